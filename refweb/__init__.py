@@ -1,0 +1,46 @@
+"""refweb, a reference solver for space webs: equilibrium and dynamics of cable nets.
+
+Names are imported when they are used: ``import refweb`` loads nothing that a scene does not need.
+"""
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "run": "runner",
+    "Scene": "scene",
+    "Static": "scene",
+    "Supports": "scene",
+    "Output": "scene",
+    "Observe": "observables",
+    "Solution": "solution",
+    "Cable": "cables",
+    "Group": "cables",
+    "Law": "laws",
+    "Web": "webs",
+    "SingleCable": "webs",
+    "Inline": "webs",
+    "File": "webs",
+    "Paper": "lattices",
+    "Window": "lattices",
+    "Layers": "lattices",
+    "Gravity": "effects.gravity",
+    "Load": "effects.load",
+    "Motion": "effects.motion",
+    "InputError": "inputs",
+    "SolverError": "statics",
+}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name):
+    import importlib
+
+    if name not in _HOME:
+        from .inputs import nearest
+
+        raise AttributeError(f"module 'refweb' has no attribute {name!r}, {nearest(name, _HOME)}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__():
+    return __all__

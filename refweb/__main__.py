@@ -1,0 +1,149 @@
+"""The command line: ``refweb run | check | info | picture``.
+
+Exit status: 0 solved, 1 the solver failed, 2 wrong input, 130 interrupted. Nothing heavy is imported before a command
+needs it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pathlib
+import sys
+
+from .inputs import InputError
+
+
+def parser():
+    """The `argparse.ArgumentParser` of all commands."""
+    top = argparse.ArgumentParser(
+        prog="refweb", description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless."
+    )
+    top.add_argument("--version", action="store_true", help="show the version and leave")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
+
+    command = commands.add_parser("run", help="solve a scene and write its result folder")
+    command.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
+    command.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")
+    command.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
+
+    command = commands.add_parser("check", help="check a scene without solving it; writes nothing")
+    command.add_argument("scene", metavar="SCENE")
+
+    command = commands.add_parser("info", help="what a scene or a result folder holds")
+    command.add_argument("source", metavar="SCENE | DIR")
+    command.add_argument("--json", action="store_true", help="as JSON")
+
+    command = commands.add_parser("picture", help="draw a result folder")
+    command.add_argument("folder", metavar="DIR")
+    command.add_argument("--frame", type=int, metavar="N", help="number of the frame (default: the last)")
+    command.add_argument("--field", metavar="NAME", help="what the colours show (default: stress)")
+    command.add_argument("--out", metavar="FILE", help="picture to write (default: DIR/web.png)")
+    command.add_argument("--animate", action="store_true", help="all frames as a GIF (default: DIR/web.gif)")
+    return top
+
+
+def _run(arguments):
+    from .console import after, before, progress
+    from .runner import run
+    from .scene import Scene, slug
+
+    scene = Scene.load(arguments.scene)
+    out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
+    with progress() as tell:
+        solution = run(scene, out=out, force=arguments.force, progress=tell, announce=before)
+    after(solution, out)
+
+
+def _check(arguments):
+    from .console import before
+    from .scene import Scene
+
+    scene = Scene.load(arguments.scene)
+    before(scene, scene.build())
+
+
+def _info(arguments):
+    import json
+
+    from .console import before, stored
+    from .runner import web_of
+    from .scene import Scene
+
+    folder = pathlib.Path(arguments.source)
+    if folder.is_dir():
+        try:
+            summary = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
+        except (ValueError, OSError) as error:
+            raise InputError(f"{folder}/run.json: cannot be read: {error}") from None
+        print(json.dumps(summary, indent=1, ensure_ascii=False)) if arguments.json else stored(summary)
+        return
+    scene = Scene.load(arguments.source)
+    system = scene.build()
+    if arguments.json:
+        print(json.dumps({"scene": scene.to_dict(), "web": web_of(system)}, indent=1, ensure_ascii=False))
+    else:
+        before(scene, system)
+
+
+def _picture(arguments):
+    from .pictures import animate, picture
+
+    if arguments.animate:
+        if arguments.frame is not None:
+            raise InputError(f"--frame {arguments.frame} and --animate exclude each other: leave one out")
+        print(animate(arguments.folder, field=arguments.field, out=arguments.out))
+    else:
+        print(picture(arguments.folder, frame=arguments.frame, field=arguments.field, out=arguments.out))
+
+
+def main(arguments=None):
+    """Run the command line; return the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    top = parser()
+    arguments = top.parse_args(arguments)
+    if arguments.version:
+        from . import __version__
+
+        print(f"refweb {__version__}")
+        return 0
+    if arguments.command is None:
+        top.print_help()
+        return 2
+    command = {"run": _run, "check": _check, "info": _info, "picture": _picture}[arguments.command]
+    try:
+        command(arguments)
+    except InputError as error:
+        print(f"refweb: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("refweb: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 1
+    except OSError as error:
+        print(f"refweb: {error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)
+        return 1
+    except Exception as error:
+        print(f"refweb: {_reason(error)}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _reason(error):
+    """A message without a traceback; a fault of refweb's own is named as one, with its place."""
+    if type(error).__module__.startswith("refweb"):
+        return str(error)
+    last = error.__traceback__
+    while last.tb_next is not None:
+        last = last.tb_next
+    place = f"{pathlib.Path(last.tb_frame.f_code.co_filename).name}:{last.tb_lineno}"
+    return f"internal error, {type(error).__name__}: {error} ({place}); please report it with the scene"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,121 @@
+"""The cable a web is made of: material, section and slackness of every line, by group."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from .inputs import InputError, Table, choice, field, nearest, real
+from .laws import NAMES, Law
+
+_DENSE = dict(at_least=0, unit="kg/m³")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group(Table):
+    """What may differ from `Cable` on the lines of one group; None keeps the cable's value."""
+
+    modulus: float | None = real(None, above=0, unit="Pa")
+    area: float | None = real(None, above=0, unit="m²")
+    density: float | None = real(None, **_DENSE)
+    slackness: float | None = real(None, at_least=0, unit="1")
+    smoothing: float | None = real(None, at_least=0, unit="1")
+    prestrain: float | None = real(None, above=-1, unit="1")
+    strength: float | None = real(None, above=0, unit="Pa")
+
+
+def _groups(name, value):
+    if not isinstance(value, dict):
+        raise InputError(f"{name} must be a table of groups, [cable.groups.NAME]")
+    return {
+        key: group if isinstance(group, Group) else Group.read(f"{name}.{key}", group) for key, group in value.items()
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cable(Table):
+    """Material and section of the lines.
+
+    Parameters
+    ----------
+    law : {"smooth", "tension-only", "linear"}
+        Tension law, see `refweb.laws`.
+    modulus : float
+        Asymptotic modulus E [Pa], > 0.
+    area : float
+        Cross section A [m²], > 0.
+    density : float
+        ρ [kg/m³], ≥ 0; mass follows natural length.
+    slackness, smoothing : float
+        ε0 and η of the smooth law [1].
+    prestrain : float
+        Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
+    strength : float, optional
+        Stress at which a line breaks [Pa]; utilisation is reported against it.
+    groups : dict of str to Group
+        Values that differ by group of lines.
+    """
+
+    law: str = choice(*NAMES, default="smooth")
+    modulus: float = real(above=0, unit="Pa")
+    area: float = real(above=0, unit="m²")
+    density: float = real(**_DENSE)
+    slackness: float | None = real(None, at_least=0, unit="1")
+    smoothing: float | None = real(None, at_least=0, unit="1")
+    prestrain: float = real(0.0, above=-1, unit="1")
+    strength: float | None = real(None, above=0, unit="Pa")
+    groups: dict = field(_groups, factory=dict)
+
+    def check(self):
+        """Fill in the smooth law's parameters; refuse them for other laws."""
+        for key, default in (("slackness", 0.0), ("smoothing", 1e-5)):
+            if self.law == "smooth":
+                if getattr(self, key) is None:
+                    object.__setattr__(self, key, default)
+                continue
+            owners = [self, *self.groups.values()]
+            given = [getattr(owner, key) for owner in owners if getattr(owner, key) is not None]
+            if given:
+                raise InputError(f'{key} = {given[0]:g} has no meaning with law = "{self.law}": leave it out')
+
+    def properties(self, web):
+        """Values for each line of a web.
+
+        Returns
+        -------
+        dict of str to ndarray
+            ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength`` (infinite where none is
+            given) and ``natural_length``, each of shape (lines,).
+
+        Raises
+        ------
+        InputError
+            For a group that no line has, or prestrain beside given natural lengths.
+        """
+        unknown = [name for name in self.groups if name not in web.groups]
+        if unknown:
+            known = sorted(set(web.groups) - {""})
+            hint = nearest(unknown[0], known) if known else "this web has no groups"
+            raise InputError(f'[cable.groups] "{unknown[0]}" is the group of no line, {hint}')
+        values = {}
+        for f in fields(Group):
+            own = getattr(self, f.name)
+            missing = np.inf if f.name == "strength" else 0.0
+            values[f.name] = np.full(len(web.lines), missing if own is None else own)
+        if self.groups:
+            group_of = np.array(web.groups)
+            for name, group in self.groups.items():
+                for key, value in group.to_dict().items():
+                    values[key][group_of == name] = value
+        prestrain = values.pop("prestrain")
+        if web.length_given and prestrain.any():
+            worst = prestrain[np.argmax(np.abs(prestrain))]
+            raise InputError(f"[cable] prestrain = {worst:g} cannot be used: the web's natural lengths are given")
+        values["natural_length"] = web.natural_length / (1.0 + prestrain)
+        return values
+
+    @property
+    def tension_law(self):
+        """The `refweb.laws.Law`."""
+        return Law(self.law)

@@ -1,0 +1,105 @@
+"""A bound on the error of a static solution, from convex duality.
+
+For the tension-only law the potential Π(x) = Σ ½ k (l − L)₊² − f·x, k = EA/L, is convex in the positions. Element forces
+s, vectors that balance the loads at every free node, give the dual value D(s) ≤ min Π. The gap is a sum over lines of
+terms that are never negative,
+
+    Π − D = Σ ½ k (l − L)₊² + |s|²/2k + L|s| − s·d,      d the line's vector, l = |d|,
+
+evaluated here without cancellation: with T = k (l − L)₊, (T − |s|)²/2k on taut lines, |s|²/2k + |s|(L − l) on slack ones,
+plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic and its gradient Lipschitz
+with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
+
+The balancing correction of the computed forces runs over taut lines first. It is kept in extended precision, where the
+platform has it, since what it leaves unbalanced enters the gap multiplied by a displacement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .factor import Factor
+from .laws import TENSION_ONLY
+from .lines import AXIAL_STIFFNESS
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """Bounds on a static solution.
+
+    Attributes
+    ----------
+    gap : float
+        Π(x) − D(s), with its rounding [J]; the exact potential lies within [Π − gap, Π].
+    tension : ndarray, shape (cells,)
+        Bound on the error of each element's tension [N].
+    strain_energy : float
+        Bound on the error of the strain energy [J].
+    """
+
+    gap: float
+    tension: np.ndarray
+    strain_energy: float
+
+
+def applies(system):
+    """True where the potential is convex and the loads are dead: tension-only law, straight elements."""
+    net = system.net
+    outer = [f for f in system.families if not f.internal]
+    dead = all(f.stiffness is None and f.energy is not None for f in outer)
+    internal = [f for f in system.families if f.internal]
+    return net.law.number == TENSION_ONLY and net.cells.shape[1] == 2 and dead and len(internal) == 1
+
+
+def _resultant(cells, s, rows):
+    total = np.zeros((rows, 3), dtype=s.dtype)
+    np.add.at(total, cells[:, 0], s)
+    np.subtract.at(total, cells[:, 1], s)
+    return total
+
+
+def certify(system, equilibrium):
+    """The `Certificate` of an equilibrium of a system to which it `applies`."""
+    net, x, cells = system.net, equilibrium.x, system.net.cells
+    stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    vector = (net.points[cells[:, 1]] - net.points[cells[:, 0]]) + (x[cells[:, 1]] - x[cells[:, 0]])
+    length = np.linalg.norm(vector, axis=1)
+    tension = equilibrium.tension
+    direction = vector / np.where(length > 0, length, 1.0)[:, None]
+    outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
+
+    weight = stiffness * np.where(tension > 0.0, 1.0, 1e-9)
+    blocks = weight[:, None, None] * np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3))
+    values = system.assemble_lines(blocks)
+    values[system.pattern.diagonal] += 1e-14 * stiffness.max()
+    factor = Factor(system.pattern)
+    factor.update(values)
+
+    force = (tension[:, None] * direction).astype(np.longdouble)
+    correction = np.zeros_like(force)
+    for _ in range(3):
+        unbalanced = outer + _resultant(cells, force + correction, system.rows)
+        unbalanced[system.supported] = 0.0
+        y = np.zeros((system.rows, 3))
+        y.ravel()[system.free] = factor.solve(unbalanced.ravel()[system.free].astype(float))
+        correction += weight[:, None] * (y[cells[:, 1]] - y[cells[:, 0]])
+    unbalanced = outer + _resultant(cells, force + correction, system.rows)
+    unbalanced[system.supported] = 0.0
+    balanced = force + correction
+
+    size = np.sqrt((balanced**2).sum(axis=1))
+    across = balanced - (balanced * direction).sum(axis=1)[:, None] * direction
+    along = (balanced * direction).sum(axis=1)
+    turned = (across**2).sum(axis=1) / np.where(size + along > 0, size + along, 1.0)
+    turned = np.where(along > 0, turned, size - along) * length
+    slack = np.where(tension > 0.0, 0.0, net.natural_length - length)
+    terms = (tension - size) ** 2 / (2 * stiffness) + size * np.maximum(slack, 0.0) + turned
+
+    reach = 2.0 * np.linalg.norm(x, axis=1).max()
+    own = 0.5 * tension**2 / stiffness + size * length * np.finfo(float).eps
+    rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum()) + np.abs(unbalanced).sum() * reach
+    gap = float(terms.sum() + rounding)
+    strain_energy = float(0.5 * (tension**2 / stiffness).sum())
+    return Certificate(gap, np.sqrt(2.0 * stiffness * gap), 2.0 * np.sqrt(strain_energy * gap) + gap)

@@ -1,0 +1,75 @@
+"""Compiled kernels: their signatures and where their machine code is kept.
+
+Every effect writes its force once, as a kernel of the one signature `FORCE`, so that the explicit loop can call any
+mixture of them without Python, and every other solver calls the same code. ``x`` in a kernel is the *displacement* of
+each row from its reference position: with the strain formula of `refweb.effects.elasticity` a net under 1e-9 N keeps all
+its digits, which it loses when positions are the unknowns.
+
+=============  ==========================================================================================
+`FORCE`        ``(t, x, v, f, cells, data, out)``: adds forces [N] to ``f``, writes ``out`` per cell
+`ENERGY`       ``(t, x, cells, data, out)``: writes the energy [J] of each cell to ``out (c,)``
+`STIFFNESS`    ``(t, x, v, blocks, cells, data, definite)``: writes −∂f/∂x [N/m] per cell; ``definite`` asks for
+               a positive semidefinite part
+=============  ==========================================================================================
+
+Machine code is kept on disk, in a folder named by the state of all source files of the package: numba itself looks only
+at the file a function stands in, and would go on using a kernel whose law, in another file, has changed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pathlib
+
+import numba
+from numba import types
+
+_f, _i = types.float64, types.int32
+
+
+def _array(scalar, dimensions):
+    return types.Array(scalar, dimensions, "C")
+
+
+_common = (_f, _array(_f, 2), _array(_f, 2))
+FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2))
+ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
+STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
+
+
+def _cache_folder():
+    package = pathlib.Path(__file__).parent
+    state = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        stat = source.stat()
+        state.update(f"{source.relative_to(package)} {stat.st_mtime_ns} {stat.st_size}\n".encode())
+    name = f"refweb-{state.hexdigest()[:16]}"
+    if numba.config.CACHE_DIR:
+        return str(pathlib.Path(numba.config.CACHE_DIR) / name)
+    if os.access(package, os.W_OK):
+        return str(package / "__pycache__" / name)
+    return ""  # numba's own choice, a folder of the user's
+
+
+_folder = _cache_folder()
+
+
+def _compile(decorator, function):
+    default = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _folder or default
+    try:
+        return decorator(function)
+    finally:
+        numba.config.CACHE_DIR = default
+
+
+def kernel(signature=None, **options):
+    """Compile a function, at once where a signature is given, and keep its machine code on disk."""
+    arguments = () if signature is None else (signature,)
+    return lambda function: _compile(numba.njit(*arguments, cache=True, error_model="numpy", **options), function)
+
+
+def ufunc(signatures):
+    """Compile a scalar function into a numpy ufunc and keep its machine code on disk."""
+    return lambda function: _compile(numba.vectorize(signatures, cache=True), function)

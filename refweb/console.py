@@ -1,0 +1,150 @@
+"""What a person at a terminal sees: one box before a run, a progress bar, one box after."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+
+from rich.console import Console
+from rich.panel import Panel
+from rich.table import Table as Grid
+from rich.text import Text
+
+from .runner import web_of
+from .scene import table_of
+
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
+
+
+def shown(value, error, unit):
+    """A value with its error in a readable unit: ``31.4848 mm``, ``2.997291 ± 0.0000017 N``."""
+    factor, prefix = 1.0, ""
+    if unit in _SCALED and value:
+        factor, prefix = next(((f, p) for f, p in PREFIXES if abs(value) >= f), PREFIXES[-1])
+    name = "" if unit == "1" else f" {prefix}{unit}"
+    value = value / factor
+    if not error:
+        return f"{value:.6g}{name}"
+    error = error / factor
+    digits = min(max(0, 1 - _exponent(error)), 15)
+    if digits > 9 or error >= 1e4 or abs(value) >= 1e7:
+        return f"{value:.10g} ± {error:.1e}{name}"
+    return f"{value:.{digits}f} ± {error:.{digits}f}{name}"
+
+
+def _exponent(value):
+    return int(f"{value:.1e}".split("e")[1])
+
+
+def _console():
+    return Console(highlight=False, width=None if sys.stdout.isatty() else 110)
+
+
+def _box(title, rows):
+    grid = Grid.grid(padding=(0, 2))
+    grid.add_column(style="bold", no_wrap=True)
+    grid.add_column()
+    for name, content in rows:
+        grid.add_row(name, content if not isinstance(content, str) else Text(content))
+    _console().print(Panel(grid, title=Text(title), title_align="left", expand=False))
+
+
+def before(scene, system):
+    """Print what is simulated: sizes, cable, effects present, solver."""
+    web, cable, solve = web_of(system), scene.cable, scene.solve
+    law = cable.law
+    if law == "smooth":
+        law += f", ε0 = {cable.slackness:g}, η = {cable.smoothing:g}"
+    present = [table_of(effect) for effect in scene.effects]
+    counted = [f"{name} × {present.count(name)}" if present.count(name) > 1 else name for name in dict.fromkeys(present)]
+    groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
+    steps = ", ".join(f"{s:g}" for s in solve.load_steps[:8]) + (", ..." if len(solve.load_steps) > 8 else "")
+    _box(
+        scene.title,
+        [
+            ("web", f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells; {len(system.free)} unknowns"),
+            ("", f"{web['cable_length']:.6g} m of cable, {web['area']:.4g} m², {web['mass']:.4g} kg"),
+            ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
+            ("effects", ", ".join(counted) or "none"),
+            ("solve", f"{solve.kind}, {solve.method}, load steps {steps}"),
+        ],
+    )
+
+
+def _results(steps):
+    names = list(steps[-1]["results"])
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    if len(steps) > 1:
+        grid.add_column("step", justify="right")
+    for name in names:
+        grid.add_column(Text(name), justify="right")
+    for step in steps:
+        row = [f"{step['step']:g}"] if len(steps) > 1 else []
+        for name in names:
+            result = step["results"][name]
+            row.append(Text(shown(result["value"], result["error"], result["unit"])))
+        grid.add_row(*row)
+    return grid
+
+
+def stored(summary):
+    """Print the box of a finished run from the content of its ``run.json``."""
+    solver, cost, rows = summary["solver"], summary["cost"], []
+    if summary["steps"]:
+        rows.append(("results", _results(summary["steps"])))
+        if any(r["error"] is None for r in summary["results"].values()):
+            rows.append(("", "a value without ± has no known error"))
+    if solver:
+        text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations, residual {solver['residual']:.1e}"
+        if solver["duality_gap"] is not None:
+            text += f", duality gap {solver['duality_gap']:.1e} J"
+        rows.append(("solver", text))
+    if cost:
+        rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
+    rows += [("warning", text) for text in summary["warnings"]]
+    if summary["status"] != "solved":
+        rows.append((summary["status"], summary["message"]))
+    _box(f"{summary['scene']}: {summary['status']}", rows)
+
+
+def after(solution, folder):
+    """Print results with their errors, and what they cost."""
+    stored(solution.summary())
+    worst = solution.state.utilisation
+    if worst is not None:
+        line = int(worst.argmax())
+        print(f"utilisation {worst[line]:.2f} at line {line}")
+    print(f"results in {folder}")
+
+
+@contextlib.contextmanager
+def progress(delay=2.0):
+    """A progress bar for whatever lasts over ``delay`` seconds; silent where nobody looks.
+
+    Yields
+    ------
+    callable
+        To be called with a line of text and the share that is done.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeElapsedColumn(), TextColumn("{task.description}"),
+        console=Console(stderr=True), transient=True,
+    )
+    task, started = bar.add_task("", total=1.0), time.perf_counter()
+
+    def tell(text, share):
+        if not bar.live.is_started and time.perf_counter() - started > delay:
+            bar.start()
+        bar.update(task, description=text, completed=share)
+
+    try:
+        yield tell
+    finally:
+        bar.stop()

@@ -1,0 +1,73 @@
+"""Effects: what acts on a net, one file each.
+
+An effect is a frozen value that holds physical numbers only. ``effect.on(net)`` returns a `Family`: cells, their numbers
+and compiled kernels for force, energy and stiffness. It touches no global matrix and knows no other effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Cells of one kind with their kernels, whose signatures are in `refweb.compiled`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the effect.
+    cells : ndarray of int32, shape (cells, arity)
+        Rows that each cell couples.
+    data : ndarray, shape (cells, columns)
+        Numbers of each cell.
+    force : kernel
+        Adds to the forces.
+    energy : kernel, optional
+        Potential of the force, where there is one.
+    stiffness : kernel, optional
+        −∂f/∂x by cell, None where it is zero.
+    book : str
+        Column of the energy book that its energy or power belongs to.
+    observed : int
+        Number of values per cell that ``force`` writes to its ``out``.
+    internal : bool
+        True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
+    """
+
+    name: str
+    cells: np.ndarray
+    data: np.ndarray
+    force: Callable
+    energy: Callable | None
+    stiffness: Callable | None
+    book: str
+    observed: int = 0
+    internal: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Rows whose motion is prescribed; ``kernel`` (signature `FORCE`) writes their x and v at time t.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (rows, 1)
+        The driven rows.
+    data : ndarray, shape (rows, columns)
+        Numbers of each row.
+    kernel : kernel
+        Writes x and v.
+    """
+
+    cells: np.ndarray
+    data: np.ndarray
+    kernel: Callable
+
+
+def column(rows):
+    """Row numbers as the cells of a family that couples nothing: int32, shape (rows, 1)."""
+    return np.ascontiguousarray(np.asarray(rows, dtype=np.int32).reshape(-1, 1))

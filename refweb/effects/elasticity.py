@@ -1,0 +1,142 @@
+"""Elasticity of the lines: the tension law on nodal line elements.
+
+With x' = dx/dξ at a quadrature point, l = |x'|, L the natural length and t = x'/l,
+
+    force on node a        −w T dN_a/dξ t
+    stiffness of (a, b)     w dN_a/dξ dN_b/dξ [(EA/L)(σ'/E) t⊗t + (T/l)(I − t⊗t)]
+
+and the strain ε = (2 X'·u' + u'·u' + |X'|² − L²)/(L(l + L)), which keeps its digits at tiny displacements.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+from ..compiled import ENERGY, FORCE, STIFFNESS, kernel
+from ..inputs import Table
+from ..laws import energy_density, stress, tangent
+from ..lines import AXIAL_STIFFNESS, LENGTH, POINT, SLACKNESS, SMOOTHING
+from . import Family
+
+
+@kernel()
+def strain(x, cells, data, c, q, nodes, gradients):
+    """(dx/dξ, its magnitude, ε) at quadrature point q of cell c."""
+    at = POINT + 4 * q
+    u0 = u1 = u2 = 0.0
+    for a in range(nodes):
+        row, d = cells[c, a], gradients[q * nodes + a]
+        u0 += d * x[row, 0]
+        u1 += d * x[row, 1]
+        u2 += d * x[row, 2]
+    r0, r1, r2, r = data[c, at], data[c, at + 1], data[c, at + 2], data[c, at + 3]
+    natural = data[c, LENGTH]
+    p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
+    length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+    square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)
+    return p0, p1, p2, length, square / (natural * (length + natural))
+
+
+@functools.cache
+def kernels(law, gradients, weights):
+    """Force, energy, stiffness and state kernels of one law and reference element.
+
+    Parameters
+    ----------
+    law : int
+        Number of the law.
+    gradients : tuple of tuple of float
+        dN/dξ by quadrature point and node.
+    weights : tuple of float
+        Quadrature weights.
+    """
+    points, nodes = len(gradients), len(gradients[0])
+    flat = tuple(value for row in gradients for value in row)
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            largest = -math.inf
+            for q in range(points):
+                p0, p1, p2, length, e = strain(x, cells, data, c, q, nodes, flat)
+                tension = stress(law, e, data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING])
+                largest = max(largest, tension)
+                if length > 0.0:
+                    s = weights[q] * tension / length
+                    for a in range(nodes):
+                        row, d = cells[c, a], s * flat[q * nodes + a]
+                        f[row, 0] -= d * p0
+                        f[row, 1] -= d * p1
+                        f[row, 2] -= d * p2
+            out[c, 0] = largest
+
+    @kernel(ENERGY)
+    def energy(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            total = 0.0
+            for q in range(points):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                total += weights[q] * energy_density(law, e, data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING])
+            out[c] = total * data[c, LENGTH]
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            for q in range(points):
+                p0, p1, p2, length, e = strain(x, cells, data, c, q, nodes, flat)
+                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
+                along = weights[q] * tangent(law, e, axial, slack, smooth) / data[c, LENGTH]
+                tension = stress(law, e, axial, slack, smooth)
+                across = 0.0
+                if length > 0.0 and not (definite and tension < 0.0):
+                    across = weights[q] * tension / length
+                if length > 0.0:
+                    p0, p1, p2 = p0 / length, p1 / length, p2 / length
+                else:
+                    p0, p1, p2 = 0.0, 0.0, 0.0
+                p = (p0, p1, p2)
+                for a in range(nodes):
+                    for b in range(nodes):
+                        d = flat[q * nodes + a] * flat[q * nodes + b]
+                        for i in range(3):
+                            for j in range(3):
+                                blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
+                            blocks[c, 3 * a + i, 3 * b + i] += d * across
+
+    @kernel(ENERGY)
+    def strains(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            largest = -math.inf
+            for q in range(points):
+                largest = max(largest, strain(x, cells, data, c, q, nodes, flat)[4])
+            out[c] = largest
+
+    return force, energy, stiffness, strains
+
+
+def of(net):
+    """The kernels of a net's law and element."""
+    return kernels(net.law.number, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Elasticity(Table):
+    """Tension of every line by the law of its cable; see `refweb.laws` and, for the numbers, `refweb.cables.Cable`."""
+
+    def on(self, net):
+        """The family of all lines; ``out`` is the tension [N]."""
+        force, energy, stiffness, _ = of(net)
+        return Family(
+            name="elasticity",
+            cells=net.cells,
+            data=net.line_data,
+            force=force,
+            energy=energy,
+            stiffness=stiffness,
+            book="strain_energy",
+            observed=1,
+            internal=True,
+        )

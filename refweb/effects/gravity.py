@@ -1,0 +1,51 @@
+"""Gravity: a uniform acceleration on every mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import ENERGY, FORCE, kernel
+from ..inputs import Table, vector
+from . import Family, column
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        for i in range(3):
+            f[cells[c, 0], i] += data[c, i]
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    for c in range(cells.shape[0]):
+        row = cells[c, 0]
+        out[c] = -(data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gravity(Table):
+    """Weight m g of every row that has mass.
+
+    Parameters
+    ----------
+    acceleration : sequence of 3 float
+        g [m/s²].
+    """
+
+    acceleration: tuple = vector(unit="m/s²")
+
+    def on(self, net):
+        """The family of all rows with mass; its energy is zero in the web's position."""
+        heavy = np.flatnonzero(net.mass)
+        return Family(
+            name="gravity",
+            cells=column(heavy),
+            data=np.outer(net.mass[heavy], self.acceleration),
+            force=force,
+            energy=energy,
+            stiffness=None,
+            book="potential_energy",
+        )

@@ -1,0 +1,71 @@
+"""Dead loads: forces of fixed direction on nodes, with an optional factor over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import ENERGY, FORCE, kernel
+from ..inputs import Table, nodes, rows, vector
+from ..time_tables import flattened, interpolate
+from . import Family, column
+
+
+@kernel()
+def factor_at(t, data, c):
+    """Factor of a load: its table's value, or without a table ``data[c, 3] + data[c, 4] t``."""
+    if data[c, 5] > 0.0:
+        return interpolate(t, data[c], 5, 2, 1)[0]
+    return data[c, 3] + data[c, 4] * t
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        factor = factor_at(t, data, c)
+        for i in range(3):
+            f[cells[c, 0], i] += factor * data[c, i]
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    for c in range(cells.shape[0]):
+        row = cells[c, 0]
+        work = data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2]
+        out[c] = -factor_at(t, data, c) * work
+
+
+@dataclass(frozen=True, kw_only=True)
+class Load(Table):
+    """A dead load on each of some nodes.
+
+    Parameters
+    ----------
+    node : int, str or list
+        Nodes, by number or name.
+    force : sequence of 3 float
+        Force on each node [N].
+    factor : sequence of (t, factor), optional
+        Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
+        times the load step.
+    """
+
+    node: object = nodes()
+    force: tuple = vector(unit="N")
+    factor: tuple | None = rows(2, None, increasing=True)
+
+    def on(self, net):
+        """The family of the loaded nodes; its energy is −(force)·(displacement)."""
+        loaded = net.web.find(self.node)
+        numbers = [*self.force, *((0.0, 1.0) if net.quasi_static else (1.0, 0.0))]
+        numbers += flattened(self.factor) if self.factor else [0.0]
+        return Family(
+            name="load",
+            cells=column(loaded),
+            data=np.tile(numbers, (len(loaded), 1)),
+            force=force,
+            energy=energy,
+            stiffness=None,
+            book="work",
+        )

@@ -1,0 +1,41 @@
+"""Prescribed motion: nodes whose displacement is a function of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import FORCE, kernel
+from ..inputs import Table, nodes, rows
+from ..time_tables import flattened, interpolate
+from . import Drive, column
+
+
+@kernel(FORCE)
+def drive(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        for i in range(3):
+            x[cells[c, 0], i], v[cells[c, 0], i] = interpolate(t, data[c], 0, 4, 1 + i)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion(Table):
+    """Prescribed displacement of nodes, which become supports.
+
+    Parameters
+    ----------
+    node : int, str or list
+        Nodes, by number or name.
+    displacement : sequence of (t, x, y, z)
+        Displacement from the web's position [m]; linear in between, end values held. In statics t is the load step.
+    """
+
+    node: object = nodes()
+    displacement: tuple = rows(4, unit="m", increasing=True)
+
+    def on(self, net):
+        """The driven rows."""
+        driven = net.web.find(self.node)
+        data = np.tile(flattened(self.displacement), (len(driven), 1))
+        return Drive(cells=column(driven), data=data, kernel=drive)

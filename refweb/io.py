@@ -1,0 +1,159 @@
+"""Result folders: frames, history and summary, so written that a kill at any moment leaves a folder that opens.
+
+Every file but ``history.csv``, which grows by whole rows, is written beside its place and then moved there.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import re
+import tempfile
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from .inputs import InputError
+
+OWN = re.compile(r"scene\.toml|checkpoint\.npz|history\.csv|run\.json|web\.pvd|web\.png|web\.gif|frames/[^/]+_\d{6}\.vtu")
+"""Files that a run writes, and that ``--force`` removes."""
+POINT_DATA = ("displacement", "velocity", "reaction", "mass")
+CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
+
+
+def write_atomically(path, write):
+    """Call ``write(file name)`` for a file beside ``path`` and move it there."""
+    handle, name = tempfile.mkstemp(prefix=".", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    try:
+        write(name)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        pathlib.Path(name).unlink(missing_ok=True)
+        raise
+
+
+def write_text(path, text):
+    """Write a text file atomically, as UTF-8."""
+    write_atomically(path, lambda name: pathlib.Path(name).write_text(text, encoding="utf-8"))
+
+
+def frame_data(state):
+    """Point and cell data of a state's web, by name."""
+    net = state.system.net
+    nodes = len(net.web.points)
+    length = np.bincount(net.line, net.natural_length)
+    points = dict(zip(POINT_DATA, (state.x, state.v, state.reaction, net.mass), strict=True))
+    cells = dict(zip(CELL_DATA, (state.tension, state.stress, state.strain, length, state.slack), strict=True))
+    return {k: a[:nodes] for k, a in points.items()}, {k: np.asarray(a, dtype=float) for k, a in cells.items()}
+
+
+def write_frame(path, state):
+    """Write the web of a state as VTU: current positions, its lines in the web's own numbering, float64."""
+    import meshio
+
+    web = state.system.net.web
+    point_data, cell_data = frame_data(state)
+    mesh = meshio.Mesh(
+        state.position[: len(web.points)],
+        [("line", web.lines)],
+        point_data=point_data,
+        cell_data={key: [values] for key, values in cell_data.items()},
+    )
+    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
+
+
+def check_folder(folder, force=False):
+    """Refuse a result folder that cannot be written, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        Where ``folder`` is a file, cannot be written, or is not empty and ``force`` is not given; with ``force`` where
+        it holds no ``run.json``.
+    """
+    folder = pathlib.Path(folder)
+    existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
+    if not existing.is_dir():
+        raise InputError(f"--out {folder}: {existing} is a file, not a folder")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise InputError(f"--out {folder}: {existing} cannot be written: choose another folder")
+    if folder.is_dir() and any(folder.iterdir()):
+        if not force:
+            raise InputError(f"--out {folder}: is not empty: choose another folder, or --force to replace its results")
+        if not (folder / "run.json").is_file():
+            raise InputError(f"--out {folder}: holds no run.json, so it is no result of refweb: nothing was removed")
+
+
+def clear(folder):
+    """Remove what a run wrote, and nothing else."""
+    for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
+        if path.is_file() and OWN.fullmatch(path.relative_to(folder).as_posix()):
+            path.unlink()
+
+
+def number(value):
+    """A number as text that reads back to the same float."""
+    return repr(float(value))
+
+
+class Folder:
+    """A result folder that is being written.
+
+    Parameters
+    ----------
+    path : path-like
+        The folder; made where it does not exist, cleared of earlier results where it does.
+    scene : refweb.Scene
+        Written as ``scene.toml`` with all defaults filled in.
+    columns : sequence of str
+        Header of ``history.csv``.
+    """
+
+    def __init__(self, path, scene, columns):
+        import tomli_w
+
+        self.path = pathlib.Path(path)
+        (self.path / "frames").mkdir(parents=True, exist_ok=True)
+        clear(self.path)
+        write_text(self.path / "scene.toml", tomli_w.dumps(scene.to_dict()))
+        self._history = open(self.path / "history.csv", "w", encoding="utf-8", newline="\n")
+        self.row(columns)
+        self._listed = []
+        self._list_frames()
+
+    def row(self, values):
+        """Append a row to ``history.csv``."""
+        text = ",".join(v if isinstance(v, str) else number(v) for v in values)
+        self._history.write(text + "\n")
+        self._history.flush()
+
+    def frame(self, number, state):
+        """Write frame and checkpoint of a state and list the frame in ``web.pvd``."""
+        name = f"frames/web_{number:06d}.vtu"
+        write_frame(self.path / name, state)
+        arrays = {"time": state.time, "positions": state.position, "velocities": state.v}
+        write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
+        self._listed.append((state.time, name))
+        self._list_frames()
+
+    def _list_frames(self):
+        rows = "".join(
+            f'    <DataSet timestep="{number(time)}" group="" part="0" file={quoteattr(name)}/>\n'
+            for time, name in self._listed
+        )
+        write_text(
+            self.path / "web.pvd",
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+            f"  <Collection>\n{rows}  </Collection>\n</VTKFile>\n",
+        )
+
+    def summary(self, run):
+        """Write ``run.json``."""
+        write_text(self.path / "run.json", json.dumps(run, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def close(self):
+        """Close the history."""
+        self._history.close()

@@ -1,0 +1,149 @@
+"""Observables: the numbers a run is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .inputs import InputError, Table, choice, component, field, node_number, nodes, text
+from .lines import AXIAL_STIFFNESS
+
+_NODAL = {"displacement": ("x", "m"), "position": ("position", "m"), "reaction": ("reaction", "N")}
+_LINE = {"tension": ("tension", "N"), "stress": ("stress", "Pa"), "strain": ("strain", "1")}
+_TOTAL = {
+    "strain_energy": "J",
+    "potential_energy": "J",
+    "total_energy": "J",
+    "work": "J",
+    "slack_fraction": "1",
+}
+QUANTITIES = (*_NODAL, *_LINE, *_TOTAL)
+_NEEDS = {"potential_energy": "gravity", "work": "load"}
+
+
+class Value(NamedTuple):
+    """Value of an observable at one instant; ``where`` is the node or line it stands at."""
+
+    value: float
+    where: int | None
+
+
+class Result(NamedTuple):
+    """A result of a run: value, its error (None where none is known), unit, time and place."""
+
+    value: float
+    error: float | None
+    unit: str
+    time: float
+    where: int | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observe(Table):
+    """A named number, followed over time.
+
+    Parameters
+    ----------
+    name : str
+        Its name in results and history.
+    quantity : str
+        One of `QUANTITIES`.
+    node : int or str, optional
+        Node of a nodal quantity; without it the largest over all nodes (reaction: the sum over all supports).
+    line : int, optional
+        Line of a line quantity; without it the largest over all lines.
+    component : {0, 1, 2, "x", "y", "z"}, optional
+        Axis of a nodal quantity; without it the magnitude.
+    reduce : {"max", "min", "final"}
+        Reduction over time.
+    """
+
+    name: str = text()
+    quantity: str = choice(*QUANTITIES)
+    node: object = nodes(None)
+    line: int | None = field(node_number, None)
+    component: int | None = component(None)
+    reduce: str = choice("max", "min", "final", default="final")
+
+    def check(self):
+        """Refuse a node, line or component that the quantity does not have."""
+        if "," in self.name or '"' in self.name:
+            raise InputError(f"name = {self.name} must be free of commas and quotes: it heads a column of history.csv")
+        nodal, line = self.quantity in _NODAL, self.quantity in _LINE
+        for key, allowed in (("node", nodal), ("component", nodal), ("line", line)):
+            if getattr(self, key) is not None and not allowed:
+                raise InputError(f'{key} = {getattr(self, key)} has no meaning for quantity = "{self.quantity}"')
+        if isinstance(self.node, tuple):
+            raise InputError(f"node = {list(self.node)} must be one node: give one [[observe]] per node")
+
+    @property
+    def unit(self):
+        """Unit of the value."""
+        if self.quantity in _TOTAL:
+            return _TOTAL[self.quantity]
+        return {**_NODAL, **_LINE}[self.quantity][1]
+
+    def on(self, system):
+        """Refuse what the system does not have; return the observable with its node as a number."""
+        web = system.net.web
+        need = _NEEDS.get(self.quantity)
+        if need and need not in [f.name for f in system.families]:
+            raise InputError(f'quantity = "{self.quantity}" needs a [{need}] in the scene')
+        if self.quantity == "work" and system.drives:
+            raise InputError('quantity = "work" is not known in statics with [[motion]]: it depends on the path')
+        if self.line is not None and self.line >= len(web.lines):
+            raise InputError(f"line = {self.line} must be 0 … {len(web.lines) - 1}")
+        if self.node is not None:
+            found = web.find(self.node)
+            if len(found) != 1:
+                raise InputError(f'node = "{self.node}" must be one node, not {len(found)}')
+            return int(found[0])
+        return None
+
+    def value(self, state):
+        """The observable at one instant, a `Value`."""
+        if self.quantity == "slack_fraction":
+            return Value(float(state.slack.mean()), None)
+        if self.quantity in _TOTAL:
+            return Value(state.energies[self.quantity], None)
+        if self.quantity in _LINE:
+            values = getattr(state, self.quantity)
+            at = int(np.argmax(values)) if self.line is None else self.line
+            return Value(float(values[at]), at)
+        values = getattr(state, _NODAL[self.quantity][0])
+        if self.quantity == "reaction" and self.node is None:
+            values = values.sum(axis=0, keepdims=True)
+        values = np.linalg.norm(values, axis=1) if self.component is None else values[:, self.component]
+        if self.quantity == "reaction" and self.node is None:
+            return Value(float(values[0]), None)
+        at = int(np.argmax(values)) if self.node is None else self.on(state.system)
+        return Value(float(values[at]), at)
+
+    def error(self, state, certificate):
+        """Bound on the error of the value from a `refweb.certificate.Certificate`, None where it gives none."""
+        if certificate is None:
+            return None
+        if self.quantity == "strain_energy":
+            return certificate.strain_energy
+        if self.quantity not in _LINE:
+            return None
+        net = state.system.net
+        bound = certificate.tension
+        if self.quantity == "stress":
+            bound = bound / net.area
+        if self.quantity == "strain":
+            bound = bound / net.line_data[:, AXIAL_STIFFNESS]
+        error = float(bound.max() if self.line is None else bound[net.line == self.line].max())
+        if self.quantity == "strain" and self.value(state).value <= error:
+            return None  # the strain of a slack line is not unique
+        return error
+
+
+DEFAULT = (
+    Observe(name="deflection", quantity="displacement", reduce="max"),
+    Observe(name="max_stress", quantity="stress", reduce="max"),
+    Observe(name="max_tension", quantity="tension", reduce="max"),
+)
+"""What a scene without ``[[observe]]`` observes."""

@@ -1,0 +1,140 @@
+"""What a run returns: results, fields, history and cost, as numpy arrays and plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .inputs import InputError, nearest
+
+
+class Names(dict):
+    """A dict whose unknown keys are answered with the nearest one."""
+
+    def __missing__(self, key):
+        raise KeyError(f"{key!r} is not among them, {nearest(key, self)}")
+
+
+@dataclass(eq=False)
+class Solution:
+    """A solved scene.
+
+    Attributes
+    ----------
+    scene : refweb.Scene
+        What was solved.
+    state : refweb.state.State
+        The last state.
+    history : dict of str to ndarray
+        Columns of the history by name: ``step`` (statics), every observable, energies [J]; one entry per row.
+    columns : list of str
+        The same names with units, as ``history.csv`` heads them.
+    steps : list of dict
+        Results and solver figures of each load step.
+    solver, cost, web : dict
+        As in ``run.json``.
+    status : {"running", "solved", "failed", "interrupted"}
+        How it ended; ``message`` says why.
+    warnings : list of str
+        What a reader of the results has to know.
+    """
+
+    scene: object
+    state: object = None
+    history: dict = field(default_factory=dict)
+    columns: list = field(default_factory=list)
+    steps: list = field(default_factory=list)
+    solver: dict = field(default_factory=dict)
+    cost: dict = field(default_factory=dict)
+    web: dict = field(default_factory=dict)
+    versions: dict = field(default_factory=dict)
+    status: str = "running"
+    message: str = ""
+    warnings: list = field(default_factory=list)
+    frames: list = field(default_factory=list)
+
+    @property
+    def results(self):
+        """Results by name, each a `refweb.observables.Result`; of the last load step."""
+        return Names(self.steps[-1]["results"]) if self.steps else Names()
+
+    @property
+    def positions(self):
+        """Positions of the web's nodes in the last state [m], shape (nodes, 3)."""
+        return self.state.position[: len(self.state.system.net.web.points)]
+
+    @property
+    def displacement(self):
+        """Displacement of the web's nodes in the last state [m], shape (nodes, 3)."""
+        return self.state.x[: len(self.state.system.net.web.points)]
+
+    @property
+    def tension(self):
+        """Tension of the lines in the last state [N], shape (lines,)."""
+        return self.state.tension
+
+    @property
+    def stress(self):
+        """Stress of the lines in the last state [Pa], shape (lines,)."""
+        return self.state.stress
+
+    @property
+    def reaction(self):
+        """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
+        return self.state.reaction[: len(self.state.system.net.web.points)]
+
+    def summary(self):
+        """The content of ``run.json``, a dict of plain values."""
+
+        def plain(results):
+            return {name: result._asdict() for name, result in results.items()}
+
+        return {
+            "status": self.status,
+            "message": self.message,
+            "scene": self.scene.title,
+            "web": self.web,
+            "results": plain(self.results),
+            "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
+            "events": [],
+            "solver": self.solver,
+            "cost": self.cost,
+            "versions": self.versions,
+            "seed": self.scene.seed,
+            "warnings": self.warnings,
+        }
+
+    def save(self, folder, force=False):
+        """Write the result folder.
+
+        Parameters
+        ----------
+        folder : path-like
+            Made where it does not exist.
+        force : bool
+            Replace the results of an earlier run.
+
+        Raises
+        ------
+        InputError
+            Where the folder is not empty or cannot be written.
+        """
+        from .io import Folder, check_folder
+
+        check_folder(folder, force)
+        if self.state is None:
+            raise InputError("there is no state to save")
+        out = Folder(folder, self.scene, self.columns)
+        for row in zip(*self.history.values(), strict=True):
+            out.row(row)
+        for number, state in self.frames:
+            out.frame(number, state)
+        out.close()
+        out.summary(self.summary())
+
+
+def as_history(names, rows):
+    """Rows of numbers as a dict of columns."""
+    table = np.array(rows, dtype=float).reshape(len(rows), len(names))
+    return Names(zip(names, table.T, strict=True))

@@ -1,0 +1,113 @@
+"""One instant of a net and everything that can be read off it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from .laws import SMOOTH
+from .lines import SLACKNESS
+
+
+class State:
+    """Displacement and velocity of a system at one time, and the quantities that follow from them.
+
+    Parameters
+    ----------
+    system : refweb.system.System
+        What acts.
+    time : float
+        Time [s]; in statics the load step.
+    x : ndarray, shape (rows, 3)
+        Displacement [m].
+    v : ndarray, shape (rows, 3), optional
+        Velocity [m/s], zero by default.
+    """
+
+    def __init__(self, system, time, x, v=None):
+        self.system, self.time, self.x = system, time, x
+        self.v = np.zeros_like(x) if v is None else v
+
+    @cached_property
+    def _forces(self):
+        force, out = self.system.forces(self.time, self.x, self.v)
+        return force, [o.copy() for o in out]
+
+    def _by_line(self, values):
+        """Largest value over the elements of each line."""
+        net = self.system.net
+        largest = np.full(len(net.web.lines), -np.inf)
+        np.maximum.at(largest, net.line, values)
+        return largest
+
+    @cached_property
+    def position(self):
+        """Positions [m], shape (rows, 3)."""
+        return self.system.net.points + self.x
+
+    @cached_property
+    def element_tension(self):
+        """Tension of each element [N], shape (cells,)."""
+        at = next(i for i, f in enumerate(self.system.families) if f.cells is self.system.net.cells)
+        return self._forces[1][at][:, 0]
+
+    @cached_property
+    def tension(self):
+        """Tension [N], shape (lines,)."""
+        return self._by_line(self.element_tension)
+
+    @cached_property
+    def stress(self):
+        """Nominal stress T/A [Pa], shape (lines,)."""
+        return self._by_line(self.element_tension / self.system.net.area)
+
+    @cached_property
+    def _element_strain(self):
+        from .effects.elasticity import of
+
+        net, strain = self.system.net, np.empty(len(self.system.net.cells))
+        of(net)[3](self.time, self.x, net.cells, net.line_data, strain)
+        return strain
+
+    @cached_property
+    def strain(self):
+        """Engineering strain [1], shape (lines,)."""
+        return self._by_line(self._element_strain)
+
+    @cached_property
+    def slack(self):
+        """True for each line whose strain is ≤ ε0 (laws without slackness: ≤ 0), shape (lines,)."""
+        net = self.system.net
+        margin = net.line_data[:, SLACKNESS] if net.law.number == SMOOTH else 0.0
+        return self._by_line(self._element_strain - margin) <= 0.0
+
+    @cached_property
+    def slack_nodes(self):
+        """Free nodes that no taut line holds, whose position is not unique."""
+        net = self.system.net
+        held = self.system.supported.all(axis=1)
+        held[net.web.lines[~self.slack].ravel()] = True
+        return np.flatnonzero(~held[: len(net.web.points)])
+
+    @cached_property
+    def reaction(self):
+        """Force of the supports on the net [N], shape (rows, 3)."""
+        return np.where(self.system.supported, -self._forces[0], 0.0)
+
+    @cached_property
+    def utilisation(self):
+        """Stress over strength, shape (lines,); None where no line has a strength."""
+        net = self.system.net
+        return self._by_line(self.element_tension / (net.area * net.strength)) if np.isfinite(net.strength).any() else None
+
+    @cached_property
+    def energies(self):
+        """Energies by column of the book [J]: those of the effects that are present, and their total."""
+        book = {}
+        for family in self.system.families:
+            energy = float(self.system.energy_of(family, self.time, self.x).sum())
+            book[family.book] = book.get(family.book, 0.0) + energy
+        work = -book.pop("work") if "work" in book else None
+        book["total_energy"] = sum(book.values())
+        return book if work is None else {**book, "work": work}

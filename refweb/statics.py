@@ -1,0 +1,325 @@
+"""Static equilibrium by Newton's method on the potential energy, from any start.
+
+The tangent of a flat tensionless net is singular, and load stepping or a diagonal shift starts from nothing. Here the
+Newton matrix is K + τ G, where G is the geometric stiffness of a *unit tension in every line*: a fictitious prestress τ
+that leaves as the iteration converges. It resists relative motion, not motion, so that the first step already has the
+shape of a loaded membrane. On the square web of 1677 nodes under 1 N the shift τG takes 7 or 8 factorizations from
+flat for every smoothing from 1e-2 to 0, where a shift of the diagonal takes 15 or 16. A line search on the energy makes
+every step a descent. Lines under compression make K indefinite: K itself is used where its shifted pivots are positive,
+its positive semidefinite part where they are not.
+
+An equilibrium exists unless the net can be carried off: a part of the net without support in a direction in which the
+forces on it do not balance. `check_supported` proves that before anything is solved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from . import certificate
+from .factor import Factor
+from .laws import LINEAR, SMOOTH, TENSION_ONLY, Law
+from .lines import SMOOTHING
+from .system import System
+
+TOLERANCE = 1e-10
+"""Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step."""
+LIMIT = 1e-9
+
+
+class SolverError(RuntimeError):
+    """A solver that found no answer; the message says what, where and when."""
+
+
+class NotFound(SolverError):
+    """An equilibrium exists but the iteration did not reach it; ``stats`` tells what it spent."""
+
+    def __init__(self, message, stats):
+        super().__init__(message)
+        self.stats = stats
+
+
+@dataclass(eq=False)
+class Equilibrium:
+    """One state of statics.
+
+    Attributes
+    ----------
+    step : float
+        Load step.
+    x : ndarray, shape (rows, 3)
+        Displacement of every row [m].
+    tension : ndarray, shape (cells,)
+        Tension of every element [N].
+    force : ndarray, shape (rows, 3)
+        Resultant force on every row [N]; at a support the negative of the reaction.
+    stats : dict
+        ``nsteps`` iterations, ``nfev`` force and energy evaluations, ``njev`` tangents, ``nlu`` factorizations,
+        ``residual`` [1], ``smallest_pivot`` (its sign, None where not asked for).
+    certificate : refweb.certificate.Certificate, optional
+        Bounds on energy and tension, for the tension-only law.
+    """
+
+    step: float
+    x: np.ndarray
+    tension: np.ndarray
+    force: np.ndarray
+    stats: dict = field(default_factory=dict)
+    certificate: object = None
+
+
+def unsupported(system):
+    """Parts of the net that can be carried off in a direction.
+
+    Returns
+    -------
+    list of (ndarray of int, int)
+        Rows of a connected part, and the axis in which none of them is supported.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    cells = [f.cells for f in system.families if f.cells.shape[1] > 1]
+    pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
+    count, part = connected_components(graph, directed=False)
+    held = np.zeros((count, 3), dtype=bool)
+    np.logical_or.at(held, part, system.supported)
+    return [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
+
+
+def check_supported(system, t):
+    """Refuse a load that no support carries; return the loose parts, whose loads balance."""
+    outer = sum((system.force_of(f, t, np.zeros((system.rows, 3))) for f in system.families if not f.internal))
+    loose = unsupported(system)
+    for rows, axis in loose:
+        resultant = np.sum(outer[rows, axis]) if np.ndim(outer) else 0.0
+        if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
+            first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
+            raise SolverError(
+                f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
+                f"{resultant:.4g} N at step {t:g}, with no support in that direction: support one of them"
+            )
+    return loose
+
+
+def force_scale(system, t, x, tension):
+    """What residuals are measured against [N]: the largest of nodal load, nodal weight and tension."""
+    loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in system.families if not f.internal]
+    return max([*loads, np.abs(tension).max(initial=0.0)])
+
+
+def residual(system, force, scale):
+    """Largest force on a free node over the scale [1]."""
+    free = np.where(system.supported, 0.0, force)
+    return np.linalg.norm(free, axis=1).max(initial=0.0) / scale if scale else 0.0
+
+
+class Newton:
+    """Energy-globalised Newton iteration on one system; keeps pattern and factorization between load steps."""
+
+    def __init__(self, system, progress=None):
+        self.system = system
+        self.progress = progress or (lambda text: None)
+        net = system.net
+        unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
+        blocks = np.kron(unit, np.eye(3))[None] / net.natural_length[:, None, None]
+        self.geometric = system.assemble_lines(blocks)
+        self.stiffest = (net.line_data[:, 1] / net.natural_length).max()
+        self.axial = net.line_data[:, 1].max()
+        self.factor = Factor(system.pattern)
+        self.loose = np.zeros(0, dtype=int)
+
+    def _ground(self, t):
+        """Places on the diagonal that hold the loose parts of the net, whose loads balance."""
+        number = np.full(3 * self.system.rows, -1)
+        number[self.system.free] = np.arange(len(self.system.free))
+        loose = [number[3 * rows + axis] for rows, axis in check_supported(self.system, t)]
+        self.loose = self.system.pattern.diagonal[np.concatenate(loose)] if loose else np.zeros(0, dtype=int)
+
+    def _matrix(self, t, x, shift, definite):
+        values = self.system.stiffness(t, x, definite=definite)
+        values += shift * self.geometric
+        values[self.loose] += 1e-10 * self.stiffest
+        return values
+
+    def _step(self, t, x, r, shift, compressed, stats):
+        """Newton step of the shifted tangent, and the shift that it took."""
+        definite = False
+        for _ in range(60):
+            self.factor.update(self._matrix(t, x, shift, definite))
+            stats["njev"] += 1
+            stats["nlu"] += 1
+            if compressed and not definite and self.factor.negative_pivots():
+                definite = True
+                continue
+            p = self.factor.solve(r)
+            if p is not None and r @ p > 0.0:
+                return p, shift
+            shift = max(4.0 * shift, 1e-12 * self.axial)
+        raise NotFound(f"singular tangent at step {t:g}: no shift up to {shift:.3g} N makes it definite", stats)
+
+    def smallest_pivot(self, t, x, stats):
+        """Sign of the smallest pivot of K: −1 for a saddle, 0 where K is singular to rounding, 1 for a minimum."""
+        tiny = 1e-12 * self.axial
+        for shift, sign in ((tiny, -1), (-tiny, 0)):
+            self.factor.update(self._matrix(t, x, shift, False))
+            stats["nlu"] += 1
+            if self.factor.negative_pivots():
+                return sign
+        return 1
+
+    def solve(self, t, x, shift=None, most=200):
+        """Equilibrium at load step t from the displacement x.
+
+        Parameters
+        ----------
+        t : float
+            Load step.
+        x : ndarray, shape (rows, 3)
+            Start [m].
+        shift : float, optional
+            Fictitious prestress τ of the first iteration [N].
+        most : int
+            Largest number of factorizations.
+
+        Returns
+        -------
+        Equilibrium
+
+        Raises
+        ------
+        SolverError
+            Where there is no equilibrium, or none is found.
+        """
+        system = self.system
+        self._ground(t)
+        x = x.copy()
+        system.drive(t, x)
+        stats = dict(nsteps=0, nfev=1, njev=0, nlu=0)
+        force, out = system.forces(t, x)
+        tension = out[0][:, 0]
+        scale = force_scale(system, t, x, tension)
+        if shift is None:
+            shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2)
+        energy, best = system.energy(t, x), np.inf
+        while True:
+            r = force.ravel()[system.free]
+            scale = force_scale(system, t, x, tension)
+            error = residual(system, force, scale)
+            if not np.isfinite(error):
+                raise SolverError(f"non-finite force at step {t:g}, node {np.argmax(~np.isfinite(force).all(axis=1))}")
+            if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
+                break
+            best = min(best, error)
+            if stats["nlu"] >= most:
+                node = np.linalg.norm(np.where(system.supported, 0, force), axis=1).argmax()
+                raise NotFound(
+                    f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node {node}, "
+                    f"limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
+                    stats,
+                )
+            p, shift = self._step(t, x, r, shift, bool((tension < 0.0).any()), stats)
+            x, energy, shift = self._search(t, x, p, r @ p, energy, shift, stats)
+            force, out = system.forces(t, x)
+            tension = out[0][:, 0]
+            stats["nsteps"] += 1
+            stats["nfev"] += 1
+            self.progress(f"step {t:g}, residual {error:.0e}")
+        stats["residual"] = float(error)
+        return Equilibrium(t, x, tension.copy(), force, stats)
+
+    def _search(self, t, x, p, slope, energy, shift, stats):
+        """Line search along p: on the energy, or on its slope once energy differences drown in rounding."""
+        system, a = self.system, 1.0
+        y = x.copy()
+        flat, drowned = y.ravel(), 0.5 * slope < 1e-9 * abs(energy)
+        start = x.ravel()[system.free]
+        for _ in range(40):
+            flat[system.free] = start + a * p
+            trial = system.energy(t, y)
+            stats["nfev"] += 1
+            if drowned:
+                here = system.force(t, y).ravel()[system.free] @ p
+                if abs(here) <= 0.9 * slope:
+                    break
+                a *= 0.5
+                continue
+            rise = trial - energy + a * slope
+            if trial <= energy - 1e-4 * a * slope:
+                break
+            a *= min(max(0.5 * a * slope / rise, 0.1), 0.5) if np.isfinite(rise) else 0.1
+        if a < 1.0:
+            return y, trial, 4.0 * shift
+        good = drowned or energy - trial > 0.25 * 0.5 * slope
+        return y, trial, 0.1 * shift if good else shift
+
+
+def _relaxed(system, smoothing):
+    """The same system with the smooth law at a larger smoothing."""
+    data = system.net.line_data.copy()
+    data[:, SMOOTHING] = np.maximum(data[:, SMOOTHING], smoothing)
+    net = replace(system.net, law=Law("smooth"), line_data=data)
+    return System(net, system.effects, system.supported)
+
+
+def _add(stats, other):
+    for key in ("nsteps", "nfev", "njev", "nlu"):
+        stats[key] += other[key]
+    return stats
+
+
+def _continued(system, t, x, progress, spent):
+    """Equilibrium by decades of smoothing, 1e-2 down to the system's own, each from the one before."""
+    own = system.net.line_data[:, SMOOTHING].max() if system.net.law.number == SMOOTH else 0.0
+    for smoothing in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        if smoothing <= own:
+            break
+        state = Newton(_relaxed(system, smoothing), progress).solve(t, x)
+        x = state.x
+        _add(spent, state.stats)
+    return Newton(system, progress).solve(t, x)
+
+
+def solve(system, load_steps, progress=None):
+    """Equilibria at load steps, one after another, each from the one before.
+
+    Where Newton's method finds none from the last state, it is led there through decades of smoothing.
+
+    Parameters
+    ----------
+    system : refweb.system.System
+        With a net whose ``quasi_static`` is True.
+    load_steps : sequence of float
+        Values of t.
+    progress : callable, optional
+        Called with a line of text after each iteration.
+
+    Yields
+    ------
+    Equilibrium
+
+    Raises
+    ------
+    SolverError
+        Where there is no equilibrium, or none is found; the states before have been yielded.
+    """
+    newton, x = Newton(system, progress), np.zeros((system.rows, 3))
+    for t in load_steps:
+        spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)
+        try:
+            state = newton.solve(t, x, most=60)
+        except NotFound as error:
+            if system.net.law.number == LINEAR:
+                raise
+            spent = error.stats
+            state = _continued(system, t, x, progress, spent)
+        if system.net.law.number != TENSION_ONLY:
+            state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
+        _add(state.stats, spent)
+        if certificate.applies(system):
+            state.certificate = certificate.certify(system, state)
+        x = state.x
+        yield state

@@ -1,0 +1,108 @@
+"""The sum of effects: M v' = f(t, x, v), x' = v, with supports eliminated.
+
+A `System` concatenates the families of its effects once and has the interface of one of them: force, energy, stiffness.
+``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the system.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from .effects import Drive
+from .pattern import Pattern
+
+
+class System:
+    """A net, the effects on it and its supports.
+
+    Parameters
+    ----------
+    net : refweb.lines.Net
+        Rows, lines and masses.
+    effects : sequence
+        Values with ``on(net)``.
+    supported : ndarray of bool, shape (rows, 3)
+        Components that do not move, or move as prescribed.
+
+    Attributes
+    ----------
+    families : list of refweb.effects.Family
+        One per effect that adds forces.
+    drives : list of refweb.effects.Drive
+        One per effect that prescribes motion; its rows are supported as well.
+    free : ndarray of int
+        Components 3 row + axis of the unknowns, increasing.
+    """
+
+    def __init__(self, net, effects, supported):
+        self.net, self.effects = net, effects
+        self.rows = len(net.points)
+        acting = [effect.on(net) for effect in effects]
+        self.families = [a for a in acting if not isinstance(a, Drive)]
+        self.drives = [a for a in acting if isinstance(a, Drive)]
+        self.supported = supported.copy()
+        for drive in self.drives:
+            self.supported[drive.cells[:, 0]] = True
+        self.free = np.flatnonzero(~self.supported)
+        self._rest = np.zeros((self.rows, 3))
+        self._out = [np.zeros((len(f.cells), f.observed)) for f in self.families]
+        self._blocks = [np.empty((len(f.cells), 3 * f.cells.shape[1], 3 * f.cells.shape[1])) for f in self._stiff]
+
+    @property
+    def _stiff(self):
+        return [f for f in self.families if f.stiffness is not None]
+
+    @cached_property
+    def pattern(self):
+        """The fixed `refweb.pattern.Pattern` of the tangent."""
+        return Pattern(self.rows, self.free, [f.cells for f in self._stiff])
+
+    def drive(self, t, x, v=None):
+        """Write the prescribed displacements [m] and velocities [m/s] at time t into x and v."""
+        v = np.zeros_like(x) if v is None else v
+        for d in self.drives:
+            d.kernel(t, x, v, self._rest, d.cells, d.data, self._rest)
+
+    def force(self, t, x, v=None):
+        """Force on every row [N], supports included, shape (rows, 3)."""
+        return self.forces(t, x, v)[0]
+
+    def forces(self, t, x, v=None):
+        """Force on every row [N], and what each family observes per cell (a list beside ``families``)."""
+        f = np.zeros((self.rows, 3))
+        v = self._rest if v is None else v
+        for family, out in zip(self.families, self._out, strict=True):
+            family.force(t, x, v, f, family.cells, family.data, out)
+        return f, self._out
+
+    def force_of(self, family, t, x, v=None):
+        """Force on every row of one family [N]."""
+        f = np.zeros((self.rows, 3))
+        out = np.zeros((len(family.cells), family.observed))
+        family.force(t, x, self._rest if v is None else v, f, family.cells, family.data, out)
+        return f
+
+    def energy_of(self, family, t, x):
+        """Energy of each cell of one family [J]."""
+        out = np.empty(len(family.cells))
+        family.energy(t, x, family.cells, family.data, out)
+        return out
+
+    def energy(self, t, x):
+        """Total potential Π [J]: that of the lines and of all loads."""
+        return sum(self.energy_of(f, t, x).sum() for f in self.families)
+
+    def stiffness(self, t, x, v=None, definite=False):
+        """Values of K = −∂f/∂x [N/m] in the fixed pattern; ``definite`` leaves out what is negative."""
+        v = self._rest if v is None else v
+        for family, blocks in zip(self._stiff, self._blocks, strict=True):
+            family.stiffness(t, x, v, blocks, family.cells, family.data, definite)
+        return self.pattern.assemble(self._blocks)
+
+    def assemble_lines(self, blocks):
+        """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
+        at = next(i for i, f in enumerate(self._stiff) if f.cells is self.net.cells)
+        empty = [np.zeros_like(b[:0]) for b in self._blocks]
+        return self.pattern.assemble([*empty[:at], np.ascontiguousarray(blocks), *empty[at + 1 :]])

@@ -1,0 +1,45 @@
+"""Small nets that several tests use."""
+
+import numpy as np
+
+from refweb import lines
+from refweb.cables import Cable
+from refweb.effects.elasticity import Elasticity
+from refweb.system import System
+from refweb.webs import Web
+
+LAWS = {
+    "smooth": dict(law="smooth", slackness=2e-3, smoothing=1e-2),
+    "tension-only": dict(law="tension-only"),
+    "linear": dict(law="linear"),
+}
+
+
+def skew_web():
+    """A branching, closed net in space with a group, a stub and prestressed and slack lines."""
+    points = [[0, 0, 0], [1, 0.1, 0], [1.1, 1, 0.2], [-0.1, 0.9, 0], [0.5, 0.5, 0.3], [0.6, 0.4, -0.5]]
+    pairs = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4], [5, 4]]
+    points, pairs = np.array(points, dtype=float), np.array(pairs)
+    distance = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    factor = np.array([0.99, 1.05, 1.0, 0.9, 0.97, 0.95, 1.2, 0.98, 0.96])
+    groups = ("", "edge", "", "edge", "", "", "tie", "tie", "")
+    return Web(points=points, lines=pairs, natural_length=factor * distance, rim=np.array([0, 2]), groups=groups)
+
+
+def skew_cable(law="smooth"):
+    """A cable whose groups differ in everything."""
+    groups = {"edge": dict(modulus=2e5, area=3e-4, density=900.0), "tie": dict(area=2e-4)}
+    return Cable(modulus=1e5, area=1e-4, density=300.0, groups=groups, **LAWS[law])
+
+
+def skew_net(law="smooth", **options):
+    return lines.build(skew_web(), skew_cable(law), **options)
+
+
+def system(web, cable, effects=(), quasi_static=True, supported=None):
+    """The system of a web with its rim supported."""
+    net = lines.build(web, cable, quasi_static=quasi_static)
+    if supported is None:
+        supported = np.zeros((len(net.points), 3), dtype=bool)
+        supported[web.rim] = True
+    return System(net, [Elasticity(), *effects], supported)
