@@ -44,13 +44,16 @@ class Certificate:
     strain_energy: float
 
 
-def applies(system):
-    """True where the potential is convex and the loads are dead: tension-only law, straight elements."""
-    net = system.net
+def straight_and_dead(system):
+    """True where the only internal forces are the tensions of straight elements, and all others are dead loads."""
     outer = [f for f in system.families if not f.internal]
     dead = all(f.stiffness is None and f.energy is not None for f in outer)
-    internal = [f for f in system.families if f.internal]
-    return net.law.number == TENSION_ONLY and net.cells.shape[1] == 2 and dead and len(internal) == 1
+    return system.net.cells.shape[1] == 2 and dead and len(system.families) == len(outer) + 1
+
+
+def applies(system):
+    """True where the potential is convex and the loads are dead."""
+    return system.net.law.number == TENSION_ONLY and straight_and_dead(system)
 
 
 def _resultant(cells, s, rows):

@@ -2,11 +2,12 @@
 
 OpenGL libraries that are missing or broken end a process instead of raising an exception, and they write to the
 terminal. `images` therefore renders in a child process, tries each kind of off-screen window in turn and returns None
-if none works; `polygons` then draws the same model through the same `View` with nothing but matplotlib.
+if none works; `polygons` then draws the same model through the same `refweb.views.View` with matplotlib alone.
 """
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import pickle
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 SUPERSAMPLING = 2
+PIECES = 3000  # long lines are cut for depth sorting until there are about so many
 SECONDS_TO_START, SECONDS_PER_FRAME = 60.0, 60.0
 
 
@@ -67,14 +69,14 @@ def images(models, views, sizes):
     ----------
     models : list of lists of `Tubes`, `Balls` and `Surface`
         One list per frame of a film.
-    views : list of `View`
+    views : list of `refweb.views.View`
     sizes : list of (width, height)
         Size of each view [pixel].
 
     Returns
     -------
-    list of lists of arrays, or None
-        ``result[model][view]``: RGB, shape (height, width, 3), uint8. None where OpenGL is not to be had.
+    list of bytes, or None
+        What `unpack` turns into the images of a model; None where OpenGL is not to be had.
     """
     with tempfile.TemporaryDirectory(prefix="refweb-") as folder:
         job = Path(folder, "job.pickle")
@@ -82,26 +84,35 @@ def images(models, views, sizes):
         for window, display in windows():
             try:
                 _child(job, window, display, SECONDS_TO_START + SECONDS_PER_FRAME * len(models))
-                return [_load(job, i, len(views)) for i in range(len(models))]
+                return [job.with_name(f"{i}.npz").read_bytes() for i in range(len(models))]
             except (OSError, subprocess.SubprocessError) as error:
-                last = (getattr(error, "stderr", None) or str(error).encode()).decode(errors="replace").strip()
-                logging.getLogger(__name__).info("%s does not work: %s", window, last.rpartition("\n")[2])
+                said = (getattr(error, "stderr", None) or b"").decode(errors="replace").strip().rpartition("\n")[2]
+                logging.getLogger(__name__).info("%s cannot be used: %s", window, said or type(error).__name__)
     return None
 
 
+def unpack(packed):
+    """The images of one model, a list with one per view: RGB, shape (height, width, 3), uint8."""
+    with np.load(io.BytesIO(packed)) as data:
+        return list(data.values())
+
+
 def _child(job, window, display, seconds):
-    """Run `_render` on a job in a process of its own, whatever it writes kept off the terminal."""
+    """Run `_render` on a job in a process of its own; what it writes or dumps stays in the job's folder."""
     environment = {k: v for k, v in os.environ.items() if display or k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     if window:
         environment["VTK_DEFAULT_OPENGL_WINDOW"] = window
-    code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import _render; _render({str(job)!r})"
-    command = [sys.executable, "-c", code]
-    subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, check=True, timeout=seconds)
-
-
-def _load(job, number, views):
-    with np.load(job.with_name(f"{number}.npz")) as data:
-        return [data[f"arr_{i}"] for i in range(views)]
+    path = [os.path.abspath(p) for p in sys.path]
+    code = f"import sys; sys.path[:] = {path!r}; from {__name__} import _render; _render({str(job)!r})"
+    subprocess.run(
+        [sys.executable or "python3", "-c", code],
+        cwd=job.parent,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        check=True,
+        timeout=seconds,
+    )
 
 
 def _render(job):
@@ -146,16 +157,16 @@ def _add(plotter, part):
     import pyvista
 
     look = {"ambient": 0.45, "diffuse": 0.62, "specular": 0.15, "specular_power": 20}
-    if isinstance(part, Surface):
+    if isinstance(part, Surface) and len(part.triangles):
         faces = np.insert(part.triangles, 0, 3, axis=1)
         mesh = pyvista.PolyData(part.points, faces=faces.ravel()).clean()
         smooth = {"smooth_shading": True, "split_sharp_edges": True, "feature_angle": 40}
         plotter.add_mesh(mesh, color=part.colour, **smooth, **{**look, "specular": 0.4})
-    elif isinstance(part, Balls):
+    elif isinstance(part, Balls) and len(part.centres):
         ball = pyvista.Sphere(radius=part.radius, theta_resolution=16, phi_resolution=16)
         mesh = pyvista.PolyData(np.asarray(part.centres, dtype=float)).glyph(geom=ball, scale=False, orient=False)
         plotter.add_mesh(mesh, color=part.colour, smooth_shading=True, **look)
-    elif len(part.paths):
+    elif isinstance(part, Tubes) and len(part.paths):
         n, k = part.paths.shape[:2]
         cells = np.insert(np.arange(n * k).reshape(n, k), 0, k, axis=1)
         mesh = pyvista.PolyData(part.paths.reshape(-1, 3), lines=cells.ravel())
@@ -203,8 +214,11 @@ def _flat_surface(part, view):
 
 def _flat_tubes(part, view, pixel):
     """A dark and, on it, a narrower bright strip for each straight piece of each line."""
-    pieces = np.stack([part.paths[:, :-1], part.paths[:, 1:]], axis=2).reshape(-1, 2, 3)
-    colours = np.repeat(part.colours, part.paths.shape[1] - 1, axis=0)
+    ends = np.stack([part.paths[:, :-1], part.paths[:, 1:]], axis=2).reshape(-1, 2, 1, 3)
+    cuts = np.linspace(0, 1, 1 + int(np.clip(PIECES / max(len(ends), 1), 1, 16)))[:, None]
+    points = ends[:, 0] + cuts * (ends[:, 1] - ends[:, 0])
+    pieces = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
+    colours = np.repeat(part.colours, len(pieces) // max(len(part.paths), 1), axis=0)
     ends, depth, scale = view.project(pieces)
     width = np.maximum(part.radius * scale.mean(axis=1), 0.5 * pixel)[:, None]
     along = ends[:, 1] - ends[:, 0]

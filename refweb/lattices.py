@@ -64,9 +64,7 @@ def _window(mesh, rows, columns, side, kind):
     """The paper's rule: a closed inner web, and one link to a fixed end for each outermost node and side."""
     if mesh == "triangle":
         odd = np.arange(rows - 1) % 2
-        polygons = np.concatenate(
-            [_rows(columns - 1 + odd, 1 - odd, _UP), _rows(columns - odd, 1 + odd, _DOWN)]
-        )
+        polygons = np.concatenate([_rows(columns - 1 + odd, 1 - odd, _UP), _rows(columns - odd, 1 + odd, _DOWN)])
         nodes, lines, _ = _tessellation(polygons)
         points = _placed(nodes, mesh, side)
         outward = [
@@ -151,7 +149,7 @@ class Window(Table):
     side: float = real(above=0, unit="m")
 
     def check(self):
-        for name, least in zip(("rows", "columns"), SMALLEST[self.mesh]):
+        for name, least in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
             if getattr(self, name) < least:
                 raise InputError(f'{name} = {getattr(self, name)} must be ≥ {least} for mesh = "{self.mesh}"')
         if self.rows * self.columns > _MOST_CELLS:
@@ -181,19 +179,15 @@ class Layers(Table):
     layers: int = integer(at_least=1)
     cell_area: float = real(above=0, unit="m²")
 
-    def check(self):
-        cells = _counts(self.mesh, self.layers)[0]
-        if cells > _MOST_CELLS:
-            raise InputError(f"layers = {self.layers} makes {cells} cells, must be ≤ {_MOST_CELLS}")
-
     def web(self, base=None):
-        """The `refweb.webs.Web`."""
+        """The `refweb.webs.Web`; refused above a million cells."""
         n = self.layers
+        cells = _counts(self.mesh, n)[0]
+        if cells > _MOST_CELLS:
+            raise InputError(f"layers = {n} makes {cells} cells, must be ≤ {_MOST_CELLS}")
         if self.mesh == "triangle":
             row = np.arange(3 * n - 2)
-            polygons = np.concatenate(
-                [_rows(len(row) - row, row, _UP), _rows(len(row) - 1 - row, row + 2, _DOWN)]
-            )
+            polygons = np.concatenate([_rows(len(row) - row, row, _UP), _rows(len(row) - 1 - row, row + 2, _DOWN)])
         elif self.mesh == "square":
             polygons = _rows(np.full(2 * n - 1, 2 * n - 1), np.zeros(2 * n - 1, dtype=int), _SQUARE, (1, 1))
         else:
@@ -259,4 +253,5 @@ def closed_form(mesh, layers, cell_area):
 
 def limit_ratio(mesh):
     """√A times the length-area ratio of infinitely many layers [1] (section 3.1): 3^(3/4), 2 and √2·3^(1/4)."""
+    Layers(mesh=mesh, layers=1, cell_area=1.0)
     return {"triangle": 3**0.75, "square": 2.0, "hexagon": sqrt(2) * 3**0.25}[mesh]

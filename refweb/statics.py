@@ -14,15 +14,14 @@ forces on it do not balance. `check_supported` proves that before anything is so
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from . import certificate
 from .factor import Factor
-from .laws import LINEAR, SMOOTH, TENSION_ONLY, Law
-from .lines import SMOOTHING
-from .system import System
+from .interior import InteriorPoint
+from .laws import LINEAR, TENSION_ONLY
 
 TOLERANCE = 1e-10
 """Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step."""
@@ -131,6 +130,7 @@ class Newton:
         self.axial = net.line_data[:, 1].max()
         self.factor = Factor(system.pattern)
         self.loose = np.zeros(0, dtype=int)
+        self.scale = 0.0
 
     def _ground(self, t):
         """Places on the diagonal that hold the loose parts of the net, whose loads balance."""
@@ -164,14 +164,14 @@ class Newton:
     def smallest_pivot(self, t, x, stats):
         """Sign of the smallest pivot of K: −1 for a saddle, 0 where K is singular to rounding, 1 for a minimum."""
         tiny = 1e-12 * self.axial
-        for shift, sign in ((tiny, -1), (-tiny, 0)):
+        for shift, sign in ((-tiny, 1), (tiny, 0)):
             self.factor.update(self._matrix(t, x, shift, False))
             stats["nlu"] += 1
-            if self.factor.negative_pivots():
+            if not self.factor.negative_pivots():
                 return sign
-        return 1
+        return -1
 
-    def solve(self, t, x, shift=None, most=200):
+    def solve(self, t, x, warm=False, most=200):
         """Equilibrium at load step t from the displacement x.
 
         Parameters
@@ -180,8 +180,9 @@ class Newton:
             Load step.
         x : ndarray, shape (rows, 3)
             Start [m].
-        shift : float, optional
-            Fictitious prestress τ of the first iteration [N].
+        warm : bool
+            Whether x is near an equilibrium, as after a load step: the first prestress τ is then 1e-4 of the one that
+            (load/EA)^(2/3) EA suggests, the tension scale of a flat net.
         most : int
             Largest number of factorizations.
 
@@ -201,14 +202,12 @@ class Newton:
         stats = dict(nsteps=0, nfev=1, njev=0, nlu=0)
         force, out = system.forces(t, x)
         tension = out[0][:, 0]
-        scale = force_scale(system, t, x, tension)
-        if shift is None:
-            shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2)
+        scale = self.scale = max(self.scale, force_scale(system, t, x, tension))
+        shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2) * (1e-4 if warm else 1.0)
         energy, best = system.energy(t, x), np.inf
         while True:
             r = force.ravel()[system.free]
-            scale = force_scale(system, t, x, tension)
-            error = residual(system, force, scale)
+            error = residual(system, force, max(self.scale, force_scale(system, t, x, tension)))
             if not np.isfinite(error):
                 raise SolverError(f"non-finite force at step {t:g}, node {np.argmax(~np.isfinite(force).all(axis=1))}")
             if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
@@ -229,6 +228,7 @@ class Newton:
             stats["nfev"] += 1
             self.progress(f"step {t:g}, residual {error:.0e}")
         stats["residual"] = float(error)
+        self.scale = max(self.scale, force_scale(system, t, x, tension))
         return Equilibrium(t, x, tension.copy(), force, stats)
 
     def _search(self, t, x, p, slope, energy, shift, stats):
@@ -257,36 +257,33 @@ class Newton:
         return y, trial, 0.1 * shift if good else shift
 
 
-def _relaxed(system, smoothing):
-    """The same system with the smooth law at a larger smoothing."""
-    data = system.net.line_data.copy()
-    data[:, SMOOTHING] = np.maximum(data[:, SMOOTHING], smoothing)
-    net = replace(system.net, law=Law("smooth"), line_data=data)
-    return System(net, system.effects, system.supported)
-
-
 def _add(stats, other):
     for key in ("nsteps", "nfev", "njev", "nlu"):
-        stats[key] += other[key]
+        stats[key] += other.get(key, 0)
     return stats
 
 
-def _continued(system, t, x, progress, spent):
-    """Equilibrium by decades of smoothing, 1e-2 down to the system's own, each from the one before."""
-    own = system.net.line_data[:, SMOOTHING].max() if system.net.law.number == SMOOTH else 0.0
-    for smoothing in (1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
-        if smoothing <= own:
+def _by_interior_point(newton, t, x, spent):
+    """Equilibrium from the central path; the nearer its end, the better Newton's start."""
+    inner = InteriorPoint(newton.system, t, x, newton.loose)
+    for tolerance in (1e-7, 1e-11, 1e-16):
+        start = inner.follow(tolerance)
+        try:
+            state = newton.solve(t, start, warm=True, most=15 if tolerance > 1e-16 else 200)
+        except NotFound as error:
+            _add(spent, error.stats)
+            if tolerance == 1e-16:
+                raise
+        else:
             break
-        state = Newton(_relaxed(system, smoothing), progress).solve(t, x)
-        x = state.x
-        _add(spent, state.stats)
-    return Newton(system, progress).solve(t, x)
+    _add(spent, {"nsteps": inner.nlu, "njev": inner.nlu, "nlu": inner.nlu})
+    return state
 
 
 def solve(system, load_steps, progress=None):
     """Equilibria at load steps, one after another, each from the one before.
 
-    Where Newton's method finds none from the last state, it is led there through decades of smoothing.
+    Where Newton's method finds none from the last state, `refweb.interior` leads there.
 
     Parameters
     ----------
@@ -307,15 +304,16 @@ def solve(system, load_steps, progress=None):
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
     newton, x = Newton(system, progress), np.zeros((system.rows, 3))
-    for t in load_steps:
+    for k, t in enumerate(load_steps):
         spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)
+        path = system.net.law.number != LINEAR and certificate.straight_and_dead(system)
         try:
-            state = newton.solve(t, x, most=60)
+            state = newton.solve(t, x, warm=k > 0, most=25 if path else 400)
         except NotFound as error:
-            if system.net.law.number == LINEAR:
+            if not path:
                 raise
-            spent = error.stats
-            state = _continued(system, t, x, progress, spent)
+            _add(spent, error.stats)
+            state = _by_interior_point(newton, t, x, spent)
         if system.net.law.number != TENSION_ONLY:
             state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
         _add(state.stats, spent)

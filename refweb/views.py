@@ -71,7 +71,7 @@ class View:
         return x - w, x + w, y - h, y + h
 
 
-def views(origin, points, solid, tree, aspect):
+def choose(origin, points, solid, moved, tree, aspect):
     """The views that show a web best, and where on the page they stand.
 
     Parameters
@@ -82,6 +82,8 @@ def views(origin, points, solid, tree, aspect):
         Points of the web now, or in all frames of a film [m].
     solid : array, shape (k, 3)
         Points of bodies [m]; what is far from the web may lie outside of the pictures.
+    moved : float
+        Largest component of a displacement [m].
     tree : bool
         Whether the lines close no loop, as those of a cable.
     aspect : float
@@ -90,8 +92,8 @@ def views(origin, points, solid, tree, aspect):
     Returns
     -------
     views : list of `View`
-        In perspective and from the side; of what lies in a plane, one along its normal. A horizontal web with loops
-        counts as lying in its plane only once it has moved in it.
+        In perspective and from the side; of what lies in a plane, one along its normal. A horizontal web that closes
+        loops counts as lying in a plane only once it has moved in it: it may be about to leave it.
     rectangles : list of (left, bottom, width, height)
         Shares of the page.
     """
@@ -99,8 +101,7 @@ def views(origin, points, solid, tree, aspect):
     low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
     near = np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
     normal = _plane(np.concatenate([origin, points]), extent)
-    moved = np.abs(points.reshape(-1, *origin.shape) - origin).max() > 1e-3 * extent
-    if normal is not None and (abs(normal[2]) < 0.9 or tree or moved):
+    if normal is not None and (abs(normal[2]) < 0.9 or tree or moved > 1e-3 * extent):
         return [View.fit(_facing(normal), near, aspect * ALONE[2] / ALONE[3], margin=1.12)], [ALONE]
     side = _side(origin)
     large = View.fit(_oblique(side), near, aspect * LARGE[2] / LARGE[3], TANGENT)

@@ -6,6 +6,7 @@ The tables `SingleCable`, `Inline` and `File` make a `Web`, as those of `refweb.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -68,18 +69,20 @@ class Web:
         points = np.array(self.points, dtype=np.float64, order="C")
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
-        _refuse_first(~np.isfinite(points).all(axis=1), lambda i: f"points[{i}] = {points[i].tolist()} must be finite [m]")
+        for i in _first(~np.isfinite(points).all(axis=1)):
+            raise InputError(f"points[{i}] = {points[i].tolist()} must be finite [m]")
         lines = _checked_lines(self.lines, len(points))
-        distance = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
-        length = distance if self.natural_length is None else np.array(self.natural_length, dtype=np.float64)
+        if self.natural_length is None:
+            with np.errstate(over="ignore"):
+                length = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
+            for i in _first(length == 0):
+                raise InputError(f"lines[{i}] = {lines[i].tolist()} has no length: its nodes coincide")
+        else:
+            length = np.array(self.natural_length, dtype=np.float64)
         if length.shape != (len(lines),):
             raise InputError(f"natural_length has {length.size} entries for {len(lines)} lines")
-        if self.natural_length is None:
-            _refuse_first(distance == 0, lambda i: f"lines[{i}] = {lines[i].tolist()} has no length: its nodes coincide")
-        _refuse_first(
-            ~((length > 0) & np.isfinite(length)),
-            lambda i: f"natural_length[{i}] = {length[i]:g} must be finite and > 0 [m]",
-        )
+        for i in _first(~((length > 0) & np.isfinite(length))):
+            raise InputError(f"natural_length[{i}] = {length[i]:g} must be finite and > 0 [m]")
         groups = ("",) * len(lines) if self.groups is None else tuple(map(str, self.groups))
         if len(groups) != len(lines):
             raise InputError(f"groups has {len(groups)} entries for {len(lines)} lines")
@@ -166,40 +169,39 @@ class Web:
         InputError
             For a number out of range or an unknown name.
         """
-        if isinstance(selection, (str, int, np.integer)):
-            found = [self._find_one(name, selection)]
-        else:
+        if isinstance(selection, (list, tuple, np.ndarray)):
             found = [self._find_one(f"{name}[{i}]", one) for i, one in enumerate(selection)]
-        found = np.concatenate([np.zeros(0, dtype=np.int64), *found])
-        return found[np.sort(np.unique(found, return_index=True)[1])]
+        else:
+            found = [self._find_one(name, selection)]
+        return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
 
     def _find_one(self, name, one):
         if not isinstance(one, str):
-            return _in_range(name, [node_number(name, one)], len(self.points), indexed=False)
+            if not 0 <= node_number(name, one) < len(self.points):
+                raise InputError(f"{name} = {one} must be 0 … {len(self.points) - 1}")
+            return (one,)
         if one in self.names:
-            return np.array(self.names[one], dtype=np.int64)
+            return self.names[one]
         if one == "all":
-            return np.arange(len(self.points))
+            return range(len(self.points))
         if one == "rim" and not len(self.rim):
             raise InputError(f'{name} = "rim": this web has no supports of its own, give node numbers')
         if one in SELECTIONS:
-            return np.atleast_1d(np.asarray(getattr(self, one), dtype=np.int64))
+            return np.atleast_1d(getattr(self, one)).tolist()
         raise InputError(f"{name} = {shown(one)} names no node, {nearest(one, (*SELECTIONS, *self.names))}")
 
 
-def _refuse_first(bad, message):
-    """Refuse the first entry that is bad; ``message`` of its index."""
-    if bad.any():
-        raise InputError(message(int(np.argmax(bad))))
+def _first(bad):
+    """Index of the first true entry, none if all are false."""
+    return np.flatnonzero(bad)[:1].tolist()
 
 
-def _in_range(name, numbers, count, indexed=True):
+def _in_range(name, numbers, count):
     numbers = np.asarray(numbers)
     if numbers.size and numbers.dtype.kind not in "iu":
         raise InputError(f"{name} = {shown(numbers.tolist())} must be node numbers")
-    for i in np.flatnonzero((numbers < 0) | (numbers >= count))[:1]:
-        which = f"{name}[{i}]" if indexed else name
-        raise InputError(f"{which} = {numbers[i]} must be 0 … {count - 1}")
+    for i in _first((numbers < 0) | (numbers >= count)):
+        raise InputError(f"{name}[{i}] = {numbers[i]} must be 0 … {count - 1}")
     return numbers.astype(np.int64)
 
 
@@ -213,17 +215,15 @@ def _checked_lines(lines, nodes):
     lines = np.asarray(lines)
     if lines.ndim != 2 or lines.shape[1] != 2 or len(lines) == 0 or lines.dtype.kind not in "iu":
         raise InputError(f"lines of shape {lines.shape} must be at least one pair of node numbers, shape (lines, 2)")
-    _refuse_first(
-        ((lines < 0) | (lines >= nodes)).any(axis=1),
-        lambda i: f"lines[{i}] = {lines[i].tolist()} must be node numbers 0 … {nodes - 1}",
-    )
-    _refuse_first(lines[:, 0] == lines[:, 1], lambda i: f"lines[{i}] = {lines[i].tolist()} joins a node to itself")
+    for i in _first(((lines < 0) | (lines >= nodes)).any(axis=1)):
+        raise InputError(f"lines[{i}] = {lines[i].tolist()} must be node numbers 0 … {nodes - 1}")
+    for i in _first(lines[:, 0] == lines[:, 1]):
+        raise InputError(f"lines[{i}] = {lines[i].tolist()} joins a node to itself")
     key = lines.min(axis=1).astype(np.int64) * nodes + lines.max(axis=1)
     _, first, same = np.unique(key, return_index=True, return_inverse=True)
-    _refuse_first(
-        first[same] != np.arange(len(lines)),
-        lambda i: f"lines[{i}] = {lines[i].tolist()} repeats lines[{first[same[i]]}] = {lines[first[same[i]]].tolist()}",
-    )
+    for i in _first(first[same] != np.arange(len(lines))):
+        j = first[same[i]]
+        raise InputError(f"lines[{i}] = {lines[i].tolist()} repeats lines[{j}] = {lines[j].tolist()}")
     unused = np.flatnonzero(np.bincount(lines.ravel(), minlength=nodes) == 0)
     if len(unused):
         more = f" and {len(unused) - 1} more" if len(unused) > 1 else ""
@@ -261,13 +261,14 @@ class SingleCable(Table):
     sag: tuple | None = vector(None)
 
     def check(self):
-        distance = np.linalg.norm(np.subtract(self.end, self.start))
+        with np.errstate(over="ignore"):
+            distance = np.linalg.norm(np.subtract(self.end, self.start))
         if not 0 < distance < np.inf:
             raise InputError(f"end = {list(self.end)} must be apart from start by a finite distance > 0 [m]")
         if self.sag is not None and self._aside(self.sag) is None:
             raise InputError(f"sag = {list(self.sag)} must not be zero or parallel to the cable, from start to end")
         if self.elements == 1 and self.length is not None and self.length > distance:
-            raise InputError(f"elements = 1 must be ≥ 2 for a length of {self.length:g} m above the distance {distance:g} m")
+            raise InputError(f"elements = 1 must be ≥ 2: length = {self.length:g} m > distance = {distance:g} m")
 
     def _aside(self, direction):
         """Unit vector of the part of a direction that is normal to the chord; None if there is none."""
@@ -424,8 +425,8 @@ def _read(path):
             return meshio.read(path)
     except (Exception, SystemExit) as error:
         reason = f"{type(error).__name__} {error}" if isinstance(error, Exception) else said.getvalue()
-        reason = " ".join(reason.split())[:200]
-        raise InputError(f"meshio cannot read {path}, is it whole and its data numeric? ({reason})") from None
+        reason = " ".join(reason.replace("Error: Couldn't read file", "").replace(str(path), "").split())[:200]
+        raise InputError(f"meshio cannot read {path}; is it whole, and its data numeric? ({reason})") from None
 
 
 def _web_of(mesh):
@@ -438,11 +439,13 @@ def _web_of(mesh):
         raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
     points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
     lines = np.concatenate([block.data for block in mesh.cells]).astype(np.int64)
-    cell_data = {key: np.concatenate(values) for key, values in mesh.cell_data.items() if key in ("natural_length", "group")}
-    length = _numbers("natural_length", cell_data.get("natural_length"), len(lines))
+    length, group = (
+        np.concatenate(mesh.cell_data[key]) if key in mesh.cell_data else None for key in ("natural_length", "group")
+    )
+    length = _numbers("natural_length", length, len(lines))
     support = _numbers("support", mesh.point_data.get("support"), len(points))
     rim = () if support is None else np.flatnonzero(support)
-    return Web(points, lines, length, rim=rim, kind="file", groups=_group_names(cell_data.get("group"), len(lines)))
+    return Web(points, lines, length, rim=rim, kind="file", groups=_group_names(group, len(lines)))
 
 
 def _numbers(name, values, count):
