@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 SUPERSAMPLING = 2
-PIECES = 3000  # long lines are cut for depth sorting until there are about so many
+PIECES = 3000  # long lines, and large triangles, are cut for depth sorting while there are fewer
 SECONDS_TO_START, SECONDS_PER_FRAME = 60.0, 60.0
 
 
@@ -205,11 +205,19 @@ def _flat(part, view, pixel):
 
 def _flat_surface(part, view):
     corners = part.points[part.triangles]
+    while 0 < len(corners) < PIECES // 10:
+        (a, b, c), (d, e, f) = (np.moveaxis(x, 1, 0) for x in (corners, (corners + np.roll(corners, -1, axis=1)) / 2))
+        corners = np.concatenate([np.stack(x, axis=1) for x in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ view.axes.T
     normal /= np.linalg.norm(normal, axis=1, keepdims=True) + 1e-300
     shade = 0.45 + 0.55 * np.abs(normal @ np.array([-0.35, 0.55, 0.76]))
     flat, depth, _ = view.project(corners)
-    return flat[:, [0, 1, 2, 2]], np.clip(shade[:, None] * part.colour, 0, 1), depth.mean(axis=1)
+    middle = corners.mean(axis=1)
+    sight = view.centre - middle if view.perspective else view.axes[2]
+    outward = np.sum(normal @ view.axes * (middle - part.points.mean(axis=0)), axis=1)
+    hidden = outward * np.sum(normal @ view.axes * sight, axis=1) < 0
+    behind = 2 * hidden * np.ptp(corners, axis=1).max(axis=1)  # sorted out of the way of the faces in front
+    return flat[:, [0, 1, 2, 2]], np.clip(shade[:, None] * part.colour, 0, 1), depth.mean(axis=1) - behind
 
 
 def _flat_tubes(part, view, pixel):

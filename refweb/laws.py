@@ -33,17 +33,23 @@ def branch(s, smoothing):
 
 
 @kernel()
-def stress(law, strain, modulus, slackness, smoothing):
-    """σ(ε) [Pa]."""
+def prepared_stress(law, strain, modulus, slackness, smoothing, g0, r0):
+    """σ(ε) [Pa], with (g0, r0) = branch(−ε0, η) at hand."""
     if law == LINEAR or (law == TENSION_ONLY and strain > 0.0):
         return modulus * strain
     if law == TENSION_ONLY:
         return 0.0
     g, r = branch(strain - slackness, smoothing)
-    g0, r0 = branch(-slackness, smoothing)
     if r + r0 == 0.0:
         return 0.0
     return modulus * strain * ((g + g0) / (r + r0))
+
+
+@kernel()
+def stress(law, strain, modulus, slackness, smoothing):
+    """σ(ε) [Pa]."""
+    g0, r0 = branch(-slackness, smoothing)
+    return prepared_stress(law, strain, modulus, slackness, smoothing, g0, r0)
 
 
 @kernel()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 # Columns of Net.line_data: what a kernel over lines finds in `data`.
-LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, POINT = range(5)
+LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0, R0, POINT = range(7)
 """``data[:, POINT + 4q : POINT + 4q + 4]`` is dX/dξ at quadrature point q and its magnitude [m]."""
 
 
@@ -37,7 +37,7 @@ class Net:
     line : ndarray of int32, shape (cells,)
         The web's line that each element belongs to.
     line_data : ndarray, shape (cells, columns)
-        Natural length [m], EA [N], ε0, η, then dX/dξ and its magnitude at each quadrature point [m].
+        Natural length [m], EA [N], ε0, η, their (g0, r0) of `refweb.laws`, then dX/dξ and its magnitude at each quadrature point [m].
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
     gradients : ndarray, shape (points, nodes per cell)
@@ -119,7 +119,10 @@ def build(web, cable, quasi_static=False):
     gradients = np.array([line_basis.elem.lbasis(local, a)[1][0] for a in range(cells.shape[1])]).T.copy()
 
     length = values["natural_length"]
-    data = [length, values["modulus"] * values["area"], values["slackness"], values["smoothing"]]
+    slackness, smoothing = values["slackness"], values["smoothing"]
+    r0 = np.sqrt(slackness**2 + 4.0 * smoothing**2)
+    g0 = 2.0 * smoothing**2 / np.where(r0 > 0.0, r0 + slackness, 1.0)
+    data = [length, values["modulus"] * values["area"], slackness, smoothing, g0, r0]
     for row in gradients:
         tangent = np.einsum("a,cai->ci", row, web.points[cells])
         data += [*tangent.T, np.linalg.norm(tangent, axis=1)]

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 from ..compiled import ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import Table
-from ..laws import energy_density, stress, tangent
-from ..lines import AXIAL_STIFFNESS, LENGTH, POINT, SLACKNESS, SMOOTHING
+from ..laws import energy_density, prepared_stress, stress, tangent
+from ..lines import AXIAL_STIFFNESS, G0, LENGTH, POINT, R0, SLACKNESS, SMOOTHING
 from . import Family
 
 
@@ -58,11 +58,13 @@ def kernels(law, gradients, weights):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            largest = -math.inf
+            largest, stretched = -math.inf, 0.0
             for q in range(points):
                 p0, p1, p2, length, e = strain(x, cells, data, c, q, nodes, flat)
-                tension = stress(law, e, data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING])
-                largest = max(largest, tension)
+                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
+                tension = prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
+                if tension > largest:
+                    largest, stretched = tension, e
                 if length > 0.0:
                     s = weights[q] * tension / length
                     for a in range(nodes):
@@ -71,6 +73,7 @@ def kernels(law, gradients, weights):
                         f[row, 1] -= d * p1
                         f[row, 2] -= d * p2
             out[c, 0] = largest
+            out[c, 1] = stretched
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -127,7 +130,7 @@ class Elasticity(Table):
     """Tension of every line by the law of its cable; see `refweb.laws` and, for the numbers, `refweb.cables.Cable`."""
 
     def on(self, net):
-        """The family of all lines; ``out`` is the tension [N]."""
+        """The family of all lines; ``out`` is tension [N] and strain."""
         force, energy, stiffness, _ = of(net)
         return Family(
             name="elasticity",
@@ -137,6 +140,6 @@ class Elasticity(Table):
             energy=energy,
             stiffness=stiffness,
             book="strain_energy",
-            observed=1,
+            observed=2,
             internal=True,
         )
