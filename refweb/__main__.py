@@ -7,8 +7,10 @@ needs it.
 from __future__ import annotations
 
 import argparse
+import os
 import pathlib
 import sys
+import warnings
 
 from .inputs import InputError
 
@@ -16,7 +18,8 @@ from .inputs import InputError
 def parser():
     """The `argparse.ArgumentParser` of all commands."""
     top = argparse.ArgumentParser(
-        prog="refweb", description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless."
+        prog="refweb",
+        description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless.",
     )
     top.add_argument("--version", action="store_true", help="show the version and leave")
     commands = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
@@ -73,11 +76,16 @@ def _info(arguments):
     if folder.is_dir():
         try:
             summary = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+            if arguments.json:
+                print(json.dumps(summary, indent=1, ensure_ascii=False))
+            else:
+                stored(summary)
         except FileNotFoundError:
             raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
-        except (ValueError, OSError) as error:
+        except (ValueError, OSError, RecursionError) as error:
             raise InputError(f"{folder}/run.json: cannot be read: {error}") from None
-        print(json.dumps(summary, indent=1, ensure_ascii=False)) if arguments.json else stored(summary)
+        except (KeyError, TypeError, IndexError, AttributeError):
+            raise InputError(f"{folder}/run.json: is not what a run of refweb writes") from None
         return
     scene = Scene.load(arguments.source)
     system = scene.build()
@@ -115,7 +123,10 @@ def main(arguments=None):
         return 2
     command = {"run": _run, "check": _check, "info": _info, "picture": _picture}[arguments.command]
     try:
-        command(arguments)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
+            command(arguments)
+        sys.stdout.flush()
     except InputError as error:
         print(f"refweb: {error}", file=sys.stderr)
         return 2
@@ -123,7 +134,7 @@ def main(arguments=None):
         print("refweb: interrupted", file=sys.stderr)
         return 130
     except BrokenPipeError:
-        sys.stderr.close()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left in the buffer goes nowhere
         return 1
     except OSError as error:
         print(f"refweb: {error.filename or 'file'}: {error.strerror or error}", file=sys.stderr)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, field, nearest, real
+from .inputs import LARGEST, InputError, Table, choice, field, nearest, real, short, shown
 from .laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")
@@ -27,9 +27,10 @@ class Group(Table):
 
 def _groups(name, value):
     if not isinstance(value, dict):
-        raise InputError(f"{name} must be a table of groups, [cable.groups.NAME]")
+        raise InputError(f"{name} = {shown(value)} must be a table of groups, [cable.groups.NAME]")
     return {
-        key: group if isinstance(group, Group) else Group.read(f"{name}.{key}", group) for key, group in value.items()
+        key: group if isinstance(group, Group) else Group.read(f"{name}.{short(key)}", group)
+        for key, group in value.items()
     }
 
 
@@ -68,7 +69,11 @@ class Cable(Table):
     groups: dict = field(_groups, factory=dict)
 
     def check(self):
-        """Fill in the smooth law's parameters; refuse them for other laws."""
+        """Fill in the smooth law's parameters; refuse them for other laws, and an EA that is 0 in floating point."""
+        for name, group in [("", self), *((f"groups.{short(name)} ", group) for name, group in self.groups.items())]:
+            modulus, area = group.modulus or self.modulus, group.area or self.area
+            if not modulus * area > 0:
+                raise InputError(f"{name}modulus = {modulus:g} times area = {area:g} must be > 0 [N]")
         for key, default in (("slackness", 0.0), ("smoothing", 1e-5)):
             if self.law == "smooth":
                 if getattr(self, key) is None:
@@ -93,11 +98,11 @@ class Cable(Table):
         InputError
             For a group that no line has, or prestrain beside given natural lengths.
         """
-        unknown = [name for name in self.groups if name not in web.groups]
+        known = sorted(set(web.groups) - {""})
+        unknown = [name for name in self.groups if name not in known]
         if unknown:
-            known = sorted(set(web.groups) - {""})
             hint = nearest(unknown[0], known) if known else "this web has no groups"
-            raise InputError(f'[cable.groups] "{unknown[0]}" is the group of no line, {hint}')
+            raise InputError(f"[cable.groups] {shown(unknown[0])} is the group of no line, {hint}")
         values = {}
         for f in fields(Group):
             own = getattr(self, f.name)
@@ -113,6 +118,13 @@ class Cable(Table):
             worst = prestrain[np.argmax(np.abs(prestrain))]
             raise InputError(f"[cable] prestrain = {worst:g} cannot be used: the web's natural lengths are given")
         values["natural_length"] = web.natural_length / (1.0 + prestrain)
+        with np.errstate(over="ignore"):
+            stiffness = values["modulus"] * values["area"] / values["natural_length"]
+            mass = values["density"] * values["area"] * values["natural_length"]
+        for name, value, unit in (("stiffness modulus × area / length", stiffness, "N/m"), ("mass", mass, "kg")):
+            bad = np.flatnonzero(~(value <= LARGEST))
+            if len(bad):
+                raise InputError(f"[cable] line {bad[0]}: {name} = {value[bad[0]]:g} must be ≤ {LARGEST:g} [{unit}]")
         return values
 
     @property

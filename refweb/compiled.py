@@ -10,20 +10,25 @@ its digits, which it loses when positions are the unknowns.
 `ENERGY`       ``(t, x, cells, data, out)``: writes the energy [J] of each cell to ``out (c,)``
 `STIFFNESS`    ``(t, x, v, blocks, cells, data, definite)``: writes −∂f/∂x [N/m] per cell; ``definite`` asks for
                a positive semidefinite part
+`BOUND`        ``(reach, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of |K| [N/m], for
+               all that can act before a row has moved by ``reach`` [m]
 =============  ==========================================================================================
 
-Machine code is kept on disk, in a folder named by the state of all source files of the package: numba itself looks only
-at the file a function stands in, and would go on using a kernel whose law, in another file, has changed.
+Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at the
+file a function stands in, and would go on using a kernel whose law, in another file, has changed.
 """
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 import pathlib
 
 import numba
+import numba.typed
 from numba import types
+from numba.core.typing import Signature
 
 _f, _i = types.float64, types.int32
 
@@ -32,9 +37,12 @@ def _array(scalar, dimensions):
     return types.Array(scalar, dimensions, "C")
 
 
+VECTOR, MATRIX, INDICES = _array(_f, 1), _array(_f, 2), _array(_i, 2)
+"""Types of numbers per cell, of the data and of the cells of a family."""
 _common = (_f, _array(_f, 2), _array(_f, 2))
 FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2))
 ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
+BOUND = types.void(_f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
 
 
@@ -42,8 +50,9 @@ def _cache_folder():
     package = pathlib.Path(__file__).parent
     state = hashlib.sha256()
     for source in sorted(package.rglob("*.py")):
-        stat = source.stat()
-        state.update(f"{source.relative_to(package)} {stat.st_mtime_ns} {stat.st_size}\n".encode())
+        content = source.read_bytes()
+        if b"kernel(" in content or b"ufunc(" in content:
+            state.update(content)
     name = f"refweb-{state.hexdigest()[:16]}"
     if numba.config.CACHE_DIR:
         return str(pathlib.Path(numba.config.CACHE_DIR) / name)
@@ -73,3 +82,29 @@ def kernel(signature=None, **options):
 def ufunc(signatures):
     """Compile a scalar function into a numpy ufunc and keep its machine code on disk."""
     return lambda function: _compile(numba.vectorize(signatures, cache=True), function)
+
+
+@functools.cache
+def _list_of(item):
+    @kernel()
+    def empty():
+        return numba.typed.List.empty_list(item)
+
+    @kernel(types.void(types.ListType(item), item))
+    def append(values, one):
+        values.append(one)
+
+    return empty, append
+
+
+def typed_list(item, values):
+    """A numba typed list of kernels of one signature, or of arrays of one type.
+
+    It is filled by compiled functions of explicit signature, whose machine code is kept on disk as well; numba's own
+    list methods are compiled anew in every process.
+    """
+    empty, append = _list_of(types.FunctionType(item) if isinstance(item, Signature) else item)
+    result = empty()
+    for value in values:
+        append(result, value)
+    return result

@@ -47,7 +47,7 @@ def _box(title, rows):
     grid.add_column(style="bold", no_wrap=True)
     grid.add_column()
     for name, content in rows:
-        grid.add_row(name, content if not isinstance(content, str) else Text(content))
+        grid.add_row(Text(name), content if not isinstance(content, str) else Text(content))
     _console().print(Panel(grid, title=Text(title), title_align="left", expand=False))
 
 
@@ -58,7 +58,8 @@ def before(scene, system):
     if law == "smooth":
         law += f", ε0 = {cable.slackness:g}, η = {cable.smoothing:g}"
     present = [table_of(effect) for effect in scene.effects]
-    counted = [f"{name} × {present.count(name)}" if present.count(name) > 1 else name for name in dict.fromkeys(present)]
+    count = {name: present.count(name) for name in present}
+    counted = [f"{name} × {times}" if times > 1 else name for name, times in count.items()]
     groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
     steps = ", ".join(f"{s:g}" for s in solve.load_steps[:8]) + (", ..." if len(solve.load_steps) > 8 else "")
     _box(
@@ -89,20 +90,21 @@ def _results(steps):
     return grid
 
 
-def stored(summary):
-    """Print the box of a finished run from the content of its ``run.json``."""
+def stored(summary, more=()):
+    """Print the box of a finished run from the content of its ``run.json``, with ``more`` rows (name, text)."""
     solver, cost, rows = summary["solver"], summary["cost"], []
     if summary["steps"]:
         rows.append(("results", _results(summary["steps"])))
         if any(r["error"] is None for r in summary["results"].values()):
             rows.append(("", "a value without ± has no known error"))
-    if solver:
-        text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations, residual {solver['residual']:.1e}"
+    rows += more
+    if solver["residual"] is not None:
+        text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
+        text += f", residual {solver['residual']:.1e}"
         if solver["duality_gap"] is not None:
             text += f", duality gap {solver['duality_gap']:.1e} J"
         rows.append(("solver", text))
-    if cost:
-        rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
+    rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
     rows += [("warning", text) for text in summary["warnings"]]
     if summary["status"] != "solved":
         rows.append((summary["status"], summary["message"]))
@@ -111,11 +113,11 @@ def stored(summary):
 
 def after(solution, folder):
     """Print results with their errors, and what they cost."""
-    stored(solution.summary())
-    worst = solution.state.utilisation
+    worst, more = solution.state.utilisation, []
     if worst is not None:
         line = int(worst.argmax())
-        print(f"utilisation {worst[line]:.2f} at line {line}")
+        more.append(("strength", f"utilisation {worst[line]:.2f} at line {line}"))
+    stored(solution.summary(), more)
     print(f"results in {folder}")
 
 

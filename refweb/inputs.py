@@ -13,23 +13,52 @@ import math
 import numbers
 from dataclasses import MISSING
 
+LARGEST = 1e100
+"""Largest value of a number with a unit: products of three stay finite."""
+_WHOLE = 2**63 - 1
+
 
 class InputError(ValueError):
     """Input that refweb refuses; the message is one line with the value, the limit and the remedy."""
+
+    def __init__(self, message):
+        super().__init__(one_line(message))
+
+
+def one_line(text):
+    """A text without line breaks and control characters."""
+    text = " ".join(str(text).split())
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def nearest(name, known):
     """The part of a message that helps with an unknown name: the nearest valid one, else all of them."""
     known = [str(k) for k in known]
-    close = difflib.get_close_matches(str(name), known, n=1, cutoff=0.5)
-    return f'did you mean "{close[0]}"?' if close else "known: " + ", ".join(known)
+    close = _close(name, known)
+    return f'did you mean "{close}"?' if close else "known: " + ", ".join(known)
+
+
+def _close(name, known):
+    """The valid name nearest to one, None if none is near."""
+    plain = {k.casefold(): k for k in reversed(known)}
+    found = difflib.get_close_matches(str(name).casefold(), plain, n=1, cutoff=0.5)
+    return plain[found[0]] if found else None
+
+
+def short(text):
+    """A text as a message shows it: at most 60 characters on one line."""
+    text = one_line(text[:1000])
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def shown(value):
-    """A value as a message shows it: short, on one line."""
-    text = f'"{value}"' if isinstance(value, str) else str(value)
-    text = " ".join(text.split())
-    return text if len(text) <= 60 else text[:57] + "..."
+    """A value as a message shows it: short, on one line, texts in quotes."""
+    if isinstance(value, str):
+        return f'"{short(value)}"'
+    try:
+        return short(str(value))
+    except (ValueError, RecursionError):  # a number of thousands of digits, lists in lists in lists
+        return f"a {type(value).__name__} too large to show"
 
 
 def _refuse(name, value, limit):
@@ -40,12 +69,20 @@ def _number(name, value, unit=""):
     unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         _refuse(name, value, f"a number{unit}")
-    if not math.isfinite(value):
+    if not abs(value) < math.inf:
         _refuse(name, value, f"a finite number{unit}")
     try:
         return float(value)
     except OverflowError:
         _refuse(name, value, f"a finite number{unit}")
+
+
+def _whole(name, value, what="a whole number"):
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        _refuse(name, value, what)
+    if abs(value) > _WHOLE:
+        _refuse(name, value, f"{what} below 2⁶³")
+    return int(value)
 
 
 def _bounded(name, value, unit, above, at_least, below, at_most):
@@ -74,7 +111,7 @@ def field(read, default=MISSING, unit="", factory=MISSING):
     return dataclasses.field(metadata={"read": read, "unit": unit}, **given)
 
 
-def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=None, unit=""):
+def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit=""):
     """A finite real number within bounds."""
 
     def read(name, value):
@@ -87,9 +124,7 @@ def integer(default=MISSING, *, at_least=None, at_most=None, unit=""):
     """A whole number within bounds."""
 
     def read(name, value):
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-            _refuse(name, value, "a whole number")
-        return _bounded(name, int(value), unit, None, at_least, None, at_most)
+        return _bounded(name, _whole(name, value), unit, None, at_least, None, at_most)
 
     return field(read, default, unit)
 
@@ -98,9 +133,12 @@ def choice(*names, default=MISSING):
     """One of a few names (or numbers)."""
 
     def read(name, value):
-        if isinstance(value, (list, dict, bool)) or value not in names:
-            _refuse(name, value, "one of " + ", ".join(map(shown, names)) + f" — {nearest(value, names)}")
-        return value
+        for known in names:
+            if type(value) is type(known) and value == known:
+                return known
+        close = _close(value, [n for n in names if isinstance(n, str)]) if isinstance(value, str) else None
+        hint = f' — did you mean "{close}"?' if close else ""
+        _refuse(name, value, ("one of " if len(names) > 1 else "") + ", ".join(map(shown, names)) + hint)
 
     return field(read, default)
 
@@ -116,12 +154,14 @@ def boolean(default=MISSING):
     return field(read, default)
 
 
-def text(default=MISSING):
-    """A string that is not empty and stands on one line."""
+def text(default=MISSING, *, most=4096):
+    """A string that is not empty, stands on one line and has at most ``most`` characters."""
 
     def read(name, value):
         if not isinstance(value, str) or not value.strip() or not value.isprintable():
             _refuse(name, value, "a printable text on one line")
+        if len(value) > most:
+            _refuse(name, value, f"a text of at most {most} characters, not {len(value)}")
         return value
 
     return field(read, default)
@@ -163,9 +203,7 @@ def rows(width, default=MISSING, *, unit="", increasing=False, number=_number):
 
 def node_number(name, value):
     """Read one whole number ≥ 0."""
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        _refuse(name, value, "a whole number ≥ 0")
-    return _bounded(name, int(value), "", None, 0, None, None)
+    return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
 
 
 def numbers_list(default=MISSING, *, unit="", number=_number, empty=False):
@@ -193,22 +231,22 @@ def texts(default=MISSING):
     return field(read, default)
 
 
-def nodes(default=MISSING):
+def nodes(default=MISSING, *, empty=False):
     """A node number, a name, or a list of them; `refweb.webs.Web.find` turns it into numbers."""
 
     def read(name, value):
         if hasattr(value, "tolist"):
             value = value.tolist()
         if isinstance(value, (list, tuple)):
+            if not value and not empty:
+                _refuse(name, value, "at least one node")
             return tuple(one(f"{name}[{i}]", x) for i, x in enumerate(value))
         return one(name, value)
 
     def one(name, value):
         if isinstance(value, str):
             return value
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-            _refuse(name, value, "a node number or a name")
-        return node_number(name, value)
+        return _bounded(name, _whole(name, value, "a node number or a name"), "", None, 0, None, None)
 
     return field(read, default)
 
@@ -217,7 +255,7 @@ def component(default=MISSING):
     """An axis: 0, 1, 2 or "x", "y", "z"; read as 0, 1 or 2."""
 
     def read(name, value):
-        if value in ("x", "y", "z"):
+        if isinstance(value, str) and value in ("x", "y", "z"):
             return "xyz".index(value)
         if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not 0 <= value <= 2:
             _refuse(name, value, 'one of 0, 1, 2, "x", "y", "z"')
@@ -265,7 +303,7 @@ class Table:
         known = [f.name for f in dataclasses.fields(cls)]
         for key in given:
             if key not in known:
-                raise InputError(f"{where} {shown(key)[1:-1]} = {shown(given[key])}: unknown key, {nearest(key, known)}")
+                raise InputError(f"{where} {short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")
         for f in dataclasses.fields(cls):
             if f.default is MISSING and f.default_factory is MISSING and f.name not in given:
                 unit = f" [{f.metadata['unit']}]" if f.metadata["unit"] else ""

@@ -53,7 +53,7 @@ class InteriorPoint:
 
     def _strain(self):
         net, strain = self.system.net, np.empty(len(self.axial))
-        of(net)[3](self.t, self.x, net.cells, net.line_data, strain)
+        of(net)[4](self.t, self.x, net.cells, net.line_data, strain)
         return strain - self.margin
 
     def _resultant(self, g, direction):

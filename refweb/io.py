@@ -14,9 +14,12 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from .inputs import InputError
+from .inputs import InputError, short
 
-OWN = re.compile(r"scene\.toml|checkpoint\.npz|history\.csv|run\.json|web\.pvd|web\.png|web\.gif|frames/[^/]+_\d{6}\.vtu")
+OWN = re.compile(
+    r"scene\.toml|checkpoint\.npz|history\.csv|run\.json|web\.pvd|web\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
+    r"|(frames/)?\.refweb-[^/]+"
+)
 """Files that a run writes, and that ``--force`` removes."""
 POINT_DATA = ("displacement", "velocity", "reaction", "mass")
 CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
@@ -24,7 +27,7 @@ CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
 
 def write_atomically(path, write):
     """Call ``write(file name)`` for a file beside ``path`` and move it there."""
-    handle, name = tempfile.mkstemp(prefix=".", suffix=path.suffix, dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=".refweb-", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     try:
         write(name)
@@ -75,22 +78,30 @@ def check_folder(folder, force=False):
         it holds no ``run.json``.
     """
     folder = pathlib.Path(folder)
-    existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists())
-    if not existing.is_dir():
-        raise InputError(f"--out {folder}: {existing} is a file, not a folder")
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise InputError(f"--out {folder}: {existing} cannot be written: choose another folder")
-    if folder.is_dir() and any(folder.iterdir()):
-        if not force:
-            raise InputError(f"--out {folder}: is not empty: choose another folder, or --force to replace its results")
-        if not (folder / "run.json").is_file():
-            raise InputError(f"--out {folder}: holds no run.json, so it is no result of refweb: nothing was removed")
+    name = f"result folder {short(str(folder))}"
+    try:
+        existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists() or p.is_symlink())
+        for part in (existing, *([folder / "frames"] if (folder / "frames").exists() else [])):
+            if not part.is_dir():
+                raise InputError(f"{name}: {part.name} is a file, not a folder")
+            if not os.access(part, os.W_OK | os.X_OK):
+                raise InputError(f"{name}: {part.name} cannot be written: choose another folder")
+        full = existing == folder.absolute() and any(folder.iterdir())
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name}: cannot be used: {getattr(error, 'strerror', None) or error}") from None
+    if full and not force:
+        raise InputError(f"{name}: is not empty: choose another folder, or --force to replace its results")
+    if full and not (folder / "run.json").is_file():
+        raise InputError(f"{name}: holds no run.json, so it is no result of refweb: nothing was removed")
 
 
-def clear(folder):
-    """Remove what a run wrote, and nothing else."""
+def clear(folder, keep="run.json"):
+    """Remove what a run wrote except ``keep``, and nothing else."""
     for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
-        if path.is_file() and OWN.fullmatch(path.relative_to(folder).as_posix()):
+        name = path.relative_to(folder).as_posix()
+        if path.is_file() and OWN.fullmatch(name) and name != keep:
             path.unlink()
 
 
@@ -110,15 +121,22 @@ class Folder:
         Written as ``scene.toml`` with all defaults filled in.
     columns : sequence of str
         Header of ``history.csv``.
+    run : dict
+        First content of ``run.json``.
     """
 
-    def __init__(self, path, scene, columns):
+    def __init__(self, path, scene, columns, run):
         import tomli_w
 
+        text = tomli_w.dumps(scene.to_dict())
         self.path = pathlib.Path(path)
-        (self.path / "frames").mkdir(parents=True, exist_ok=True)
+        try:
+            (self.path / "frames").mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"result folder {short(str(path))}: cannot be made: {error.strerror}") from None
+        self.summary(run)
         clear(self.path)
-        write_text(self.path / "scene.toml", tomli_w.dumps(scene.to_dict()))
+        write_text(self.path / "scene.toml", text)
         self._history = open(self.path / "history.csv", "w", encoding="utf-8", newline="\n")
         self.row(columns)
         self._listed = []

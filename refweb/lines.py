@@ -46,6 +46,8 @@ class Net:
         Quadrature weights, of sum 1.
     quasi_static : bool
         True where time is the load step of statics.
+    bodies : tuple of refweb.bodies.RigidBody
+        Bodies, whose rows follow those of the nodes.
     """
 
     web: object
@@ -60,6 +62,7 @@ class Net:
     gradients: np.ndarray
     weights: np.ndarray
     quasi_static: bool = False
+    bodies: tuple = ()
 
     @property
     def natural_length(self):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, component, field, node_number, nodes, text
+from .inputs import InputError, Table, choice, component, field, node_number, nodes, shown, text
 from .lines import AXIAL_STIFFNESS
 
 _NODAL = {"displacement": ("x", "m"), "position": ("position", "m"), "reaction": ("reaction", "N")}
@@ -50,8 +50,9 @@ class Observe(Table):
         Its name in results and history.
     quantity : str
         One of `QUANTITIES`.
-    node : int or str, optional
-        Node of a nodal quantity; without it the largest over all nodes (reaction: the sum over all supports).
+    node : int, str or list, optional
+        Node of a nodal quantity. Of several nodes the one with the largest value counts, for a reaction their sum;
+        without ``node`` that is over all.
     line : int, optional
         Line of a line quantity; without it the largest over all lines.
     component : {0, 1, 2, "x", "y", "z"}, optional
@@ -60,7 +61,7 @@ class Observe(Table):
         Reduction over time.
     """
 
-    name: str = text()
+    name: str = text(most=80)
     quantity: str = choice(*QUANTITIES)
     node: object = nodes(None)
     line: int | None = field(node_number, None)
@@ -70,13 +71,14 @@ class Observe(Table):
     def check(self):
         """Refuse a node, line or component that the quantity does not have."""
         if "," in self.name or '"' in self.name:
-            raise InputError(f"name = {self.name} must be free of commas and quotes: it heads a column of history.csv")
+            raise InputError(
+                f"name = {shown(self.name)} must be free of commas and quotes: it heads a column of history.csv"
+            )
         nodal, line = self.quantity in _NODAL, self.quantity in _LINE
         for key, allowed in (("node", nodal), ("component", nodal), ("line", line)):
             if getattr(self, key) is not None and not allowed:
-                raise InputError(f'{key} = {getattr(self, key)} has no meaning for quantity = "{self.quantity}"')
-        if isinstance(self.node, tuple):
-            raise InputError(f"node = {list(self.node)} must be one node: give one [[observe]] per node")
+                value = shown(getattr(self, key))
+                raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
 
     @property
     def unit(self):
@@ -86,7 +88,7 @@ class Observe(Table):
         return {**_NODAL, **_LINE}[self.quantity][1]
 
     def on(self, system):
-        """Refuse what the system does not have; return the observable with its node as a number."""
+        """Refuse what the system does not have; return the numbers of the nodes, None for all."""
         web = system.net.web
         need = _NEEDS.get(self.quantity)
         if need and need not in [f.name for f in system.families]:
@@ -95,12 +97,7 @@ class Observe(Table):
             raise InputError('quantity = "work" is not known in statics with [[motion]]: it depends on the path')
         if self.line is not None and self.line >= len(web.lines):
             raise InputError(f"line = {self.line} must be 0 … {len(web.lines) - 1}")
-        if self.node is not None:
-            found = web.find(self.node)
-            if len(found) != 1:
-                raise InputError(f'node = "{self.node}" must be one node, not {len(found)}')
-            return int(found[0])
-        return None
+        return None if self.node is None else web.find(self.node)
 
     def value(self, state):
         """The observable at one instant, a `Value`."""
@@ -113,13 +110,14 @@ class Observe(Table):
             at = int(np.argmax(values)) if self.line is None else self.line
             return Value(float(values[at]), at)
         values = getattr(state, _NODAL[self.quantity][0])
-        if self.quantity == "reaction" and self.node is None:
-            values = values.sum(axis=0, keepdims=True)
+        found = self.on(state.system)
+        found = np.arange(len(state.system.net.web.points)) if found is None else found
+        values = values[found]
+        if self.quantity == "reaction" and len(found) > 1:
+            values, found = values.sum(axis=0, keepdims=True), [None]
         values = np.linalg.norm(values, axis=1) if self.component is None else values[:, self.component]
-        if self.quantity == "reaction" and self.node is None:
-            return Value(float(values[0]), None)
-        at = int(np.argmax(values)) if self.node is None else self.on(state.system)
-        return Value(float(values[at]), at)
+        at = int(np.argmax(values))
+        return Value(float(values[at]), None if found[at] is None else int(found[at]))
 
     def error(self, state, certificate):
         """Bound on the error of the value from a `refweb.certificate.Certificate`, None where it gives none."""

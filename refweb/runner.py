@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import sys
 import time
 
 import numpy as np
 
-from . import statics
+from . import __version__, statics
 from .io import Folder, check_folder
 from .laws import LINEAR, SMOOTH
 from .observables import Result
 from .scene import Scene
-from .solution import Solution, as_history
+from .solution import SOLVER, Solution, as_history
 from .state import State
 
 
@@ -58,16 +57,13 @@ def run(scene, out=None, force=False, progress=None, announce=None):
     for observable in scene.observables:
         names.append(observable.name)
         units.append(observable.unit)
-    first = State(system, 0.0, np.zeros((system.rows, 3)))
-    energies = list(first.energies)
+    energies = list(State(system, 0.0, np.zeros((system.rows, 3))).energies)
     names, units = names + energies, units + ["J"] * len(energies)
     solution.columns = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
-    rows, folder = [], None
-    if out is not None:
-        folder = Folder(out, scene, solution.columns)
-        folder.summary(solution.summary())
+    rows, remarks = [], {}
+    folder = Folder(out, scene, solution.columns, solution.summary()) if out is not None else None
     try:
-        _solve(scene, system, solution, rows, folder, progress)
+        _solve(scene, system, solution, rows, remarks, folder, progress)
         solution.status = "solved"
     except KeyboardInterrupt:
         solution.status, solution.message = "interrupted", f"interrupted after {len(rows)} load steps"
@@ -80,55 +76,61 @@ def run(scene, out=None, force=False, progress=None, announce=None):
         raise
     finally:
         solution.history = as_history(names, rows)
-        if solution.state is not None:
-            solution.cost = _cost(system, solution, started)
-            _judge(solution)
+        solution.cost = _cost(system, solution, started)
+        solution.warnings += _told(remarks, len(rows))
         if folder is not None:
             folder.close()
             folder.summary(solution.summary())
     return solution
 
 
-def _solve(scene, system, solution, rows, folder, progress):
-    """Follow the load steps: results, history row and, where due, a frame of each."""
+def _solve(scene, system, solution, rows, remarks, folder, progress):
+    """Follow the load steps: results, remarks and history row of each, and frames of some, the last always."""
     steps = scene.solve.load_steps
 
     def tell(text):
         if progress is not None:
             progress(text, len(rows) / len(steps))
 
-    totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-    for i, found in enumerate(statics.solve(system, steps, tell)):
-        state = State(system, found.step, found.x)
-        values = [o.value(state) for o in scene.observables]
-        errors = [o.error(state, found.certificate) for o in scene.observables]
-        results = {
-            o.name: Result(value.value, error, o.unit, found.step, value.where)
-            for o, value, error in zip(scene.observables, values, errors, strict=True)
-        }
-        for key in totals:
-            totals[key] += found.stats[key]
-        gap = found.certificate.gap if found.certificate else None
-        stats = {
-            "method": scene.solve.method,
-            **found.stats,
-            "residual": found.stats["residual"],
-            "duality_gap": gap,
-            "smallest_pivot": found.stats.get("smallest_pivot"),
-            "slack_nodes": len(state.slack_nodes),
-            "energy_drift": None,
-        }
-        solution.steps.append({"step": found.step, "results": results, "solver": stats})
-        solution.solver = {**stats, **totals}
-        solution.state = state
-        rows.append([found.step, *(v.value for v in values), *state.energies.values()])
+    def frame():
+        solution.frames.append((len(rows) - 1, solution.state))
         if folder is not None:
-            folder.row(rows[-1])
-        if i % scene.output.frames == 0 or i == len(steps) - 1:
+            folder.frame(*solution.frames[-1])
+
+    totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    solution.solver = {**SOLVER, "method": scene.solve.method, **totals}
+    try:
+        for found in statics.solve(system, steps, tell):
+            state = State(system, found.step, found.x)
+            values = [o.value(state) for o in scene.observables]
+            errors = [o.error(state, found.certificate) for o in scene.observables]
+            results = {
+                o.name: Result(value.value, error, o.unit, found.step, value.where)
+                for o, value, error in zip(scene.observables, values, errors, strict=True)
+            }
+            stats = {key: found.stats.get(key) for key in SOLVER} | {
+                "method": scene.solve.method,
+                "duality_gap": found.certificate.gap if found.certificate else None,
+                "slack_nodes": len(state.slack_nodes),
+            }
+            totals = {key: totals[key] + stats[key] for key in totals}
+            row = [found.step, *(v.value for v in values), *state.energies.values()]
+            if not np.isfinite(row).all():
+                bad = solution.columns[np.isfinite(row).argmin()]
+                raise statics.SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
+            solution.steps.append({"step": found.step, "results": results, "solver": stats})
+            solution.solver = {**stats, **totals}
+            solution.state = state
+            rows.append(row)
+            for kind, text in _remarks(state, stats):
+                remarks.setdefault(kind, []).append((found.step, text))
             if folder is not None:
-                folder.frame(i, state)
-            else:
-                solution.frames.append((i, state))
+                folder.row(row)
+            if (len(rows) - 1) % scene.output.frames == 0:
+                frame()
+    finally:
+        if rows and solution.frames[-1][0] < len(rows) - 1:
+            frame()
 
 
 def web_of(system):
@@ -145,8 +147,9 @@ def web_of(system):
 
 
 def _versions():
-    names = ("refweb", "numpy", "scipy", "scikit-fem", "numba", "meshio", "qdldl")
-    return {"python": sys.version.split()[0], **{name: importlib.metadata.version(name) for name in names}}
+    names = ("numpy", "scipy", "scikit-fem", "numba", "meshio", "qdldl")
+    own = {"refweb": __version__, "python": sys.version.split()[0]}
+    return {**own, **{name: importlib.metadata.version(name) for name in names}}
 
 
 def _notices(scene, system):
@@ -162,7 +165,7 @@ def _cost(system, solution, started):
     """CPU and wall time, and an estimate of each effect's share: its kernel alone at the last state × its calls."""
     cpu, wall = time.process_time() - started[0], time.perf_counter() - started[1]
     state, share = solution.state, {}
-    for family in system.families:
+    for family in system.families if state is not None else ():
         best = np.inf
         for _ in range(3):
             begin = time.process_time()
@@ -172,29 +175,34 @@ def _cost(system, solution, started):
     return {"cpu_s": cpu, "wall_s": wall, "by_effect": share}
 
 
-def _judge(solution):
-    """Add the warnings that the results call for."""
-    net, state = solution.state.system.net, solution.state
+def _remarks(state, stats):
+    """What a reader of a state has to know: pairs of a kind and a text."""
+    net = state.system.net
     stress = float(state.stress.max())
     if net.law.number == SMOOTH:
         columns = net.line_data[:, 1:4].T
         floor = float((net.law.floor(*columns) / net.area).max())
         if floor > 0.01 * stress:
-            solution.warnings.append(
+            yield "floor", (
                 f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "
-                "slack lines push; lower smoothing or use law = \"tension-only\""
+                'slack lines push; lower smoothing or use law = "tension-only"'
             )
-    if solution.solver.get("smallest_pivot") == -1:
+    if stats["smallest_pivot"] == -1:
         law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
-        solution.warnings.append(
-            f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would wrinkle or "
-            'buckle out of this state; law = "tension-only" has no such states'
+        yield "saddle", (
+            f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would wrinkle "
+            'or buckle out of this state; law = "tension-only" has no such states'
         )
-    if solution.solver["slack_nodes"]:
+    if stats["slack_nodes"]:
         some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
-        solution.warnings.append(
-            f"{len(state.slack_nodes)} nodes hang on slack lines only, their positions are not unique: {some}"
-        )
+        yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
     if state.utilisation is not None and state.utilisation.max() > 1.0:
         line = int(state.utilisation.argmax())
-        solution.warnings.append(f"line {line} breaks: stress over strength is {state.utilisation[line]:.3g}")
+        yield "strength", f"line {line} breaks: stress over strength is {state.utilisation[line]:.3g}"
+
+
+def _told(remarks, count):
+    """Each kind of remark once, as it was last made, with the load steps it was made at unless that is all."""
+    for made in remarks.values():
+        steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
+        yield made[-1][1] + (f" (load step {steps})" if len(made) < count else "")

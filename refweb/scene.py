@@ -1,12 +1,14 @@
 """A scene: one web, one cable, the effects on it, and what to solve and observe.
 
-`Scene` is frozen and one to one with a TOML file. A table that is present is an effect that is present; the module of an
-effect is imported when its table is.
+`Scene` is frozen and one to one with a TOML file. A table that is present is an effect that is present; the module of
+an effect is imported when its table is.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import os
 import pathlib
 import re
 import tomllib
@@ -14,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, components, integer, nearest, nodes, numbers_list, shown, text
+from .inputs import InputError, Table, choice, components, integer, nearest, nodes, numbers_list, short, shown, text
 
 WEBS = {
     "paper": "refweb.lattices:Paper",
@@ -43,7 +45,7 @@ def _load(reference):
 class Supports(Table):
     """Nodes whose displacement is held at zero in some components."""
 
-    nodes: object = nodes()
+    nodes: object = nodes(empty=True)
     components: tuple = components(("x", "y", "z"))
 
 
@@ -54,6 +56,10 @@ class Static(Table):
     kind: str = choice("static", default="static")
     method: str = choice("newton", default="newton")
     load_steps: tuple = numbers_list((1.0,))
+
+    def check(self):
+        if len(self.load_steps) > 100_000:
+            raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +108,15 @@ class Scene:
     title: str = "scene"
     seed: int = 0
     folder: pathlib.Path | None = field(default=None, compare=False)
+    file: str = field(default="", compare=False)
+
+    def __post_init__(self):
+        for key, value in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
+            object.__setattr__(self, key, value.metadata["read"](key, getattr(self, key)))
+        for key in ("effects", "support", "observe"):
+            object.__setattr__(self, key, tuple(getattr(self, key)))
+        for effect in self.effects:
+            table_of(effect)
 
     @staticmethod
     def load(source):
@@ -112,40 +127,35 @@ class Scene:
         InputError
             Where there is no such file or scene, or it is wrong.
         """
-        path = pathlib.Path(source)
-        if not path.is_file():
-            shipped = SHIPPED / f"{path.name.removesuffix('.toml')}.toml"
-            if len(path.parts) != 1 or not shipped.is_file():
-                known = sorted(p.stem for p in SHIPPED.glob("*.toml"))
-                raise InputError(f"{shown(str(source))[1:-1]}: no such file and no shipped scene, {nearest(path.stem, known)}")
-            path = shipped
+        path, shipped = pathlib.Path(source), sorted(SHIPPED.glob("*.toml"))
+        if not os.path.isfile(path):
+            known = [p.stem for p in shipped]
+            if str(path).removesuffix(".toml") not in known:
+                hint = nearest(path.stem, known)
+                raise InputError(f"{short(str(source))}: no such file and no shipped scene, {hint}")
+            path = shipped[known.index(path.stem)]
         try:
-            given = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError, RecursionError) as error:
-            raise InputError(f"{path.name}: cannot be read: {' '.join(str(error).split())}") from None
-        try:
-            return Scene.from_dict({"title": path.stem, **given}, path.resolve().parent)
-        except InputError as error:
-            raise InputError(f"{path.name}: {error}") from None
+            given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+        except (ValueError, OSError, RecursionError) as error:  # a ValueError also for a number of thousands of digits
+            raise InputError(f"{path.name}: cannot be read: {error}") from None
+        with _in_file(path.name):
+            return Scene.from_dict({"title": path.stem, **given}, path.resolve().parent, path.name)
 
     @staticmethod
-    def from_dict(given, folder=None):
-        """The scene of the dict that a TOML file is read to; relative paths start at ``folder``."""
-        plain = {"schema": 1, "title": "scene", "seed": 0}
+    def from_dict(given, folder=None, file=""):
+        """The scene of the dict that a TOML file is read to; relative paths start at ``folder``.
+
+        ``file`` is the name that begins the messages of `build`.
+        """
         single = {"cable": "refweb.cables:Cable", "supports": Supports, "output": Output}
         several = {"support": Supports, "observe": "refweb.observables:Observe"}
-        known = [*plain, "web", "solve", *single, *several, *EFFECTS]
+        known = ["schema", "title", "seed", "web", "solve", *single, *several, *EFFECTS]
         for key in given:
             if key not in known:
-                raise InputError(f"[{shown(key)[1:-1]}]: unknown table or key, {nearest(key, known)}")
-        top = {**plain, **given}
-        for key, check in (
-            ("schema", choice(1)),
-            ("title", text()),
-            ("seed", integer(at_least=0, at_most=2**63 - 1)),
-        ):
-            top[key] = check.metadata["read"](key, top[key])
-        parts = {"title": top["title"], "seed": top["seed"], "folder": folder}
+                raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {nearest(key, known)}")
+        choice(1).metadata["read"]("schema", given.get("schema", 1))
+        parts = {key: given[key] for key in ("title", "seed") if key in given}
+        parts |= {"folder": folder, "file": file}
         for key in ("web", "cable", "solve"):
             if key not in given:
                 raise InputError(f"[{key}] is missing: every scene has one")
@@ -155,7 +165,8 @@ class Scene:
             if key in given:
                 parts[key] = _resolve(table).read(f"[{key}]", given[key])
         for key, table in several.items():
-            parts[key] = _each(key, _resolve(table), given.get(key, []))
+            if key in given:
+                parts[key] = _each(key, _resolve(table), given[key])
         effects = []
         for key in given:
             if key in EFFECTS:
@@ -203,15 +214,22 @@ class Scene:
         Raises
         ------
         InputError
-            For whatever does not fit together; the message names the table.
+            For whatever does not fit together; the message names file and table.
         """
+        with _in_file(self.file):
+            return self._build()
+
+    def _build(self):
         from . import lines
         from .effects.elasticity import Elasticity
         from .system import System
 
         web = self.web
         if isinstance(web, Table):
-            web = _in("[web]", web.web, self.folder)
+            try:
+                web = _in("[web]", web.web, self.folder)
+            except OSError as error:
+                raise InputError(f"[web] cannot be read: {error.strerror or error}") from None
         net = _in("", lines.build, web, self.cable, quasi_static=self.solve.kind == "static")
         supported = np.zeros((len(net.points), 3), dtype=bool)
         if self.supports is None:
@@ -230,12 +248,14 @@ class Scene:
                 raise InputError(f"[{key}] stands {count[key]} times: a scene has one")
         system = System(net, acting, supported)
         _distinct_motions(system)
-        names = set()
+        own = ("step", "time", "total_energy", *(family.book for family in system.families))
+        columns = dict.fromkeys(own, "a column of its own")
         for i, observable in enumerate(self.observables):
             _in(f"[[observe]] {i + 1}", observable.on, system)
-            if observable.name in names:
-                raise InputError(f'[[observe]] {i + 1} name = "{observable.name}" stands twice: names are unique')
-            names.add(observable.name)
+            if (stands := columns.get(observable.name)) is not None:
+                name = shown(observable.name)
+                raise InputError(f"[[observe]] {i + 1} name = {name} is {stands} of history.csv: names are unique")
+            columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
         return system
 
 
@@ -259,8 +279,26 @@ def table_of(effect):
 
 
 def slug(title):
-    """A title as the name of a folder."""
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-") or "result"
+    """A title as the name of a folder, of at most 80 characters."""
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:80].strip("-") or "result"
+
+
+@contextlib.contextmanager
+def _in_file(file):
+    """Begin refusals with the name of the scene file."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{file}: {error}" if file else str(error)) from None
+
+
+def _as_given(key, value):
+    """A top-level key as it stands in the file: [table], [[table]] or key = value."""
+    if isinstance(value, dict):
+        return f"[{short(key)}]"
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return f"[[{short(key)}]]"
+    return f"{short(key)} = {shown(value)}"
 
 
 def _resolve(table):
@@ -276,7 +314,9 @@ def _in(where, call, *arguments, **named):
 
 def _each(key, table, given):
     if not isinstance(given, (list, tuple)):
-        raise InputError(f"[{key}] must be a list of tables: write [[{key}]]")
+        raise InputError(f"[{key}] = {shown(given)} must be a list of tables: write [[{key}]]")
+    if not given:
+        raise InputError(f"{key} = [] must hold at least one table: write [[{key}]] or leave it out")
     return tuple(table.read(f"[[{key}]] {i + 1}", one) for i, one in enumerate(given))
 
 

@@ -6,7 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .inputs import InputError, nearest
+from .inputs import nearest
+
+SOLVER = dict.fromkeys(
+    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift".split()
+)
+"""What a solver reports; None for what it does not know."""
 
 
 class Names(dict):
@@ -38,6 +43,8 @@ class Solution:
         How it ended; ``message`` says why.
     warnings : list of str
         What a reader of the results has to know.
+    frames : list of (int, refweb.state.State)
+        Row numbers and states that stand as VTU in a result folder.
     """
 
     scene: object
@@ -45,8 +52,8 @@ class Solution:
     history: dict = field(default_factory=dict)
     columns: list = field(default_factory=list)
     steps: list = field(default_factory=list)
-    solver: dict = field(default_factory=dict)
-    cost: dict = field(default_factory=dict)
+    solver: dict = field(default_factory=SOLVER.copy)
+    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "by_effect": {}})
     web: dict = field(default_factory=dict)
     versions: dict = field(default_factory=dict)
     status: str = "running"
@@ -123,9 +130,7 @@ class Solution:
         from .io import Folder, check_folder
 
         check_folder(folder, force)
-        if self.state is None:
-            raise InputError("there is no state to save")
-        out = Folder(folder, self.scene, self.columns)
+        out = Folder(folder, self.scene, self.columns, {**self.summary(), "status": "running"})
         for row in zip(*self.history.values(), strict=True):
             out.row(row)
         for number, state in self.frames:

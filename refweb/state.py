@@ -67,7 +67,7 @@ class State:
         from .effects.elasticity import of
 
         net, strain = self.system.net, np.empty(len(self.system.net.cells))
-        of(net)[3](self.time, self.x, net.cells, net.line_data, strain)
+        of(net)[4](self.time, self.x, net.cells, net.line_data, strain)
         return strain
 
     @cached_property
@@ -99,7 +99,9 @@ class State:
     def utilisation(self):
         """Stress over strength, shape (lines,); None where no line has a strength."""
         net = self.system.net
-        return self._by_line(self.element_tension / (net.area * net.strength)) if np.isfinite(net.strength).any() else None
+        if not np.isfinite(net.strength).any():
+            return None
+        return self._by_line(self.element_tension / (net.area * net.strength))
 
     @cached_property
     def energies(self):

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from . import certificate
+from .errors import SolverError
 from .factor import Factor
 from .interior import InteriorPoint
 from .laws import LINEAR, TENSION_ONLY
@@ -26,10 +27,6 @@ from .laws import LINEAR, TENSION_ONLY
 TOLERANCE = 1e-10
 """Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
-
-
-class SolverError(RuntimeError):
-    """A solver that found no answer; the message says what, where and when."""
 
 
 class NotFound(SolverError):

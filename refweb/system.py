@@ -23,8 +23,8 @@ class System:
         Rows, lines and masses.
     effects : sequence
         Values with ``on(net)``.
-    supported : ndarray of bool, shape (rows, 3)
-        Components that do not move, or move as prescribed.
+    supported : ndarray of bool, shape (nodes, 3)
+        Components of nodes that do not move, or move as prescribed.
 
     Attributes
     ----------
@@ -37,18 +37,33 @@ class System:
     """
 
     def __init__(self, net, effects, supported):
+        for effect in effects:
+            if hasattr(effect, "extend"):
+                net = effect.extend(net)
         self.net, self.effects = net, effects
         self.rows = len(net.points)
-        acting = [effect.on(net) for effect in effects]
+        acting = [effect.on(net) for effect in effects if hasattr(effect, "on")]
         self.families = [a for a in acting if not isinstance(a, Drive)]
         self.drives = [a for a in acting if isinstance(a, Drive)]
-        self.supported = supported.copy()
+        self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
+        for body in net.bodies:
+            self.supported[body.row] = body.fixed
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
         self.free = np.flatnonzero(~self.supported)
         self._rest = np.zeros((self.rows, 3))
         self._out = [np.zeros((len(f.cells), f.observed)) for f in self.families]
         self._blocks = [np.empty((len(f.cells), 3 * f.cells.shape[1], 3 * f.cells.shape[1])) for f in self._stiff]
+
+    def initial_velocity(self):
+        """Velocities at the start [m/s], shape (rows, 3): those of the effects and bodies."""
+        v = np.zeros((self.rows, 3))
+        for effect in self.effects:
+            if hasattr(effect, "start"):
+                effect.start(self.net, self.supported, v)
+        for body in self.net.bodies:
+            v[body.row] = body.velocity
+        return v
 
     @property
     def _stiff(self):

@@ -226,7 +226,7 @@ def _checked_lines(lines, nodes):
         raise InputError(f"lines[{i}] = {lines[i].tolist()} repeats lines[{j}] = {lines[j].tolist()}")
     unused = np.flatnonzero(np.bincount(lines.ravel(), minlength=nodes) == 0)
     if len(unused):
-        more = f" and {len(unused) - 1} more" if len(unused) > 1 else ""
+        more = f" (and {len(unused) - 1} more)" if len(unused) > 1 else ""
         raise InputError(f"node {unused[0]}{more} is used by no line")
     return np.array(lines, dtype=np.int32, order="C")
 
@@ -395,6 +395,10 @@ class File(Table):
     ------
     InputError
         From ``web``, if the file cannot be read or is not a web.
+
+    Notes
+    -----
+    meshio does not come to an end on Tecplot and Kratos (mdpa) files that are cut off.
     """
 
     kind: str = choice("file", default="file")

@@ -277,10 +277,6 @@ def test_cable_centre_is_at_half_its_length(start, end, elements, centre):
         (dict(sag=(3, 0, 0)), "sag = [3.0, 0.0, 0.0] must not be zero or parallel to the cable, from start to end"),
         (dict(sag=(0, 0, 0)), "sag = [0.0, 0.0, 0.0] must not be zero or parallel to the cable, from start to end"),
         (dict(sag=(1, 0)), "sag = [1, 0] must be a vector of 3 numbers, not 2"),
-        (
-            dict(end=(1e308, 0, 9e307)),
-            "end = [1e+308, 0.0, 9e+307] must be apart from start by a finite distance > 0 [m]",
-        ),
     ],
 )
 def test_cable_refuses(given, message):
@@ -323,9 +319,8 @@ def test_arrays_are_typed_and_read_only():
         (dict(lines=[[0, 1], [1, 1], [2, 0]]), "lines[1] = [1, 1] joins a node to itself"),
         (dict(lines=[[0, 1], [1, 2], [1, 0]]), "lines[2] = [1, 0] repeats lines[0] = [0, 1]"),
         (dict(lines=[[0, 1]]), "node 2 is used by no line"),
-        (dict(points=[*TRIANGLE["points"], [1, 1, 1], [2, 2, 2]]), "node 3 and 1 more is used by no line"),
+        (dict(points=[*TRIANGLE["points"], [1, 1, 1], [2, 2, 2]]), "node 3 (and 1 more) is used by no line"),
         (dict(points=[[0, 0, 0], [1, 0, 0], [1, 0, 0]]), "lines[1] = [1, 2] has no length: its nodes coincide"),
-        (dict(points=[[0, 0, 0], [1e308, 0, 0], [0, 1, 0]]), "natural_length[0] = inf must be finite and > 0 [m]"),
         (dict(points=[[0, 0, 0], [1, 0, float("nan")], [0, 1, 0]]), "points[1][2] = nan must be a finite number"),
         (dict(points=[[0, 0], [1, 0], [0, 1]]), "points[0] = [0, 0] must be a row of 3 numbers, not 2"),
         (dict(lines=[[0, 1], [1, 2], [2, -1]]), "lines[2][1] = -1 must be ≥ 0"),
@@ -355,6 +350,7 @@ def test_inline_refuses(given, message):
         (([[0, 0, 0], [1, 0, 0]], [0, 1]), r"lines of shape \(2,\) must be at least one pair of node numbers"),
         (([[0, 0, 0], [1, 0, 0]], [[0.0, 1.0]]), "must be at least one pair of node numbers"),
         (([[0, 0, 0], [1, 0, np.inf]], [[0, 1]]), r"points\[1\] = \[1.0, 0.0, inf\] must be finite"),
+        (([[0, 0, 0], [1e200, 0, 0]], [[0, 1]]), r"natural_length\[0\] = inf must be finite and > 0"),
         (([[0, 0, 0], [1, 0, 0]], [[0, 1]], [np.nan]), r"natural_length\[0\] = nan must be finite and > 0"),
         (([[0, 0, 0], [1, 0, 0]], [[0, 1]], None, [2]), r"rim\[0\] = 2 must be 0 … 1"),
     ],

@@ -1,7 +1,14 @@
 """Effects: what acts on a net, one file each.
 
-An effect is a frozen value that holds physical numbers only. ``effect.on(net)`` returns a `Family`: cells, their numbers
-and compiled kernels for force, energy and stiffness. It touches no global matrix and knows no other effect.
+An effect is a frozen value that holds physical numbers only. It has one or more of these methods, touches no global
+matrix and knows no other effect.
+
+``on(net)``
+    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; or a `Drive`.
+``extend(net)``
+    The `refweb.lines.Net` with more rows or mass; comes before any ``on``.
+``start(net, supported, v)``
+    Writes initial velocities.
 """
 
 from __future__ import annotations
@@ -30,10 +37,13 @@ class Family:
         Potential of the force, where there is one.
     stiffness : kernel, optional
         −∂f/∂x by cell, None where it is zero.
+    bound : kernel, optional
+        Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
     book : str
         Column of the energy book that its energy or power belongs to.
     observed : int
-        Number of values per cell that ``force`` writes to its ``out``.
+        Number of values per cell that ``force`` writes to its ``out``; the first of a family booked as "work" is its
+        power [W].
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
     """
@@ -44,6 +54,7 @@ class Family:
     force: Callable
     energy: Callable | None
     stiffness: Callable | None
+    bound: Callable | None
     book: str
     observed: int = 0
     internal: bool = False

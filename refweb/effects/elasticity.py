@@ -14,7 +14,7 @@ import functools
 import math
 from dataclasses import dataclass
 
-from ..compiled import ENERGY, FORCE, STIFFNESS, kernel
+from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import Table
 from ..laws import energy_density, prepared_stress, stress, tangent
 from ..lines import AXIAL_STIFFNESS, G0, LENGTH, POINT, R0, SLACKNESS, SMOOTHING
@@ -41,7 +41,7 @@ def strain(x, cells, data, c, q, nodes, gradients):
 
 @functools.cache
 def kernels(law, gradients, weights):
-    """Force, energy, stiffness and state kernels of one law and reference element.
+    """Force, energy, stiffness, bound and strain kernels of one law and reference element.
 
     Parameters
     ----------
@@ -109,6 +109,17 @@ def kernels(law, gradients, weights):
                                 blocks[c, 3 * a + i, 3 * b + j] += d * (along - across) * p[i] * p[j]
                             blocks[c, 3 * a + i, 3 * b + i] += d * across
 
+    @kernel(BOUND)
+    def bound(reach, x, mass, rates, cells, data):
+        for c in range(cells.shape[0]):
+            for q in range(points):
+                total = 0.0
+                for a in range(nodes):
+                    total += abs(flat[q * nodes + a])
+                for a in range(nodes):
+                    share = abs(flat[q * nodes + a]) * total
+                    rates[cells[c, a]] += weights[q] * share * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
+
     @kernel(ENERGY)
     def strains(t, x, cells, data, out):
         for c in range(cells.shape[0]):
@@ -117,7 +128,7 @@ def kernels(law, gradients, weights):
                 largest = max(largest, strain(x, cells, data, c, q, nodes, flat)[4])
             out[c] = largest
 
-    return force, energy, stiffness, strains
+    return force, energy, stiffness, bound, strains
 
 
 def of(net):
@@ -131,7 +142,7 @@ class Elasticity(Table):
 
     def on(self, net):
         """The family of all lines; ``out`` is tension [N] and strain."""
-        force, energy, stiffness, _ = of(net)
+        force, energy, stiffness, bound, _ = of(net)
         return Family(
             name="elasticity",
             cells=net.cells,
@@ -139,6 +150,7 @@ class Elasticity(Table):
             force=force,
             energy=energy,
             stiffness=stiffness,
+            bound=bound,
             book="strain_energy",
             observed=2,
             internal=True,

@@ -47,5 +47,6 @@ class Gravity(Table):
             force=force,
             energy=energy,
             stiffness=None,
+            bound=None,
             book="potential_energy",
         )

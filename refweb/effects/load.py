@@ -23,9 +23,10 @@ def factor_at(t, data, c):
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
     for c in range(cells.shape[0]):
-        factor = factor_at(t, data, c)
+        row, factor = cells[c, 0], factor_at(t, data, c)
+        out[c, 0] = factor * (data[c, 0] * v[row, 0] + data[c, 1] * v[row, 1] + data[c, 2] * v[row, 2])
         for i in range(3):
-            f[cells[c, 0], i] += factor * data[c, i]
+            f[row, i] += factor * data[c, i]
 
 
 @kernel(ENERGY)
@@ -56,7 +57,7 @@ class Load(Table):
     factor: tuple | None = rows(2, None, increasing=True)
 
     def on(self, net):
-        """The family of the loaded nodes; its energy is −(force)·(displacement)."""
+        """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
         numbers = [*self.force, *((0.0, 1.0) if net.quasi_static else (1.0, 0.0))]
         numbers += flattened(self.factor) if self.factor else [0.0]
@@ -67,5 +68,7 @@ class Load(Table):
             force=force,
             energy=energy,
             stiffness=None,
+            bound=None,
             book="work",
+            observed=1,
         )

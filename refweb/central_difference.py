@@ -1,0 +1,412 @@
+"""Explicit dynamics: central differences as kick, drift, kick, in one compiled loop.
+
+    v ← v + ½h f/m,   x ← x + h v,   f ← f(t + h, x),   v ← v + ½h f/m
+
+The loop calls the kernels of all effects through typed lists and tracks peaks in every step; Python sees history rows
+only. The step comes from Gershgorin's bound on the largest frequency, 2/√(max row sum of M⁻¹K), with K's lines at their
+taut stiffness and the lines that a body can reach within the row at their contact stiffness.
+
+Below that bound a slack chain in contact can still gain energy by many orders, and look plausible afterwards. So the
+book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of the largest energy ends the run.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .compiled import BOUND, ENERGY, FORCE, INDICES, MATRIX, VECTOR, kernel, typed_list
+from .errors import SolverError
+from .inputs import InputError
+from .probes import INTEGERS, PROBE
+
+DRIFT = 1e-2
+"""Largest energy drift of a run whose result is returned."""
+
+
+@kernel()
+def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, total):
+    """Write the energy of each family, the kinetic energy and the work to ``total``."""
+    count = len(energies)
+    for i in range(count):
+        energies[i](t, x, cells[i], data[i], energy_outs[i])
+        total[i] = energy_outs[i].sum()
+    total[count], total[count + 1] = 0.0, book[0]
+    for r in range(x.shape[0]):
+        total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+
+
+@kernel()
+def advance(
+    count, h, t, x, v, f, mass, inverse, held, driven, working,
+    kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
+    probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
+    energies, energy_outs, watch, total,
+):  # fmt: skip
+    """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse."""
+    flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
+    rows, where = x.shape[0], np.zeros(1, dtype=np.int64)
+    before, power, reaction = np.empty((driven.size, 7)), 0.0, np.zeros(3)
+    for i in working:
+        for c in range(outs[i].shape[0]):
+            power += outs[i][c, 0]
+    for s in range(held.size):
+        reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
+    for step in range(1, count + 1):
+        now = t + step * h
+        for d in range(driven.size):
+            r = driven[d]
+            before[d, 6] = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+            for k in range(3):
+                before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
+        for q in range(3 * rows):
+            speed = flat_v[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
+            flat_v[q] = speed
+            flat_x[q] += h * speed
+            flat_f[q] = 0.0
+        for i in range(len(drives)):
+            drives[i](now, x, v, f, drive_cells[i], drive_data[i], drive_outs[i])
+        for i in range(len(kernels)):
+            kernels[i](now, x, v, f, cells[i], data[i], outs[i])
+        for q in range(3 * rows):
+            flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
+        if working.size:
+            gained = 0.0
+            for i in working:
+                for c in range(outs[i].shape[0]):
+                    gained += outs[i][c, 0]
+            book[0] += 0.5 * h * (power + gained)
+            power = gained
+        for d in range(driven.size):
+            r = driven[d]
+            book[0] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
+            for k in range(3):
+                book[0] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
+        for k in range(3):
+            impulse[k] += 0.5 * h * reaction[k]
+            reaction[k] = 0.0
+        for s in range(held.size):
+            reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
+        for k in range(3):
+            impulse[k] += 0.5 * h * reaction[k]
+        for i in followed:
+            value = probes[i](now, x, v, f, outs[0], probe_rows[i], probe_data[i], where)
+            if signs[i] * value > signs[i] * peaks[i]:
+                peaks[i], times[i], places[i] = value, now, where[0]
+        if watch.shape[0]:
+            book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, total)
+            for j in range(watch.shape[0]):
+                value, i = np.dot(watch[j], total), len(probes) + j
+                if signs[i] * value > signs[i] * peaks[i]:
+                    peaks[i], times[i] = value, now
+
+
+@kernel()
+def step_bound(reach, x, mass, free, rates, bounds, cells, data):
+    """Largest stable step [s]; infinite where nothing vibrates."""
+    rates[:] = 0.0
+    for i in range(len(bounds)):
+        bounds[i](reach, x, mass, rates, cells[i], data[i])
+    rate = 0.0
+    for r in free:
+        rate = max(rate, rates[r] / mass[r])
+    return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
+
+
+@kernel()
+def rows_ahead(
+    ends, safety, step_size, limit, state, saved, mass, inverse, free, held, driven, working,
+    kernels, cells, data, outs, energies, energy_outs, bounds, drives, drive_cells, drive_data, drive_outs,
+    probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
+    watch, history,
+):  # fmt: skip
+    """Advance to each time of ``ends`` and write a row of ``history`` there.
+
+    ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
+    done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
+    x, v and f at the row before.
+    """
+    x, v, f = saved[0], saved[1], saved[2]
+    back = saved[3:]
+    rows, where, rates = x.shape[0], np.zeros(1, dtype=np.int64), np.empty(x.shape[0])
+    total = np.zeros(len(energies) + 2)
+    for n in range(ends.size):
+        interval = ends[n] - state[0]
+        if interval > 0.0:
+            back[0], back[1], back[2] = x, v, f
+            fastest = 0.0
+            for r in range(rows):
+                fastest = max(fastest, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+            if step_size > 0.0:
+                steps = interval / step_size
+            else:
+                reach = 4.0 * interval * math.sqrt(fastest)
+                steps = interval / (safety * step_bound(reach, x, mass, free, rates, bounds, cells, data))
+            count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
+            h = interval / count
+            advance(
+                count, h, state[0], x, v, f, mass, inverse, held, driven, working,
+                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
+                probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
+                energies, energy_outs, watch, total,
+            )  # fmt: skip
+            state[0], state[1], state[2] = ends[n], state[1] + count, h
+        row, at = history[n], 1
+        row[0] = state[0]
+        for i in range(len(probes)):
+            row[at] = probes[i](state[0], x, v, f, outs[0], probe_rows[i], probe_data[i], where)
+            at += 1
+        book_energies(state[0], x, v, mass, cells, data, energies, energy_outs, book, total)
+        stored = np.abs(total[:-1]).sum()
+        energy = total[:-1].sum()
+        for i in working:
+            stored -= abs(total[i])
+            energy -= total[i]
+        row[at : at + total.size] = total
+        at += total.size
+        for k in range(3):
+            row[at + k], row[at + 3 + k] = 0.0, impulse[k]
+            for r in range(rows):
+                if inverse[r, k] > 0.0:
+                    row[at + k] += v[r, k] / inverse[r, k]
+        if state[1] == 0.0:
+            state[3] = energy - book[0]
+        state[4] = max(state[4], stored)
+        drift = abs(energy - book[0] - state[3])
+        state[5] = max(state[5], drift)
+        if not math.isfinite(drift) or (drift > limit * state[4]):
+            return n
+    return ends.size
+
+
+@kernel(ENERGY)
+def no_energy(t, x, cells, data, out):
+    out[:] = 0.0
+
+
+@kernel(BOUND)
+def no_bound(reach, x, mass, rates, cells, data):
+    pass
+
+
+class OpenBook(SolverError):
+    """The energy of a run drifted away from the work done on it."""
+
+
+@dataclass(eq=False)
+class Run:
+    """The whole state of an explicit run; a run resumed from it is the same run bit for bit.
+
+    Attributes
+    ----------
+    state : ndarray
+        Time [s], steps taken, last step [s], energy at the start [J], largest energy [J], worst drift [J].
+    saved : ndarray, shape (6, rows, 3)
+        Displacement [m], velocity [m/s] and force [N], and the same at the row before.
+    peaks, times, places : ndarray, shape (probes,)
+        Extreme value of each probe, its time, and the row or element it stands at.
+    work : ndarray, shape (1,)
+        Work of loads and motion [J].
+    impulse : ndarray, shape (3,)
+        Impulse of the supports on the net [N s].
+    """
+
+    state: np.ndarray
+    saved: np.ndarray
+    peaks: np.ndarray
+    times: np.ndarray
+    places: np.ndarray
+    work: np.ndarray
+    impulse: np.ndarray
+
+    @property
+    def time(self):
+        """Time [s]."""
+        return float(self.state[0])
+
+    @property
+    def nsteps(self):
+        """Steps taken."""
+        return int(self.state[1])
+
+    @property
+    def x(self):
+        """Displacement [m], shape (rows, 3)."""
+        return self.saved[0]
+
+    @property
+    def v(self):
+        """Velocity [m/s], shape (rows, 3)."""
+        return self.saved[1]
+
+    @property
+    def drift(self):
+        """Largest |ΔE − work| over the largest energy [1]."""
+        return float(self.state[5] / self.state[4]) if self.state[4] > 0.0 else 0.0
+
+
+class CentralDifference:
+    """Central differences on one system.
+
+    Parameters
+    ----------
+    system : refweb.system.System
+        Straight elements, lumped mass.
+    probes : sequence of (probe, rows, data, sign)
+        What to look at, see `refweb.probes`: at every row, and with sign 1 (−1) the largest (smallest) value over all
+        steps.
+    watch : sequence of (weights, sign)
+        Sums of energies to follow in every step: weights of (each family, kinetic energy, work), shape (families + 2,).
+    safety : float
+        Share of the step bound, 0 < safety ≤ 1.
+    step_size : float, optional
+        A fixed step instead [s], at most the bound.
+
+    Raises
+    ------
+    InputError
+        For a free row without mass, or a step above the bound.
+    """
+
+    def __init__(self, system, probes=(), watch=(), safety=0.5, step_size=None):
+        self.system, self.safety, self.step_size = system, safety, step_size
+        net, free = system.net, ~system.supported
+        bare = np.flatnonzero((net.mass <= 0.0) & free.any(axis=1))
+        if len(bare):
+            raise InputError(
+                f"node {bare[0]} has no mass, which central-difference needs: give density > 0 or a [[point_mass]]"
+            )
+        families, drives = system.families, system.drives
+        self._outs = [np.zeros((len(f.cells), f.observed)) for f in families]
+        inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
+        driven = np.concatenate([[], *(d.cells[:, 0] for d in drives)]).astype(np.int64)
+        working = np.array([i for i, f in enumerate(families) if f.book == "work"], dtype=np.int64)
+        self._masses = (net.mass, inverse)
+        self._moving = np.flatnonzero(free.any(axis=1))
+        self._ends = (np.flatnonzero(system.supported), driven, working)
+        self._cells = typed_list(INDICES, [f.cells for f in families])
+        self._data = typed_list(MATRIX, [f.data for f in families])
+        self._forces = (typed_list(FORCE, [f.force for f in families]), self._cells, self._data)
+        self._seen = typed_list(MATRIX, self._outs)
+        self._energies = (
+            typed_list(ENERGY, [f.energy or no_energy for f in families]),
+            typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
+        )
+        self._bounds = typed_list(BOUND, [f.bound or no_bound for f in families])
+        self._drives = (
+            typed_list(FORCE, [d.kernel for d in drives]),
+            typed_list(INDICES, [d.cells for d in drives]),
+            typed_list(MATRIX, [d.data for d in drives]),
+            typed_list(MATRIX, [np.zeros((len(d.cells), 0)) for d in drives]),
+        )
+        signs = np.array([float(p[-1]) for p in (*probes, *watch)])
+        self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 2)
+        self._probes = (
+            typed_list(PROBE, [p[0] for p in probes]),
+            typed_list(INTEGERS, [np.array(p[1], dtype=np.int64) for p in probes]),
+            typed_list(MATRIX, [np.ascontiguousarray(p[2], dtype=float) for p in probes]),
+            signs,
+            np.flatnonzero(signs[: len(probes)]),
+        )
+        if step_size is not None and step_size > (limit := self.bound()):
+            raise InputError(f"step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
+
+    def bound(self, x=None, reach=np.inf):
+        """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m]."""
+        x = np.zeros((self.system.rows, 3)) if x is None else x
+        rates = np.empty(self.system.rows)
+        return step_bound(reach, x, self._masses[0], self._moving, rates, self._bounds, self._cells, self._data)
+
+    def start(self, x=None, v=None):
+        """The `Run` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
+        system = self.system
+        saved = np.zeros((6, system.rows, 3))
+        saved[0] = 0.0 if x is None else x
+        saved[1] = system.initial_velocity() if v is None else v
+        saved[1][system.supported] = 0.0
+        system.drive(0.0, saved[0], saved[1])
+        for family, out in zip(system.families, self._outs, strict=True):
+            family.force(0.0, saved[0], saved[1], saved[2], family.cells, family.data, out)
+        probes, rows, data, signs, _ = self._probes
+        values, where = np.zeros(len(signs)), np.zeros((len(signs), 1), dtype=np.int64)
+        for i in range(len(probes)):
+            values[i] = probes[i](0.0, saved[0], saved[1], saved[2], self._outs[0], rows[i], data[i], where[i])
+        if len(self._watch):
+            total = np.zeros(len(system.families) + 2)
+            book_energies(
+                0.0, saved[0], saved[1], self._masses[0], self._cells, self._data, *self._energies, np.zeros(1), total
+            )
+            values[len(probes) :] = self._watch @ total
+        return Run(np.zeros(6), saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3))
+
+    def _peaks(self, run):
+        return (*self._probes, run.peaks, run.times, run.places, run.work, run.impulse)
+
+    def rows(self, run, ends):
+        """Advance a run to each time of ``ends`` in turn; equal steps lead to each.
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+            Time, value of each probe, energy of each family, kinetic energy, work, momentum of all that is free and
+            impulse of the supports (3 columns each).
+
+        Raises
+        ------
+        OpenBook
+            Where the energy drift exceeds `DRIFT`.
+        SolverError
+            At the first number that is not finite; names node, line and time.
+        """
+        ends = np.atleast_1d(np.asarray(ends, dtype=float))
+        history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 8))
+        step, start = self.step_size or 0.0, run.time
+        done = rows_ahead(
+            ends, self.safety, step, DRIFT, run.state, run.saved, *self._masses, self._moving, *self._ends,
+            *self._forces, self._seen, *self._energies, self._bounds, *self._drives, *self._peaks(run),
+            self._watch, history,
+        )  # fmt: skip
+        if done < len(ends):
+            before = ends[done - 1] if done else start
+            if not np.isfinite(history[done]).all():
+                self._name_blow_up(run, before)
+            self._name_drift(run, before)
+        return history
+
+    def _name_blow_up(self, run, before):
+        """Replay the last row step by step and name the first number that is not finite."""
+        system, h = self.system, run.state[2]
+        net = system.net
+        x, v, f = run.saved[3:].copy()
+        count, total = round((run.time - before) / h), np.zeros(len(system.families) + 2)
+        for step in range(1, count + 1):
+            advance(
+                1, h, before + (step - 1) * h, x, v, f, *self._masses, *self._ends, *self._forces, self._seen,
+                *self._drives, *self._peaks(run), *self._energies, self._watch, total,
+            )  # fmt: skip
+            wrong = ~np.isfinite(x + v + f).all(axis=1)
+            if wrong.any():
+                row = int(np.flatnonzero(wrong)[0])
+                nodes = len(net.web.points)
+                name = f"node {row}" if row < nodes else f'body "{net.bodies[row - nodes].name}"'
+                lines = net.line[(net.cells == row).any(axis=1)]
+                name += f", line {lines[0]}," if len(lines) else ""
+                raise SolverError(f"number not finite at {name} t = {before + step * h:.6g} s: use a smaller safety")
+        raise SolverError(f"energy not finite at t = {run.time:.6g} s: use a smaller safety")
+
+    def _name_drift(self, run, before):
+        """Say where energy came in: the effect and cell whose energy grew most in the last row."""
+        system, grown = self.system, (-np.inf, "", 0)
+        for family in system.families:
+            if family.energy is not None and family.book != "work":
+                change = system.energy_of(family, run.time, run.x) - system.energy_of(family, before, run.saved[3])
+                cell = int(change.argmax())
+                grown = max(grown, (float(change[cell]), family.name, cell))
+        _, name, cell = grown
+        line = system.net.line[cell % len(system.net.line)]
+        raise OpenBook(
+            f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, limit "
+            f"{DRIFT:g}: energy came in with {name} at line {line}; use a smaller safety than {self.safety:g}"
+        )

@@ -1,0 +1,31 @@
+"""Point masses on nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..inputs import Table, nodes, real
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointMass(Table):
+    """A mass added to each of some nodes; it weighs under gravity.
+
+    Parameters
+    ----------
+    node : int, str or list
+        Nodes, by number or name.
+    mass : float
+        Mass on each node [kg], ≥ 0.
+    """
+
+    node: object = nodes()
+    mass: float = real(at_least=0, unit="kg")
+
+    def extend(self, net):
+        """The net with the masses added."""
+        mass = net.mass.copy()
+        np.add.at(mass, net.web.find(self.node), self.mass)
+        return replace(net, mass=mass)

@@ -1,0 +1,34 @@
+"""Initial velocities of nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..inputs import InputError, Table, nodes, vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class Velocity(Table):
+    """Initial velocity of each of some nodes; "all" are all nodes that are free.
+
+    Parameters
+    ----------
+    node : int, str or list
+        Nodes, by number or name.
+    value : sequence of 3 float
+        Velocity [m/s].
+    """
+
+    node: object = nodes()
+    value: tuple = vector(unit="m/s")
+
+    def start(self, net, supported, v):
+        """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""
+        if net.quasi_static:
+            raise InputError("a velocity has no place in statics: leave it out")
+        for node in net.web.find(self.node):
+            allowed = [axis for axis in range(3) if not supported[node, axis]]
+            stopped = [axis for axis in range(3) if supported[node, axis] and self.value[axis] != 0.0]
+            if stopped and self.node != "all":
+                raise InputError(f"node = {node} is supported along {'xyz'[stopped[0]]}: it cannot have a velocity there")
+            v[node, allowed] = [self.value[axis] for axis in allowed]

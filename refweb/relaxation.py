@@ -1,0 +1,116 @@
+"""Static equilibrium by dynamic relaxation: the explicit way, independent of any tangent.
+
+Central differences with fictitious masses, chosen so that a step of 1 is at `SAFETY` of the bound of stability in every
+row, and kinetic damping: whenever the kinetic energy passes a peak, all velocities are set to zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiled import BOUND, FORCE, INDICES, MATRIX, kernel, typed_list
+from .statics import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale
+
+SAFETY = 0.9
+
+
+@kernel()
+def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
+    """``count`` steps; returns the largest force on a free row and the number of times the motion was stopped."""
+    flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
+    before, stops = 0.0, 0
+    for _ in range(count):
+        kinetic = 0.0
+        for q in range(flat_x.size):
+            if flat_inverse[q] > 0.0:
+                flat_v[q] += flat_inverse[q] * flat_f[q]
+                kinetic += flat_v[q] * flat_v[q] / flat_inverse[q]
+        if kinetic < before:
+            stops += 1
+            flat_v[:] = 0.0
+            for q in range(flat_x.size):  # a new start from rest: half a kick
+                flat_v[q] = 0.5 * flat_inverse[q] * flat_f[q]
+            kinetic = 0.0
+        before = kinetic
+        for q in range(flat_x.size):
+            flat_x[q] += flat_v[q]
+            flat_f[q] = 0.0
+        for i in range(len(kernels)):
+            kernels[i](t, x, v, f, cells[i], data[i], outs[i])
+    worst = 0.0
+    for r in range(x.shape[0]):
+        square = 0.0
+        for k in range(3):
+            if inverse[r, k] > 0.0:
+                square += f[r, k] * f[r, k]
+        worst = max(worst, square)
+    return np.sqrt(worst), stops
+
+
+def solve(system, load_steps, progress=None, most=5_000_000):
+    """Equilibria at load steps, one after another, each from the one before.
+
+    Parameters
+    ----------
+    system : refweb.system.System
+        With a net whose ``quasi_static`` is True.
+    load_steps : sequence of float
+        Values of t.
+    progress : callable, optional
+        Called with a line of text as it goes.
+    most : int
+        Largest number of steps for one load step.
+
+    Yields
+    ------
+    refweb.statics.Equilibrium
+
+    Raises
+    ------
+    SolverError
+        Where there is no equilibrium, or none is found.
+    """
+    from . import certificate
+
+    families = system.families
+    outs = [np.zeros((len(f.cells), f.observed)) for f in families]
+    cells, data = typed_list(INDICES, [f.cells for f in families]), typed_list(MATRIX, [f.data for f in families])
+    lists = (typed_list(FORCE, [f.force for f in families]), cells, data, typed_list(MATRIX, outs))
+    rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
+    for family in families:
+        if family.bound is not None:
+            family.bound(np.inf, x, np.ones(system.rows), rates, family.cells, family.data)
+    moving = ~system.supported & (rates > 0.0)[:, None]
+    inverse = np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
+    scale = 0.0
+    for t in load_steps:
+        check_supported(system, t)
+        x = x.copy()
+        system.drive(t, x)
+        v, f = np.zeros_like(x), system.force(t, x)
+        done = 0
+        error = np.inf
+        while True:
+            worst, _ = relax(0, t, x, v, f, inverse, *lists)
+            f, out = system.forces(t, x)
+            tension = out[0][:, 0]
+            here = max(scale, force_scale(system, t, x, tension))
+            last, error = error, worst / here if here else 0.0
+            if error <= TOLERANCE or (error <= LIMIT and done and error > 0.5 * last):
+                break
+            if done >= most or not np.isfinite(error):
+                raise NotFound(
+                    f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
+                    f'{LIMIT:g}; use method = "newton"',
+                    {"nsteps": done},
+                )
+            relax(2000, t, x, v, f, inverse, *lists)
+            done += 2000
+            if progress is not None:
+                progress(f"step {t:g}, residual {error:.0e}")
+        scale = here
+        stats = dict(nsteps=done, nfev=done, njev=0, nlu=0, residual=float(error))
+        state = Equilibrium(t, x, tension.copy(), f, stats)
+        if certificate.applies(system):
+            state.certificate = certificate.certify(system, state)
+        yield state
