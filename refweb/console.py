@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import time
+import threading
 
 from rich.console import Console
 from rich.panel import Panel
@@ -61,7 +61,13 @@ def before(scene, system):
     count = {name: present.count(name) for name in present}
     counted = [f"{name} × {times}" if times > 1 else name for name, times in count.items()]
     groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
-    steps = ", ".join(f"{s:g}" for s in solve.load_steps[:8]) + (", ..." if len(solve.load_steps) > 8 else "")
+    how = f"{solve.kind}, {solve.method}, "
+    if solve.kind == "static":
+        how += "load steps " + ", ".join(f"{s:g}" for s in solve.load_steps[:8])
+        how += ", ..." if len(solve.load_steps) > 8 else ""
+    else:
+        step = f"safety {solve.safety:g}" if solve.step_size is None else f"step {solve.step_size:g} s"
+        how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
     _box(
         scene.title,
         [
@@ -69,7 +75,7 @@ def before(scene, system):
             ("", f"{web['cable_length']:.6g} m of cable, {web['area']:.4g} m², {web['mass']:.4g} kg"),
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
-            ("solve", f"{solve.kind}, {solve.method}, load steps {steps}"),
+            ("solve", how),
         ],
     )
 
@@ -90,11 +96,23 @@ def _results(steps):
     return grid
 
 
+def _reduced(results):
+    grid = Grid.grid(padding=(0, 2))
+    for name, result in results.items():
+        where = "" if result["where"] is None else f"at {result['where']}"
+        value = shown(result["value"], result["error"], result["unit"])
+        grid.add_row(Text(name), Text(value), Text(f"t = {result['time']:.6g} s"), Text(where))
+    return grid
+
+
 def stored(summary, more=()):
     """Print the box of a finished run from the content of its ``run.json``, with ``more`` rows (name, text)."""
     solver, cost, rows = summary["solver"], summary["cost"], []
     if summary["steps"]:
         rows.append(("results", _results(summary["steps"])))
+    elif summary["results"]:
+        rows.append(("results", _reduced(summary["results"])))
+    if summary["results"]:
         if any(r["error"] is None for r in summary["results"].values()):
             rows.append(("", "a value without ± has no known error"))
     rows += more
@@ -103,6 +121,9 @@ def stored(summary, more=()):
         text += f", residual {solver['residual']:.1e}"
         if solver["duality_gap"] is not None:
             text += f", duality gap {solver['duality_gap']:.1e} J"
+        rows.append(("solver", text))
+    if solver["energy_drift"] is not None:
+        text = f"{solver['method']}: {solver['nsteps']} steps, energy drift {solver['energy_drift']:.1e}"
         rows.append(("solver", text))
     rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
     rows += [("warning", text) for text in summary["warnings"]]
@@ -139,14 +160,12 @@ def progress(delay=2.0):
         BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeElapsedColumn(), TextColumn("{task.description}"),
         console=Console(stderr=True), transient=True,
     )
-    task, started = bar.add_task("", total=1.0), time.perf_counter()
-
-    def tell(text, share):
-        if not bar.live.is_started and time.perf_counter() - started > delay:
-            bar.start()
-        bar.update(task, description=text, completed=share)
-
+    task = bar.add_task("loading and, the first time, compiling kernels", total=1.0)
+    timer = threading.Timer(delay, bar.start)
+    timer.daemon = True
+    timer.start()
     try:
-        yield tell
+        yield lambda text, share: bar.update(task, description=text, completed=share)
     finally:
+        timer.cancel()
         bar.stop()

@@ -8,11 +8,13 @@ import time
 import numpy as np
 
 from . import probes
-from .central_difference import CentralDifference
+from .central_difference import CentralDifference, OpenBook
+from .errors import SolverError
 from .laws import SMOOTH
 from .lines import SLACKNESS
 from .observables import LINE, NODAL, Result
-from .state import State
+from .solution import SOLVER
+from .state import State, floor_remark
 
 ENERGIES = ("kinetic_energy", "strain_energy", "potential_energy", "contact_energy", "work", "total_energy")
 _VECTORS = ("momentum", "support_impulse")
@@ -58,77 +60,6 @@ def probe_of(observable, system):
     return kernel, numbers, data
 
 
-class Recorder:
-    """Follows one explicit run: the columns of its history, and its results.
-
-    Parameters
-    ----------
-    scene : refweb.Scene
-        What is observed, how often, and how it is solved.
-    system : refweb.system.System
-        What acts.
-    """
-
-    def __init__(self, scene, system):
-        self.scene, self.system = scene, system
-        self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
-        self.watched = [o for o in scene.observables if o.quantity in ENERGIES and o.reduce != "final"]
-        books = {f.book for f in system.families}
-        moved = bool(system.drives)
-        present = lambda name: name in ("kinetic_energy", "total_energy") or name in books or (name == "work" and moved)
-        self.energies = [name for name in ENERGIES if present(name)]
-        self.columns = [f"time [s]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
-        self.columns += [f"{name} [J]" for name in self.energies]
-        self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
-        self._book = np.array([_weights(system, name) for name in self.energies])
-
-    def solver(self, safety):
-        """The `CentralDifference` of the scene at a share of the step bound."""
-        signs = {"max": 1, "min": -1, "final": 0}
-        return CentralDifference(
-            self.system,
-            probes=[(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed],
-            watch=[(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched],
-            safety=safety,
-            step_size=self.scene.solve.step_size,
-        )
-
-    def rows(self, history, run):
-        """Rows of the solver as rows of ``history.csv``."""
-        count, families = len(self.probed), len(self.system.families) + 2
-        energies = history[:, 1 + count : 1 + count + families]
-        table = [history[:, 0]]
-        for o in self.scene.observables:
-            if o in self.probed:
-                table.append(history[:, 1 + self.probed.index(o)])
-            elif o.quantity == "step_size":
-                table.append(np.full(len(history), run.state[2]))
-            else:
-                table.append(energies @ _weights(self.system, o.quantity))
-        return np.column_stack([*table, energies @ self._book.T, history[:, 1 + count + families :]])
-
-    def results(self, run, last):
-        """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
-        results, net = {}, self.system.net
-        for i, o in enumerate(self.scene.observables):
-            value, when, where = float(last[1 + i]), run.time, None
-            if o in self.probed:
-                at = self.probed.index(o)
-                if o.reduce != "final":
-                    value, when, where = float(run.peaks[at]), float(run.times[at]), int(run.places[at])
-                elif o.quantity != "slack_fraction":
-                    where = o.value(State(self.system, run.time, run.x, run.v)).where
-                if o.quantity in LINE and o.reduce != "final":
-                    where = int(net.line[where])
-                if o.quantity == "slack_fraction" or o.body is not None or (o.quantity == "reaction" and o.node is None):
-                    where = None
-            elif o in self.watched:
-                at = len(self.probed) + self.watched.index(o)
-                value, when = float(run.peaks[at]), float(run.times[at])
-            results[o.name] = Result(value, None, o.unit, when, where)
-        return results
-
-
 def row_times(scene):
     """Times of the history rows [s]: multiples of the interval, and the end."""
     interval, duration = scene.output.interval, scene.solve.duration
@@ -166,3 +97,176 @@ def with_errors(results, twin):
     """
     errors = {n: 2.0 * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
     return {n: r._replace(error=errors[n]) for n, r in results.items()}
+
+
+class Motion:
+    """Follows a dynamic scene: history rows, peaks, frames, errors.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        What is observed, how often, and how it is solved.
+    system : refweb.system.System
+        What acts.
+    solution : refweb.Solution
+        What is filled in.
+
+    Raises
+    ------
+    InputError
+        For what central differences cannot take.
+    """
+
+    def __init__(self, scene, system, solution):
+        self.scene, self.system, self.solution = scene, system, solution
+        self.rows = []
+        self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
+        self.watched = [o for o in scene.observables if o.quantity in ENERGIES and o.reduce != "final"]
+        books = {f.book for f in system.families}
+        books |= {"kinetic_energy", "total_energy"} | ({"work"} if system.drives else set())
+        self.energies = [name for name in ENERGIES if name in books]
+        self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
+        self.columns += [f"{name} [J]" for name in self.energies]
+        self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
+        self._own = self._hidden()
+        self._solver = self.solver(scene.solve.safety)
+        self._book = np.array([_weights(system, name) for name in self.energies])
+
+    @property
+    def done(self):
+        """How far it came."""
+        return f"t = {self.rows[-1][0] if self.rows else 0.0:.6g} s"
+
+    def _hidden(self):
+        """Probes of refweb's own, behind the user's: largest stress and utilisation where a warning may need them."""
+        net, own = self.system.net, {}
+        if net.law.number == SMOOTH:
+            own["stress"] = 1.0 / net.area
+        if np.isfinite(net.strength).any():
+            own["utilisation"] = 1.0 / (net.area * net.strength)
+        return own
+
+    def solver(self, safety, finer=1.0):
+        """The `CentralDifference` of the scene at a share of the step bound, or a step_size, over ``finer``."""
+        signs, step = {"max": 1, "min": -1, "final": 0}, self.scene.solve.step_size
+        return CentralDifference(
+            self.system,
+            probes=[(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed]
+            + [(probes.line, [0, -1], scale[:, None], 1) for scale in self._own.values()],
+            watch=[(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched],
+            safety=safety / finer,
+            step_size=None if step is None else step / finer,
+        )
+
+    def table(self, history, run):
+        """Rows of the solver as rows of ``history.csv``."""
+        count, families = len(self.probed) + len(self._own), len(self.system.families) + 2
+        energies = history[:, 1 + count : 1 + count + families]
+        table = [history[:, 0]]
+        for o in self.scene.observables:
+            if o in self.probed:
+                table.append(history[:, 1 + self.probed.index(o)])
+            elif o.quantity == "step_size":
+                table.append(np.full(len(history), run.state[2]))
+            else:
+                table.append(energies @ _weights(self.system, o.quantity))
+        return np.column_stack([*table, energies @ self._book.T, history[:, 1 + count + families :]])
+
+    def results(self, run, last):
+        """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
+        results, net = {}, self.system.net
+        for i, o in enumerate(self.scene.observables):
+            value, when, where = float(last[1 + i]), run.time, None
+            if o in self.probed:
+                at = self.probed.index(o)
+                if o.reduce != "final":
+                    value, when, where = float(run.peaks[at]), float(run.times[at]), int(run.places[at])
+                elif o.quantity != "slack_fraction":
+                    where = o.value(State(self.system, run.time, run.x, run.v)).where
+                if o.quantity in LINE and o.reduce != "final":
+                    where = int(net.line[where])
+                if o.quantity == "slack_fraction" or o.body is not None or (o.quantity == "reaction" and o.node is None):
+                    where = None
+            elif o in self.watched:
+                at = len(self.probed) + len(self._own) + self.watched.index(o)
+                value, when = float(run.peaks[at]), float(run.times[at])
+            results[o.name] = Result(value, None, o.unit, when, where)
+        return results
+
+
+
+    def follow(self, folder, tell):
+        """Run; a run whose energy book is open is repeated with half the step, twice at most."""
+        scene, solution, safety = self.scene, self.solution, self.scene.solve.safety
+        twin = scene.accuracy.error == "twin"
+        for attempt in range(3):
+            try:
+                results = self._run(self._solver, folder, lambda share: tell("running", share / (1 + 1.4 * twin)))
+                break
+            except OpenBook as error:
+                if attempt == 2 or scene.solve.step_size is not None:
+                    raise
+                safety *= 0.5
+                solution.warnings.append(f"{error}; repeated with safety = {safety:g}")
+                self._solver, self.rows = self.solver(safety), []
+                solution.frames.clear()
+                if folder is not None:
+                    folder.restart(solution.summary())
+        solution.reduced = results
+        if twin:
+            try:
+                finer = self.solver(safety, math.sqrt(2.0))
+                other = self._run(finer, None, lambda share: tell("twin", (1 + 1.4 * share) / 2.4), keep=False)
+            except SolverError as error:
+                solution.warnings.append(f"no errors are known: the twin run failed: {error}")
+            else:
+                solution.reduced = with_errors(results, other)
+
+    def _run(self, solver, folder, tell, keep=True):
+        """One run from start to end; returns its results."""
+        scene, solution = self.scene, self.solution
+        run, times = solver.start(), row_times(scene)
+        stops = np.unique(np.append(np.arange(0, len(times), scene.output.frames), len(times) - 1))
+        tell(0.0)
+        try:
+            for first, history in blocks(solver, run, times, stops):
+                table = self.table(history, run)
+                last = first + len(table) - 1
+                if keep:
+                    self._note(solver, run)
+                    self.rows += table.tolist() if folder is None else [table[-1].tolist()]
+                    for row in table if folder is not None else ():
+                        folder.row(row)
+                    if last in stops:
+                        self._frame(last, folder)
+                tell((last + 1) / len(times))
+        except SolverError:
+            if keep:
+                self._note(solver, run)
+            raise
+        return self.results(run, table[-1])
+
+    def _note(self, solver, run):
+        """Take the state of a run over into the solution."""
+        self._peaks = dict(zip(self._own, run.peaks[len(self.probed) :], strict=False))
+        if np.isfinite(run.x).all():
+            self.solution.state = State(self.system, run.time, run.x.copy(), run.v.copy())
+        figures = dict(nsteps=run.nsteps, nfev=run.nsteps + 1, njev=0, nlu=0, energy_drift=run.drift)
+        self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **figures}
+        self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None
+
+    def _frame(self, number, folder):
+        if folder is None:
+            self.solution.frames.append((number, self.solution.state))
+        else:
+            folder.frame(number, self.solution.state)
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        net = self.system.net
+        if not self.solution.reduced:
+            return
+        if "stress" in self._peaks:
+            yield from floor_remark(net, self._peaks["stress"])
+        if self._peaks.get("utilisation", 0.0) > 1.0:
+            yield f"a line breaks: the largest stress over strength is {self._peaks['utilisation']:.3g}"

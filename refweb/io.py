@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from .bodies import sphere
 from .inputs import InputError, short
 
 OWN = re.compile(
@@ -65,6 +66,17 @@ def write_frame(path, state):
         point_data=point_data,
         cell_data={key: [values] for key, values in cell_data.items()},
     )
+    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
+
+
+def write_body(path, body, state):
+    """Write the surface of a body as VTU, at its current position."""
+    import meshio
+
+    points, triangles = sphere(state.position[body.row], body.radius)
+    data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
+    point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
+    mesh = meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
     write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
 
 
@@ -134,13 +146,25 @@ class Folder:
             (self.path / "frames").mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"result folder {short(str(path))}: cannot be made: {error.strerror}") from None
+        self._columns = columns
         self.summary(run)
         clear(self.path)
         write_text(self.path / "scene.toml", text)
+        self._start()
+
+    def _start(self):
         self._history = open(self.path / "history.csv", "w", encoding="utf-8", newline="\n")
-        self.row(columns)
+        self.row(self._columns)
         self._listed = []
         self._list_frames()
+
+    def restart(self, run):
+        """Remove rows and frames and begin anew; ``run`` is the content of ``run.json``."""
+        self.close()
+        self.summary(run)
+        for path in (self.path / "frames").glob("*_??????.vtu"):
+            path.unlink()
+        self._start()
 
     def row(self, values):
         """Append a row to ``history.csv``."""
@@ -152,15 +176,19 @@ class Folder:
         """Write frame and checkpoint of a state and list the frame in ``web.pvd``."""
         name = f"frames/web_{number:06d}.vtu"
         write_frame(self.path / name, state)
+        self._listed.append((state.time, 0, name))
+        for part, body in enumerate(state.system.net.bodies, start=1):
+            surface = f"frames/{body.name}_{number:06d}.vtu"
+            write_body(self.path / surface, body, state)
+            self._listed.append((state.time, part, surface))
         arrays = {"time": state.time, "positions": state.position, "velocities": state.v}
         write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
-        self._listed.append((state.time, name))
         self._list_frames()
 
     def _list_frames(self):
         rows = "".join(
-            f'    <DataSet timestep="{number(time)}" group="" part="0" file={quoteattr(name)}/>\n'
-            for time, name in self._listed
+            f'    <DataSet timestep="{number(time)}" group="" part="{part}" file={quoteattr(name)}/>\n'
+            for time, part, name in self._listed
         )
         write_text(
             self.path / "web.pvd",

@@ -7,20 +7,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, component, field, node_number, nodes, shown, text
+from .inputs import InputError, Table, choice, component, field, nearest, node_number, nodes, shown, text
 from .lines import AXIAL_STIFFNESS
 
-_NODAL = {"displacement": ("x", "m"), "position": ("position", "m"), "reaction": ("reaction", "N")}
-_LINE = {"tension": ("tension", "N"), "stress": ("stress", "Pa"), "strain": ("strain", "1")}
-_TOTAL = {
+NODAL = {
+    "displacement": ("x", "m"),
+    "position": ("position", "m"),
+    "velocity": ("v", "m/s"),
+    "reaction": ("reaction", "N"),
+}
+LINE = {"tension": ("tension", "N"), "stress": ("stress", "Pa"), "strain": ("strain", "1")}
+TOTAL = {
+    "kinetic_energy": "J",
     "strain_energy": "J",
     "potential_energy": "J",
+    "contact_energy": "J",
     "total_energy": "J",
     "work": "J",
     "slack_fraction": "1",
+    "step_size": "s",
 }
-QUANTITIES = (*_NODAL, *_LINE, *_TOTAL)
-_NEEDS = {"potential_energy": "gravity", "work": "load"}
+QUANTITIES = (*NODAL, *LINE, *TOTAL)
+_DYNAMIC = ("velocity", "kinetic_energy", "step_size")
+_NEEDS = {"potential_energy": "gravity", "contact_energy": "contact", "work": "load"}
 
 
 class Value(NamedTuple):
@@ -53,6 +62,8 @@ class Observe(Table):
     node : int, str or list, optional
         Node of a nodal quantity. Of several nodes the one with the largest value counts, for a reaction their sum;
         without ``node`` that is over all.
+    body : str, optional
+        Body of a nodal quantity; its reaction is the contact force on it.
     line : int, optional
         Line of a line quantity; without it the largest over all lines.
     component : {0, 1, 2, "x", "y", "z"}, optional
@@ -64,6 +75,7 @@ class Observe(Table):
     name: str = text(most=80)
     quantity: str = choice(*QUANTITIES)
     node: object = nodes(None)
+    body: str | None = text(None)
     line: int | None = field(node_number, None)
     component: int | None = component(None)
     reduce: str = choice("max", "min", "final", default="final")
@@ -74,50 +86,65 @@ class Observe(Table):
             raise InputError(
                 f"name = {shown(self.name)} must be free of commas and quotes: it heads a column of history.csv"
             )
-        nodal, line = self.quantity in _NODAL, self.quantity in _LINE
-        for key, allowed in (("node", nodal), ("component", nodal), ("line", line)):
+        nodal, line = self.quantity in NODAL, self.quantity in LINE
+        for key, allowed in (("node", nodal), ("body", nodal), ("component", nodal), ("line", line)):
             if getattr(self, key) is not None and not allowed:
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
+        if self.node is not None and self.body is not None:
+            raise InputError(f"node = {shown(self.node)} and body = {shown(self.body)} exclude each other")
 
     @property
     def unit(self):
         """Unit of the value."""
-        if self.quantity in _TOTAL:
-            return _TOTAL[self.quantity]
-        return {**_NODAL, **_LINE}[self.quantity][1]
+        if self.quantity in TOTAL:
+            return TOTAL[self.quantity]
+        return {**NODAL, **LINE}[self.quantity][1]
 
     def on(self, system):
-        """Refuse what the system does not have; return the numbers of the nodes, None for all."""
-        web = system.net.web
+        """Refuse what the system does not have."""
+        net = system.net
         need = _NEEDS.get(self.quantity)
-        if need and need not in [f.name for f in system.families]:
+        if net.quasi_static and self.quantity in _DYNAMIC:
+            raise InputError(f'quantity = "{self.quantity}" has no meaning in statics')
+        moved = self.quantity == "work" and system.drives
+        if need and need not in [f.name for f in system.families] and not moved:
             raise InputError(f'quantity = "{self.quantity}" needs a [{need}] in the scene')
-        if self.quantity == "work" and system.drives:
+        if moved and net.quasi_static:
             raise InputError('quantity = "work" is not known in statics with [[motion]]: it depends on the path')
-        if self.line is not None and self.line >= len(web.lines):
-            raise InputError(f"line = {self.line} must be 0 … {len(web.lines) - 1}")
-        return None if self.node is None else web.find(self.node)
+        if self.line is not None and self.line >= len(net.web.lines):
+            raise InputError(f"line = {self.line} must be 0 … {len(net.web.lines) - 1}")
+        if self.quantity in NODAL:
+            self.rows(system)
+
+    def rows(self, system):
+        """Rows of a nodal quantity, shape (k,)."""
+        net = system.net
+        if self.body is not None:
+            names = [body.name for body in net.bodies]
+            if self.body not in names:
+                hint = nearest(self.body, names) if names else "the scene has no [[body]]"
+                raise InputError(f'body = "{self.body}" is no body, {hint}')
+            return np.array([net.bodies[names.index(self.body)].row])
+        return np.arange(len(net.web.points)) if self.node is None else net.web.find(self.node)
 
     def value(self, state):
         """The observable at one instant, a `Value`."""
         if self.quantity == "slack_fraction":
             return Value(float(state.slack.mean()), None)
-        if self.quantity in _TOTAL:
+        if self.quantity in TOTAL:
             return Value(state.energies[self.quantity], None)
-        if self.quantity in _LINE:
+        if self.quantity in LINE:
             values = getattr(state, self.quantity)
             at = int(np.argmax(values)) if self.line is None else self.line
             return Value(float(values[at]), at)
-        values = getattr(state, _NODAL[self.quantity][0])
-        found = self.on(state.system)
-        found = np.arange(len(state.system.net.web.points)) if found is None else found
-        values = values[found]
-        if self.quantity == "reaction" and len(found) > 1:
-            values, found = values.sum(axis=0, keepdims=True), [None]
+        rows = self.rows(state.system)
+        values = getattr(state, NODAL[self.quantity][0])[rows]
+        if self.quantity == "reaction" and len(rows) > 1:
+            values, rows = values.sum(axis=0, keepdims=True), [None]
         values = np.linalg.norm(values, axis=1) if self.component is None else values[:, self.component]
         at = int(np.argmax(values))
-        return Value(float(values[at]), None if found[at] is None else int(found[at]))
+        return Value(float(values[at]), None if rows[at] is None or self.body is not None else int(rows[at]))
 
     def error(self, state, certificate):
         """Bound on the error of the value from a `refweb.certificate.Certificate`, None where it gives none."""
@@ -125,7 +152,7 @@ class Observe(Table):
             return None
         if self.quantity == "strain_energy":
             return certificate.strain_energy
-        if self.quantity not in _LINE:
+        if self.quantity not in LINE:
             return None
         net = state.system.net
         bound = certificate.tension

@@ -9,12 +9,13 @@ import time
 import numpy as np
 
 from . import __version__, statics
+from .errors import SolverError
 from .io import Folder, check_folder
-from .laws import LINEAR, SMOOTH
+from .laws import LINEAR
 from .observables import Result
 from .scene import Scene
 from .solution import SOLVER, Solution, as_history
-from .state import State
+from .state import State, floor_remark
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):
@@ -53,84 +54,108 @@ def run(scene, out=None, force=False, progress=None, announce=None):
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=_versions())
     solution.warnings += _notices(scene, system)
-    names, units = ["step"], ["1"]
-    for observable in scene.observables:
-        names.append(observable.name)
-        units.append(observable.unit)
-    energies = list(State(system, 0.0, np.zeros((system.rows, 3))).energies)
-    names, units = names + energies, units + ["J"] * len(energies)
-    solution.columns = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
-    rows, remarks = [], {}
+    follower = (_LoadSteps if scene.solve.kind == "static" else _dynamics())(scene, system, solution)
+    solution.columns = follower.columns
     folder = Folder(out, scene, solution.columns, solution.summary()) if out is not None else None
+    tell = progress or (lambda text, share: None)
     try:
-        _solve(scene, system, solution, rows, remarks, folder, progress)
+        follower.follow(folder, tell)
         solution.status = "solved"
     except KeyboardInterrupt:
-        solution.status, solution.message = "interrupted", f"interrupted after {len(rows)} load steps"
+        solution.status, solution.message = "interrupted", f"interrupted after {follower.done}"
         raise
-    except statics.SolverError as error:
+    except SolverError as error:
         solution.status, solution.message = "failed", str(error)
         raise
     except Exception as error:
         solution.status, solution.message = "failed", f"{type(error).__name__}: {error}"
         raise
     finally:
-        solution.history = as_history(names, rows)
+        solution.history = as_history([c.rsplit(" [", 1)[0] for c in solution.columns], follower.rows)
         solution.cost = _cost(system, solution, started)
-        solution.warnings += _told(remarks, len(rows))
+        solution.warnings += follower.remarks()
         if folder is not None:
             folder.close()
             folder.summary(solution.summary())
     return solution
 
 
-def _solve(scene, system, solution, rows, remarks, folder, progress):
-    """Follow the load steps: results, remarks and history row of each, and frames of some, the last always."""
-    steps = scene.solve.load_steps
+def _dynamics():
+    from .dynamics import Motion
 
-    def tell(text):
-        if progress is not None:
-            progress(text, len(rows) / len(steps))
+    return Motion
 
-    def frame():
-        solution.frames.append((len(rows) - 1, solution.state))
-        if folder is not None:
-            folder.frame(*solution.frames[-1])
 
-    totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-    solution.solver = {**SOLVER, "method": scene.solve.method, **totals}
-    try:
-        for found in statics.solve(system, steps, tell):
-            state = State(system, found.step, found.x)
-            values = [o.value(state) for o in scene.observables]
-            errors = [o.error(state, found.certificate) for o in scene.observables]
-            results = {
-                o.name: Result(value.value, error, o.unit, found.step, value.where)
-                for o, value, error in zip(scene.observables, values, errors, strict=True)
-            }
-            stats = {key: found.stats.get(key) for key in SOLVER} | {
-                "method": scene.solve.method,
-                "duality_gap": found.certificate.gap if found.certificate else None,
-                "slack_nodes": len(state.slack_nodes),
-            }
-            totals = {key: totals[key] + stats[key] for key in totals}
-            row = [found.step, *(v.value for v in values), *state.energies.values()]
-            if not np.isfinite(row).all():
-                bad = solution.columns[np.isfinite(row).argmin()]
-                raise statics.SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
-            solution.steps.append({"step": found.step, "results": results, "solver": stats})
-            solution.solver = {**stats, **totals}
-            solution.state = state
-            rows.append(row)
-            for kind, text in _remarks(state, stats):
-                remarks.setdefault(kind, []).append((found.step, text))
+class _LoadSteps:
+    """Follows the load steps of a static scene: results, history row and remarks of each, and frames."""
+
+    def __init__(self, scene, system, solution):
+        self.scene, self.system, self.solution = scene, system, solution
+        self.rows, self._remarks = [], {}
+        self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
+        self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
+
+    @property
+    def done(self):
+        """How far it came."""
+        return f"{len(self.rows)} load steps"
+
+    def _solver(self):
+        if self.scene.solve.method == "relaxation":
+            from . import relaxation
+
+            return relaxation.solve
+        return statics.solve
+
+    def follow(self, folder, tell):
+        """Solve; write rows and frames to ``folder`` as they come."""
+        scene, solution, steps, state = self.scene, self.solution, self.scene.solve.load_steps, None
+
+        def frame():
+            solution.frames.append((len(self.rows) - 1, state))
             if folder is not None:
-                folder.row(row)
-            if (len(rows) - 1) % scene.output.frames == 0:
+                folder.frame(*solution.frames[-1])
+
+        totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
+        solution.solver = {**SOLVER, "method": scene.solve.method, **totals}
+        try:
+            for found in self._solver()(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
+                state = State(self.system, found.step, found.x)
+                values = [o.value(state) for o in scene.observables]
+                errors = [o.error(state, found.certificate) for o in scene.observables]
+                results = {
+                    o.name: Result(value.value, error, o.unit, found.step, value.where)
+                    for o, value, error in zip(scene.observables, values, errors, strict=True)
+                }
+                stats = {key: found.stats.get(key) for key in SOLVER} | {
+                    "method": scene.solve.method,
+                    "duality_gap": found.certificate.gap if found.certificate else None,
+                    "slack_nodes": len(state.slack_nodes),
+                }
+                totals = {key: totals[key] + stats[key] for key in totals}
+                row = [found.step, *(v.value for v in values), *state.energies.values()]
+                if not np.isfinite(row).all():
+                    bad = self.columns[np.isfinite(row).argmin()]
+                    raise SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
+                solution.steps.append({"step": found.step, "results": results, "solver": stats})
+                solution.solver = {**stats, **totals}
+                solution.state = state
+                for kind, text in _remarks(state, stats):
+                    self._remarks.setdefault(kind, []).append((found.step, text))
+                self.rows.append(row)
+                if folder is not None:
+                    folder.row(row)
+                if (len(self.rows) - 1) % scene.output.frames == 0:
+                    frame()
+        finally:
+            if self.rows and solution.frames[-1][0] < len(self.rows) - 1:
                 frame()
-    finally:
-        if rows and solution.frames[-1][0] < len(rows) - 1:
-            frame()
+
+    def remarks(self):
+        """Each kind of remark once, as it was last made, with its load steps unless it was made at all of them."""
+        for made in self._remarks.values():
+            steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
+            yield made[-1][1] + (f" (load step {steps})" if len(made) < len(self.rows) else "")
 
 
 def web_of(system):
@@ -153,12 +178,14 @@ def _versions():
 
 
 def _notices(scene, system):
-    loose = statics.unsupported(system)
+    if system.net.bodies and not any(f.name == "contact" for f in system.families):
+        yield "the scene has a [[body]] but no [contact]: the web does not feel it"
+    loose = statics.unsupported(system) if scene.solve.kind == "static" else []
     if not loose:
-        return []
+        return
     axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
     nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
-    return [f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"]
+    yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
 
 
 def _cost(system, solution, started):
@@ -171,22 +198,15 @@ def _cost(system, solution, started):
             begin = time.process_time()
             system.force_of(family, state.time, state.x)
             best = min(best, time.process_time() - begin)
-        share[family.name] = share.get(family.name, 0.0) + best * solution.solver["nfev"]
+        share[family.name] = share.get(family.name, 0.0) + best * (solution.solver["nfev"] or 0)
     return {"cpu_s": cpu, "wall_s": wall, "by_effect": share}
 
 
 def _remarks(state, stats):
     """What a reader of a state has to know: pairs of a kind and a text."""
     net = state.system.net
-    stress = float(state.stress.max())
-    if net.law.number == SMOOTH:
-        columns = net.line_data[:, 1:4].T
-        floor = float((net.law.floor(*columns) / net.area).max())
-        if floor > 0.01 * stress:
-            yield "floor", (
-                f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "
-                'slack lines push; lower smoothing or use law = "tension-only"'
-            )
+    for text in floor_remark(net, float(state.stress.max())):
+        yield "floor", text
     if stats["smallest_pivot"] == -1:
         law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
         yield "saddle", (
@@ -199,10 +219,3 @@ def _remarks(state, stats):
     if state.utilisation is not None and state.utilisation.max() > 1.0:
         line = int(state.utilisation.argmax())
         yield "strength", f"line {line} breaks: stress over strength is {state.utilisation[line]:.3g}"
-
-
-def _told(remarks, count):
-    """Each kind of remark once, as it was last made, with the load steps it was made at unless that is all."""
-    for made in remarks.values():
-        steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
-        yield made[-1][1] + (f" (load step {steps})" if len(made) < count else "")

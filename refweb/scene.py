@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, components, integer, nearest, nodes, numbers_list, short, shown, text
+from .inputs import InputError, Table, choice, components, integer, nearest, nodes, numbers_list, real, short, shown, text
 
 WEBS = {
     "paper": "refweb.lattices:Paper",
@@ -30,8 +30,12 @@ EFFECTS = {
     "gravity": "refweb.effects.gravity:Gravity",
     "load": "refweb.effects.load:Load",
     "motion": "refweb.effects.motion:Motion",
+    "point_mass": "refweb.effects.point_mass:PointMass",
+    "velocity": "refweb.effects.velocity:Velocity",
+    "body": "refweb.effects.body:Body",
+    "contact": "refweb.effects.contact:Contact",
 }
-LISTS = ("load", "motion")
+LISTS = ("load", "motion", "point_mass", "velocity", "body")
 """Effects whose table may stand several times, ``[[load]]``."""
 SHIPPED = pathlib.Path(__file__).parent / "scenes"
 
@@ -54,7 +58,7 @@ class Static(Table):
     """Static solution at a list of load steps."""
 
     kind: str = choice("static", default="static")
-    method: str = choice("newton", default="newton")
+    method: str = choice("newton", "relaxation", default="newton")
     load_steps: tuple = numbers_list((1.0,))
 
     def check(self):
@@ -63,10 +67,51 @@ class Static(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Output(Table):
-    """What a result folder holds: a VTU every ``frames`` history rows; the first and the last state always."""
+class Dynamic(Table):
+    """Motion over a time, by explicit central differences.
 
-    frames: int = integer(1, at_least=1)
+    Parameters
+    ----------
+    duration : float
+        Time to simulate [s].
+    safety : float
+        Share of the bound of stability that a step is, 0 < safety ≤ 1.
+    step_size : float, optional
+        Largest step instead [s]; the step used is the largest below it that divides a history row.
+    """
+
+    kind: str = choice("dynamic", default="dynamic")
+    method: str = choice("central-difference", default="central-difference")
+    duration: float = real(above=0, unit="s")
+    safety: float = real(0.5, above=0, at_most=1)
+    step_size: float | None = real(None, above=0, unit="s")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output(Table):
+    """What a result folder holds.
+
+    Parameters
+    ----------
+    interval : float, optional
+        Time between history rows [s], 1e-3 by default; in statics the load steps are the rows.
+    frames : int, optional
+        A VTU every this many rows, the first and the last state always; 10 by default, in statics 1.
+    """
+
+    interval: float | None = real(None, above=0, unit="s")
+    frames: int | None = integer(None, at_least=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accuracy(Table):
+    """How the error of dynamic results is found: by a twin of half the error, or not at all."""
+
+    error: str = choice("twin", "none", default="twin")
+
+
+ROWS = 10_000_000
+"""Largest number of history rows."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,10 +130,12 @@ class Scene:
         Replaces the web's own supports; no nodes frees all.
     support : sequence of Supports
         Supports in addition.
-    solve : Static
+    solve : Static or Dynamic
         What to solve and how.
     output : Output
         What a result folder holds.
+    accuracy : Accuracy, optional
+        How errors are found, in dynamics.
     observe : sequence of refweb.Observe
         Numbers to follow; `refweb.observables.DEFAULT` without any.
     title : str
@@ -104,6 +151,7 @@ class Scene:
     support: tuple = ()
     solve: Static = field(default_factory=Static)
     output: Output = field(default_factory=Output)
+    accuracy: Accuracy | None = None
     observe: tuple = ()
     title: str = "scene"
     seed: int = 0
@@ -117,6 +165,26 @@ class Scene:
             object.__setattr__(self, key, tuple(getattr(self, key)))
         for effect in self.effects:
             table_of(effect)
+        self._fill()
+
+    def _fill(self):
+        """Fill in the defaults that depend on what is solved."""
+        output, dynamic = self.output, self.solve.kind == "dynamic"
+        if not dynamic and output.interval is not None:
+            raise InputError(f"[output] interval = {output.interval:g} has no meaning in statics: leave it out")
+        if not dynamic and self.accuracy is not None:
+            raise InputError("[accuracy] has no meaning in statics, whose results bring their bounds: leave it out")
+        interval = (output.interval or min(1e-3, self.solve.duration)) if dynamic else None
+        frames = output.frames or (10 if dynamic else 1)
+        object.__setattr__(self, "output", Output(interval=interval, frames=frames))
+        if not dynamic:
+            return
+        object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
+        if interval > self.solve.duration:
+            raise InputError(f"[output] interval = {interval:g} must be ≤ duration = {self.solve.duration:g} [s]")
+        if self.solve.duration / interval > ROWS:
+            count = self.solve.duration / interval
+            raise InputError(f"[output] interval = {interval:g} makes {count:.3g} history rows, at most {ROWS}")
 
     @staticmethod
     def load(source):
@@ -147,7 +215,7 @@ class Scene:
 
         ``file`` is the name that begins the messages of `build`.
         """
-        single = {"cable": "refweb.cables:Cable", "supports": Supports, "output": Output}
+        single = {"cable": "refweb.cables:Cable", "supports": Supports, "output": Output, "accuracy": Accuracy}
         several = {"support": Supports, "observe": "refweb.observables:Observe"}
         known = ["schema", "title", "seed", "web", "solve", *single, *several, *EFFECTS]
         for key in given:
@@ -160,7 +228,7 @@ class Scene:
             if key not in given:
                 raise InputError(f"[{key}] is missing: every scene has one")
         parts["web"] = _by_kind("web", given["web"], WEBS)
-        parts["solve"] = _by_kind("solve", given["solve"], {"static": Static})
+        parts["solve"] = _by_kind("solve", given["solve"], {"static": Static, "dynamic": Dynamic})
         for key, table in single.items():
             if key in given:
                 parts[key] = _resolve(table).read(f"[{key}]", given[key])
@@ -194,6 +262,8 @@ class Scene:
                 given[key] = effect.to_dict()
         given["solve"] = self.solve.to_dict()
         given["output"] = self.output.to_dict()
+        if self.accuracy is not None:
+            given["accuracy"] = self.accuracy.to_dict()
         given["observe"] = [o.to_dict() for o in self.observables]
         return given
 
@@ -229,7 +299,8 @@ class Scene:
             try:
                 web = _in("[web]", web.web, self.folder)
             except OSError as error:
-                raise InputError(f"[web] cannot be read: {error.strerror or error}") from None
+                path = shown(getattr(web, "path", ""))
+                raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
         net = _in("", lines.build, web, self.cable, quasi_static=self.solve.kind == "static")
         supported = np.zeros((len(net.points), 3), dtype=bool)
         if self.supports is None:
@@ -248,7 +319,8 @@ class Scene:
                 raise InputError(f"[{key}] stands {count[key]} times: a scene has one")
         system = System(net, acting, supported)
         _distinct_motions(system)
-        own = ("step", "time", "total_energy", *(family.book for family in system.families))
+        system.initial_velocity()
+        own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
         columns = dict.fromkeys(own, "a column of its own")
         for i, observable in enumerate(self.observables):
             _in(f"[[observe]] {i + 1}", observable.on, system)
@@ -265,8 +337,9 @@ class _Named:
     def __init__(self, where, effect):
         self.where, self.effect = where, effect
 
-    def on(self, net):
-        return _in(self.where, self.effect.on, net)
+    def __getattr__(self, name):
+        method = getattr(self.effect, name)
+        return lambda *arguments: _in(self.where, method, *arguments)
 
 
 def table_of(effect):

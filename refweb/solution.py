@@ -43,6 +43,8 @@ class Solution:
         How it ended; ``message`` says why.
     warnings : list of str
         What a reader of the results has to know.
+    reduced : dict
+        Results of a dynamic run; `results` has those of either kind.
     frames : list of (int, refweb.state.State)
         Row numbers and states that stand as VTU in a result folder.
     """
@@ -60,11 +62,12 @@ class Solution:
     message: str = ""
     warnings: list = field(default_factory=list)
     frames: list = field(default_factory=list)
+    reduced: dict = field(default_factory=dict)
 
     @property
     def results(self):
         """Results by name, each a `refweb.observables.Result`; of the last load step."""
-        return Names(self.steps[-1]["results"]) if self.steps else Names()
+        return Names(self.steps[-1]["results"] if self.steps else self.reduced)
 
     @property
     def positions(self):

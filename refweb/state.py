@@ -92,8 +92,12 @@ class State:
 
     @cached_property
     def reaction(self):
-        """Force of the supports on the net [N], shape (rows, 3)."""
-        return np.where(self.system.supported, -self._forces[0], 0.0)
+        """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
+        force = np.where(self.system.supported, -self._forces[0], 0.0)
+        for body in self.system.net.bodies:
+            internal = (f for f in self.system.families if f.internal)
+            force[body.row] = sum(self.system.force_of(f, self.time, self.x, self.v)[body.row] for f in internal)
+        return force
 
     @cached_property
     def utilisation(self):
@@ -113,3 +117,14 @@ class State:
         work = -book.pop("work") if "work" in book else None
         book["total_energy"] = sum(book.values())
         return book if work is None else {**book, "work": work}
+
+
+def floor_remark(net, stress):
+    """A warning where the smooth law's floor exceeds 1 % of the largest stress [Pa]."""
+    if net.law.number == SMOOTH:
+        floor = float((net.law.floor(*net.line_data[:, 1:4].T) / net.area).max())
+        if floor > 0.01 * stress:
+            yield (
+                f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "
+                'slack lines push; lower smoothing or use law = "tension-only"'
+            )
