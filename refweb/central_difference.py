@@ -303,6 +303,7 @@ class CentralDifference:
         )
         signs = np.array([float(p[-1]) for p in (*probes, *watch)])
         self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 2)
+        self._seeing = list(probes)
         self._probes = (
             typed_list(PROBE, [p[0] for p in probes]),
             typed_list(INTEGERS, [np.array(p[1], dtype=np.int64) for p in probes]),
@@ -329,10 +330,11 @@ class CentralDifference:
         system.drive(0.0, saved[0], saved[1])
         for family, out in zip(system.families, self._outs, strict=True):
             family.force(0.0, saved[0], saved[1], saved[2], family.cells, family.data, out)
-        probes, rows, data, signs, _ = self._probes
+        signs, probes = self._probes[3], self._seeing
         values, where = np.zeros(len(signs)), np.zeros((len(signs), 1), dtype=np.int64)
-        for i in range(len(probes)):
-            values[i] = probes[i](0.0, saved[0], saved[1], saved[2], self._outs[0], rows[i], data[i], where[i])
+        for i, (probe, rows, data, _) in enumerate(probes):
+            rows, data = np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float)
+            values[i] = probe(0.0, saved[0], saved[1], saved[2], self._outs[0], rows, data, where[i])
         if len(self._watch):
             total = np.zeros(len(system.families) + 2)
             book_energies(

@@ -74,9 +74,14 @@ def _compile(decorator, function):
 
 
 def kernel(signature=None, **options):
-    """Compile a function, at once where a signature is given, and keep its machine code on disk."""
+    """Compile a function, at once where a signature is given, and keep its machine code on disk.
+
+    Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
+    """
     arguments = () if signature is None else (signature,)
-    return lambda function: _compile(numba.njit(*arguments, cache=True, error_model="numpy", **options), function)
+    return lambda function: _compile(
+        numba.njit(*arguments, cache=True, error_model="numpy", fastmath={"contract"}, nogil=True, **options), function
+    )
 
 
 def ufunc(signatures):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 
 import numpy as np
@@ -97,6 +98,44 @@ def with_errors(results, twin):
     """
     errors = {n: 2.0 * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
     return {n: r._replace(error=errors[n]) for n, r in results.items()}
+
+
+class _Twin:
+    """A run of half the error beside the run itself, in a thread of its own: the compiled loop needs no interpreter."""
+
+    def __init__(self, motion, safety, wanted):
+        self._motion, self._safety, self._wanted = motion, safety, wanted
+        self._stop = threading.Event()
+
+    def __enter__(self):
+        self._thread, self._results, self._failure = None, None, None
+        if self._wanted:
+            self._thread = threading.Thread(target=self._run, daemon=True)
+            self._thread.start()
+        return self
+
+    def __exit__(self, *error):
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self):
+        motion = self._motion
+        try:
+            solver = motion.solver(self._safety, math.sqrt(2.0))
+            run = solver.start()
+            for _, history in blocks(solver, run, *motion._times()):
+                if self._stop.is_set():
+                    return
+            self._results = motion.results(run, motion.table(history, run)[-1])
+        except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
+            self._failure = error
+
+    def results(self):
+        """Wait for it; (results, None), or (None, why it failed), or (None, None) where it was not wanted."""
+        if self._thread is not None:
+            self._thread.join()
+        return self._results, self._failure
 
 
 class Motion:
@@ -198,53 +237,51 @@ class Motion:
     def follow(self, folder, tell):
         """Run; a run whose energy book is open is repeated with half the step, twice at most."""
         scene, solution, safety = self.scene, self.solution, self.scene.solve.safety
-        twin = scene.accuracy.error == "twin"
         for attempt in range(3):
-            try:
-                results = self._run(self._solver, folder, lambda share: tell("running", share / (1 + 1.4 * twin)))
-                break
-            except OpenBook as error:
-                if attempt == 2 or scene.solve.step_size is not None:
-                    raise
-                safety *= 0.5
-                solution.warnings.append(f"{error}; repeated with safety = {safety:g}")
-                self._solver, self.rows = self.solver(safety), []
-                solution.frames.clear()
-                if folder is not None:
-                    folder.restart(solution.summary())
-        solution.reduced = results
-        if twin:
-            try:
-                finer = self.solver(safety, math.sqrt(2.0))
-                other = self._run(finer, None, lambda share: tell("twin", (1 + 1.4 * share) / 2.4), keep=False)
-            except SolverError as error:
-                solution.warnings.append(f"no errors are known: the twin run failed: {error}")
-            else:
-                solution.reduced = with_errors(results, other)
+            with _Twin(self, safety, scene.accuracy.error == "twin") as twin:
+                try:
+                    results = self._run(self._solver, folder, lambda share: tell("running", share))
+                except OpenBook as error:
+                    if attempt == 2 or scene.solve.step_size is not None:
+                        raise
+                    safety *= 0.5
+                    solution.warnings.append(f"{error}; repeated with safety = {safety:g}")
+                    self._solver, self.rows = self.solver(safety), []
+                    solution.frames.clear()
+                    if folder is not None:
+                        folder.restart(solution.summary())
+                    continue
+                tell("finding errors by a twin run", 1.0)
+                other, failure = twin.results()
+            break
+        solution.reduced = with_errors(results, other) if other else results
+        if failure:
+            solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
 
-    def _run(self, solver, folder, tell, keep=True):
-        """One run from start to end; returns its results."""
-        scene, solution = self.scene, self.solution
-        run, times = solver.start(), row_times(scene)
-        stops = np.unique(np.append(np.arange(0, len(times), scene.output.frames), len(times) - 1))
+    def _run(self, solver, folder, tell):
+        """One run from start to end, with rows and frames; returns its results."""
+        run, times, stops = solver.start(), *self._times()
         tell(0.0)
         try:
             for first, history in blocks(solver, run, times, stops):
                 table = self.table(history, run)
                 last = first + len(table) - 1
-                if keep:
-                    self._note(solver, run)
-                    self.rows += table.tolist() if folder is None else [table[-1].tolist()]
-                    for row in table if folder is not None else ():
-                        folder.row(row)
-                    if last in stops:
-                        self._frame(last, folder)
+                self._note(solver, run)
+                self.rows += table.tolist() if folder is None else [table[-1].tolist()]
+                for row in table if folder is not None else ():
+                    folder.row(row)
+                if last in stops:
+                    self._frame(last, folder)
                 tell((last + 1) / len(times))
         except SolverError:
-            if keep:
-                self._note(solver, run)
+            self._note(solver, run)
             raise
         return self.results(run, table[-1])
+
+    def _times(self):
+        """Times of the history rows, and the rows that frames are written at."""
+        times = row_times(self.scene)
+        return times, np.unique(np.append(np.arange(0, len(times), self.scene.output.frames), len(times) - 1))
 
     def _note(self, solver, run):
         """Take the state of a run over into the solution."""

@@ -13,6 +13,7 @@ Scalar functions, one formula for the compiled kernels and for `Law`, whose meth
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -85,22 +86,24 @@ def energy_density(law, strain, modulus, slackness, smoothing):
     return modulus * energy
 
 
-_SIGNATURES = ["float64(int64, float64, float64, float64, float64)"]
+@functools.cache
+def _ufuncs():
+    """Stress, tangent and energy density as ufuncs; a run of kernels alone never builds them."""
+    signature = ["float64(int64, float64, float64, float64, float64)"]
 
+    @ufunc(signature)
+    def stresses(law, strain, modulus, slackness, smoothing):
+        return stress(law, strain, modulus, slackness, smoothing)
 
-@ufunc(_SIGNATURES)
-def _stress(law, strain, modulus, slackness, smoothing):
-    return stress(law, strain, modulus, slackness, smoothing)
+    @ufunc(signature)
+    def tangents(law, strain, modulus, slackness, smoothing):
+        return tangent(law, strain, modulus, slackness, smoothing)
 
+    @ufunc(signature)
+    def energies(law, strain, modulus, slackness, smoothing):
+        return energy_density(law, strain, modulus, slackness, smoothing)
 
-@ufunc(_SIGNATURES)
-def _tangent(law, strain, modulus, slackness, smoothing):
-    return tangent(law, strain, modulus, slackness, smoothing)
-
-
-@ufunc(_SIGNATURES)
-def _energy_density(law, strain, modulus, slackness, smoothing):
-    return energy_density(law, strain, modulus, slackness, smoothing)
+    return stresses, tangents, energies
 
 
 @dataclass(frozen=True)
@@ -136,15 +139,15 @@ class Law:
 
     def stress(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Stress σ = T/A [Pa]."""
-        return _stress(self.number, strain, modulus, slackness, smoothing)
+        return _ufuncs()[0](self.number, strain, modulus, slackness, smoothing)
 
     def tangent(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Tangent modulus dσ/dε [Pa]."""
-        return _tangent(self.number, strain, modulus, slackness, smoothing)
+        return _ufuncs()[1](self.number, strain, modulus, slackness, smoothing)
 
     def energy_density(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Energy per natural volume ∫σ dε, zero at ε = 0 [J/m³]."""
-        return _energy_density(self.number, strain, modulus, slackness, smoothing)
+        return _ufuncs()[2](self.number, strain, modulus, slackness, smoothing)
 
     def floor(self, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for linear."""

@@ -109,10 +109,10 @@ class _LoadSteps:
 
     def follow(self, folder, tell):
         """Solve; write rows and frames to ``folder`` as they come."""
-        scene, solution, steps, state = self.scene, self.solution, self.scene.solve.load_steps, None
+        scene, solution, steps = self.scene, self.solution, self.scene.solve.load_steps
 
         def frame():
-            solution.frames.append((len(self.rows) - 1, state))
+            solution.frames.append((len(self.rows) - 1, solution.state))
             if folder is not None:
                 folder.frame(*solution.frames[-1])
 

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .laws import SMOOTH
+from .laws import LINEAR, SMOOTH
 from .lines import SLACKNESS
 
 
@@ -84,10 +84,11 @@ class State:
 
     @cached_property
     def slack_nodes(self):
-        """Free nodes that no taut line holds, whose position is not unique."""
+        """Free nodes that no taut line holds, whose position is not unique; bars hold under compression as well."""
         net = self.system.net
         held = self.system.supported.all(axis=1)
-        held[net.web.lines[~self.slack].ravel()] = True
+        holds = np.ones(len(net.web.lines), dtype=bool) if net.law.number == LINEAR else ~self.slack
+        held[net.web.lines[holds].ravel()] = True
         return np.flatnonzero(~held[: len(net.web.points)])
 
     @cached_property

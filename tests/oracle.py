@@ -15,53 +15,59 @@ from skfem.helpers import dot
 
 from refweb import lines
 
-VECTOR = skfem.ElementVector(skfem.ElementLineP1(), 3)
-
 
 def along(u):
     """du/ds of a vector field: components first, then cells and quadrature points."""
     return u.grad[:, 0]
 
 
-@skfem.LinearForm
-def internal_force(v, w):
-    x = along(w["x"])
+def tangent_and_stretch(w):
+    """t and λ."""
+    x = along(w.x)
     stretch = np.sqrt(dot(x, x))
-    return w["A"] * w["sigma"](stretch - 1) * dot(x, along(v)) / stretch
+    return x / stretch, stretch
 
 
-@skfem.BilinearForm
-def tangent(u, v, w):
-    x = along(w["x"])
-    stretch = np.sqrt(dot(x, x))
-    t = x / stretch
-    stiff, tension = w["A"] * w["slope"](stretch - 1), w["A"] * w["sigma"](stretch - 1)
-    both = dot(t, along(u)) * dot(t, along(v))
-    return stiff * both + tension / stretch * (dot(along(u), along(v)) - both)
+def forms(law):
+    """Internal force, tangent and energy of a tension law, for numbers E, A, ε0, η per line and a position field x."""
 
+    @skfem.LinearForm
+    def internal_force(v, w):
+        t, stretch = tangent_and_stretch(w)
+        return w.A * law.stress(stretch - 1, w.E, w.slackness, w.smoothing) * dot(t, along(v))
 
-@skfem.Functional
-def energy(w):
-    x = along(w["x"])
-    return w["A"] * w["density"](np.sqrt(dot(x, x)) - 1)
+    @skfem.BilinearForm
+    def tangent(u, v, w):
+        t, stretch = tangent_and_stretch(w)
+        tension = w.A * law.stress(stretch - 1, w.E, w.slackness, w.smoothing)
+        stiffness = w.A * law.tangent(stretch - 1, w.E, w.slackness, w.smoothing)
+        stretching = dot(t, along(u)) * dot(t, along(v))
+        return stiffness * stretching + tension / stretch * (dot(along(u), along(v)) - stretching)
+
+    @skfem.Functional
+    def energy(w):
+        return w.A * law.energy_density(tangent_and_stretch(w)[1] - 1, w.E, w.slackness, w.smoothing)
+
+    return internal_force, tangent, energy
 
 
 @skfem.BilinearForm
 def structure(u, v, w):
-    """Couples every component of a cell's nodes with every other: what the tangent of any state can reach.
+    """Couples every component of a line's nodes with every other: the entries that the tangent of some state has.
 
-    ``COOData`` eliminates zeros, hence the tangent itself has fewer entries where lines are slack or lie along an axis.
+    The tangent itself has fewer where lines are slack or along an axis, because ``COOData`` eliminates zeros.
     """
     return along(u).sum(axis=0) * along(v).sum(axis=0)
 
 
-@skfem.BilinearForm
-def mass(u, v, w):
-    return w["line_density"] * dot(u, v)
+@skfem.LinearForm
+def lumped_mass(v, w):
+    """Row sums of the consistent mass ∫ ρA δx·dx ds."""
+    return w.density * w.A * v.value.sum(axis=0)
 
 
 class Oracle:
-    """Force, tangent and energy of a net's lines at displacement x, as scikit-fem assembles them.
+    """The lines of a web as scikit-fem assembles them.
 
     Parameters
     ----------
@@ -73,36 +79,32 @@ class Oracle:
 
     def __init__(self, web, cable):
         values = cable.properties(web)
-        self.points, law = web.points, cable.tension_law
-        self.basis = lines.basis(web.points, web.lines, values["natural_length"], VECTOR)
-        numbers = [values[k][:, None] for k in ("modulus", "slackness", "smoothing")]
-        self.line = dict(
-            A=values["area"][:, None],
-            line_density=(values["density"] * values["area"])[:, None],
-            sigma=lambda strain: law.stress(strain, *numbers),
-            slope=lambda strain: law.tangent(strain, *numbers),
-            density=lambda strain: law.energy_density(strain, *numbers),
-        )
+        vector = skfem.ElementVector(skfem.ElementLineP1(), 3)
+        self.points = web.points
+        self.basis = lines.basis(web.points, web.lines, values["natural_length"], vector)
+        self.forms = forms(cable.tension_law)
+        names = dict(E="modulus", A="area", density="density", slackness="slackness", smoothing="smoothing")
+        self.numbers = {key: values[name][:, None] for key, name in names.items()}
 
     def _at(self, x):
-        return dict(self.line, x=self.basis.interpolate((self.points + x).ravel()))
+        return dict(self.numbers, x=self.basis.interpolate((self.points + x).ravel()))
 
     def force(self, x):
-        """Force of the lines on every node [N], shape (nodes, 3)."""
-        return -internal_force.assemble(self.basis, **self._at(x)).reshape(-1, 3)
+        """Force of the lines on every node at the displacement x [N], shape (nodes, 3)."""
+        return -self.forms[0].assemble(self.basis, **self._at(x)).reshape(-1, 3)
 
     def stiffness(self, x):
         """Tangent of all components [N/m]."""
-        return tangent.assemble(self.basis, **self._at(x))
+        return self.forms[1].assemble(self.basis, **self._at(x))
 
     def energy(self, x):
         """Strain energy of each line [J]."""
-        return energy.elemental(self.basis, **self._at(x))
+        return self.forms[2].elemental(self.basis, **self._at(x))
 
     def structure(self):
-        """Matrix whose non-zero entries are the components that some line couples."""
+        """Matrix whose entries are the pairs of components that some line couples."""
         return structure.assemble(self.basis)
 
     def mass(self):
-        """Mass of each component [kg]: row sums of the consistent mass matrix."""
-        return mass.assemble(self.basis, **self.line).sum(axis=1)
+        """Lumped mass of each node, once per component [kg], shape (nodes, 3)."""
+        return lumped_mass.assemble(self.basis, **self.numbers).reshape(-1, 3)

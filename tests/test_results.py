@@ -1,0 +1,332 @@
+"""What a run leaves: the result folder, the solution and the warnings."""
+
+import csv
+import json
+import xml.etree.ElementTree as ElementTree
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+import refweb
+
+STEPS = (0.5, 1.0, 2.0, 3.0)
+MODULUS, AREA, DENSITY, WEIGHT = 1e5, 1e-4, 300.0, np.array([0.3, 0.0, -2.0])
+FORCE = np.array([0.1, -0.05, 0.4])
+
+
+def scene(**changes):
+    """A hexagon web under gravity and two loads, one with a table."""
+    return refweb.Scene(
+        title="Loaded hexagons",
+        seed=7,
+        web=refweb.Window(mesh="hexagon", rows=4, columns=4, side=0.3),
+        cable=refweb.Cable(law="tension-only", modulus=MODULUS, area=AREA, density=DENSITY),
+        effects=[
+            refweb.Gravity(acceleration=WEIGHT),
+            refweb.Load(node="centre", force=FORCE),
+            refweb.Load(node=[0, 3], force=FORCE, factor=[(0, 0), (2, 1)]),
+        ],
+        solve=refweb.Static(load_steps=STEPS),
+        observe=[
+            refweb.Observe(name="sag", quantity="displacement", node="centre", component="z"),
+            refweb.Observe(name="largest tension", quantity="tension"),
+            refweb.Observe(name="support", quantity="reaction"),
+        ],
+    ).replace(**changes)
+
+
+@pytest.fixture(scope="module")
+def web():
+    return scene().build().net.web
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """A folder written while the run goes."""
+    folder = tmp_path_factory.mktemp("results") / "deep" / "written"
+    refweb.run(scene(), out=folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def solution():
+    """The same run without touching the disk."""
+    return refweb.run(scene())
+
+
+def frames(folder):
+    return sorted((folder / "frames").iterdir())
+
+
+def read_json(folder):
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+
+
+def is_number(value):
+    return isinstance(value, float) or value is None
+
+
+def check_results(results):
+    for name, result in results.items():
+        assert isinstance(name, str) and list(result) == ["value", "error", "unit", "time", "where"]
+        assert isinstance(result["value"], float) and isinstance(result["time"], float) and is_number(result["error"])
+        assert result["error"] is None or result["error"] > 0.0
+        assert result["unit"] in ("m", "N") and isinstance(result["where"], int | None)
+
+
+def check_solver(solver):
+    counts = ["nsteps", "nfev", "njev", "nlu"]
+    bounds = ["residual", "duality_gap", "smallest_pivot", "slack_nodes", "energy_drift"]
+    assert list(solver) == ["method", *counts, *bounds] and solver["method"] == "newton"
+    assert all(type(solver[key]) is int and solver[key] > 0 for key in counts)
+    assert 0.0 <= solver["residual"] <= 1e-9 and solver["duality_gap"] > 0.0
+    assert solver["smallest_pivot"] is None and solver["energy_drift"] is None and type(solver["slack_nodes"]) is int
+
+
+def test_run_json(written, web):
+    run = read_json(written)
+    keys = "status message scene web results steps events solver cost versions seed warnings"
+    assert list(run) == keys.split()
+    assert (run["status"], run["message"], run["scene"], run["seed"]) == ("solved", "", "Loaded hexagons", 7)
+    assert list(run["web"]) == ["nodes", "lines", "cells", "cable_length", "area", "mass"]
+    assert (run["web"]["nodes"], run["web"]["lines"]) == (len(web.points), len(web.lines))
+    width, height, _ = np.ptp(web.points, axis=0)
+    length = 0.3 * len(web.lines)
+    for key, value in [("cable_length", length), ("area", width * height), ("mass", DENSITY * AREA * length)]:
+        assert run["web"][key] == pytest.approx(value, rel=1e-12)
+    assert list(run["results"]) == ["sag", "largest tension", "support"] and run["events"] == []
+    check_results(run["results"])
+    assert [step["step"] for step in run["steps"]] == list(STEPS) and run["results"] == run["steps"][-1]["results"]
+    for step in run["steps"]:
+        assert list(step) == ["step", "results", "solver"]
+        check_results(step["results"])
+        check_solver(step["solver"])
+    check_solver(run["solver"])
+    assert run["solver"]["nlu"] == sum(step["solver"]["nlu"] for step in run["steps"])
+    assert list(run["cost"]) == ["cpu_s", "wall_s", "by_effect"]
+    assert set(run["cost"]["by_effect"]) == {"elasticity", "gravity", "load"}
+    assert all(isinstance(text, str) for text in [*run["versions"].values(), *run["warnings"]])
+    assert {"refweb", "python", "numpy", "scipy"} <= set(run["versions"])
+
+
+def test_errors_of_tensions_only(written):
+    """The certificate bounds tensions; nothing bounds displacements, and null is not zero."""
+    results = read_json(written)["results"]
+    assert results["sag"]["error"] is None and results["support"]["error"] is None
+    assert 0 < results["largest tension"]["error"] < 1e-3 * results["largest tension"]["value"]
+
+
+def test_history(written, solution):
+    with open(written / "history.csv", encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    energies = {"strain_energy [J]", "potential_energy [J]", "total_energy [J]", "work [J]"}
+    assert header[:4] == ["step [1]", "sag [m]", "largest tension [N]", "support [N]"] and set(header[4:]) == energies
+    assert header == solution.columns and list(solution.history) == [name.rsplit(" [", 1)[0] for name in header]
+    values = np.array(rows, dtype=float)
+    np.testing.assert_array_equal(values, np.column_stack(list(solution.history.values())))
+    np.testing.assert_array_equal(values[:, 0], STEPS)
+    column = dict(zip(header, values.T, strict=True))
+    total = column["strain_energy [J]"] + column["potential_energy [J]"]
+    np.testing.assert_allclose(column["total_energy [J]"], total, rtol=1e-12)
+    for step, row in zip(read_json(written)["steps"], values, strict=True):
+        assert [result["value"] for result in step["results"].values()] == row[1:4].tolist()
+
+
+def loads(step, web):
+    """Resultant of all loads [N]."""
+    mass = DENSITY * AREA * 0.3 * len(web.lines)
+    return mass * WEIGHT + step * FORCE + 2 * min(step / 2, 1) * FORCE
+
+
+@pytest.mark.parametrize("read", ["meshio", "pyvista"])
+def test_frames_open(written, web, solution, read):
+    assert [path.name for path in frames(written)] == [f"web_00000{i}.vtu" for i in range(len(STEPS))]
+    for path, step in zip(frames(written), STEPS, strict=True):
+        if read == "meshio":
+            mesh = meshio.read(path)
+            (block,) = mesh.cells
+            points, lines, kind = mesh.points, block.data, block.type
+            nodal, cell = mesh.point_data, {name: data[0] for name, data in mesh.cell_data.items()}
+        else:
+            mesh = pyvista.read(path)
+            points, lines = np.asarray(mesh.points), mesh.cells.reshape(-1, 3)[:, 1:]
+            kind = "line" if set(mesh.celltypes) == {pyvista.CellType.LINE} else "other"
+            nodal, cell = ({name: np.asarray(d[name]) for name in d} for d in (mesh.point_data, mesh.cell_data))
+        assert kind == "line"
+        np.testing.assert_array_equal(lines, web.lines)
+        assert set(nodal) == {"displacement", "velocity", "reaction", "mass"}
+        assert set(cell) == {"tension", "stress", "strain", "natural_length", "slack"}
+        for array in (points, *nodal.values(), *cell.values()):
+            assert array.dtype == np.float64
+        np.testing.assert_allclose(points - nodal["displacement"], web.points, rtol=0, atol=1e-15)
+        assert not nodal["velocity"].any() and nodal["displacement"].any()
+        np.testing.assert_allclose(nodal["mass"].sum(), DENSITY * AREA * 0.3 * len(web.lines), rtol=1e-13)
+        np.testing.assert_allclose(nodal["reaction"].sum(axis=0), -loads(step, web), rtol=0, atol=1e-8)
+        assert not np.delete(nodal["reaction"], web.rim, axis=0).any()
+        length = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
+        np.testing.assert_allclose(cell["natural_length"], 0.3, rtol=1e-14)
+        np.testing.assert_allclose(cell["strain"], length / 0.3 - 1, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(cell["stress"], np.maximum(MODULUS * cell["strain"], 0), rtol=0, atol=1e-7)
+        np.testing.assert_allclose(cell["tension"], AREA * cell["stress"], rtol=1e-14)
+        np.testing.assert_array_equal(cell["slack"], cell["strain"] <= 0)
+    np.testing.assert_array_equal(points, solution.positions)
+    np.testing.assert_array_equal(cell["tension"], solution.tension)
+
+
+def listed(folder):
+    root = ElementTree.parse(folder / "web.pvd").getroot()
+    return [(float(entry.get("timestep")), entry.get("file")) for entry in root.iter("DataSet")]
+
+
+def test_pvd(written):
+    assert listed(written) == [(step, f"frames/web_00000{i}.vtu") for i, step in enumerate(STEPS)]
+    reader = pyvista.get_reader(written / "web.pvd")
+    assert reader.time_values == list(STEPS)
+    assert reader.read()[0].n_points == read_json(written)["web"]["nodes"]
+
+
+@pytest.mark.parametrize("every, kept", [(1, [0, 1, 2, 3]), (2, [0, 2, 3]), (3, [0, 3]), (100, [0, 3])])
+def test_selected_frames(tmp_path, every, kept):
+    """Every so many rows; the first and the last always."""
+    solution = refweb.run(scene(output=refweb.Output(frames=every)), out=tmp_path / "out")
+    assert [path.name for path in frames(tmp_path / "out")] == [f"web_{i:06d}.vtu" for i in kept]
+    assert listed(tmp_path / "out") == [(STEPS[i], f"frames/web_{i:06d}.vtu") for i in kept]
+    assert len((tmp_path / "out" / "history.csv").read_text().splitlines()) == 1 + len(STEPS)
+    assert len(solution.steps) == len(STEPS)
+
+
+def test_checkpoint(written, solution):
+    with np.load(written / "checkpoint.npz") as checkpoint:
+        assert set(checkpoint) == {"time", "positions", "velocities"} and checkpoint["time"] == STEPS[-1]
+        np.testing.assert_array_equal(checkpoint["positions"], solution.positions)
+        assert checkpoint["velocities"].shape == solution.positions.shape and not checkpoint["velocities"].any()
+
+
+def test_scene_of_the_folder_runs_to_the_same(written, solution):
+    again = refweb.Scene.load(written / "scene.toml")
+    assert again == scene() and again.to_dict() == scene().to_dict()
+    assert refweb.run(again).results == solution.results
+
+
+def test_solution(solution, web):
+    assert list(solution.results) == ["sag", "largest tension", "support"] and solution.status == "solved"
+    sag = solution.results["sag"]
+    assert sag == (sag.value, sag.error, sag.unit, sag.time, sag.where) and (sag.unit, sag.time) == ("m", 3.0)
+    assert sag.where == web.centre and sag.value == solution.displacement[web.centre, 2]
+    assert solution.results["largest tension"].value == solution.tension.max()
+    assert solution.results["largest tension"].where == solution.tension.argmax()
+    assert solution.results["support"].value == pytest.approx(np.linalg.norm(loads(3.0, web)), rel=1e-9)
+    assert solution.positions.shape == solution.reaction.shape == web.points.shape
+    assert solution.tension.shape == solution.stress.shape == (len(web.lines),)
+    np.testing.assert_array_equal(solution.positions, web.points + solution.displacement)
+    with pytest.raises(KeyError, match='did you mean "sag"'):
+        solution.results["sga"]
+    with pytest.raises(KeyError, match='did you mean "largest tension"'):
+        solution.history["largest_tension"]
+
+
+def contents(folder):
+    found = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    run = json.loads(found.pop("run.json"))
+    run.pop("cost")
+    return run, found
+
+
+def test_save_writes_what_run_writes(tmp_path, written, solution):
+    """Two runs and a later save give the same bytes, but for what they cost."""
+    again = refweb.run(scene(), out=tmp_path / "again")
+    solution.save(tmp_path / "saved")
+    again.save(tmp_path / "saved again")
+    run, found = contents(written)
+    assert len(found) == 4 + len(STEPS)
+    for name in ("again", "saved", "saved again"):
+        assert contents(tmp_path / name)[0] == run
+        assert contents(tmp_path / name)[1] == found
+    with pytest.raises(refweb.InputError, match="is not empty"):
+        solution.save(tmp_path / "saved")
+    solution.save(tmp_path / "saved", force=True)
+    assert contents(tmp_path / "saved") == (run, found)
+
+
+def test_nothing_is_left_of_a_refused_run(tmp_path):
+    with pytest.raises(refweb.InputError, match="names no node"):
+        refweb.run(scene(support=[refweb.Supports(nodes="tip")]), out=tmp_path / "out")
+    web = refweb.Web(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], rim=[0])
+    with pytest.raises(refweb.InputError, match="a scene file cannot hold it"):
+        refweb.run(scene(web=web, effects=(), observe=()), out=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def straight(law, prestrain, groups=None, smoothing=None, strength=None):
+    """The run of a straight cable of three lines pulled by its prestrain."""
+    given = dict(law=law, modulus=MODULUS, area=AREA, density=1.0, prestrain=prestrain)
+    return refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(
+                points=[[i, 0, 0] for i in range(4)],
+                lines=[[0, 1], [1, 2], [2, 3]],
+                supports=[0, 3],
+                groups=["", "weak", ""],
+            ),
+            cable=refweb.Cable(**given, smoothing=smoothing, strength=strength, groups=groups or {}),
+        )
+    )
+
+
+@pytest.mark.parametrize("share, warned", [(0.012, True), (0.008, False)])
+def test_floor_is_warned_of_above_one_percent(share, warned):
+    """Under ε0 = 0 the floor is η E, and the stress of a cable with prestrain ε nearly ε E."""
+    solution = straight("smooth", 0.02, smoothing=0.02 * share)
+    found = [text for text in solution.warnings if "floor" in text]
+    assert len(found) == warned and len(solution.warnings) == warned
+    if warned:
+        assert f"{MODULUS * 0.02 * share:.4g} Pa" in found[0] and "1 %" in found[0]
+
+
+def test_slack_nodes_are_counted():
+    solution = straight("tension-only", -0.1)
+    (text,) = solution.warnings
+    assert "2 nodes hang on slack lines" in text and "1, 2" in text
+    assert solution.solver["slack_nodes"] == 2 and solution.state.slack.all() and not solution.tension.any()
+
+
+def test_saddle_is_named():
+    """A straight chain of bars under compression is in equilibrium, and would buckle; bars are never slack."""
+    solution = straight("linear", -0.1)
+    (text,) = solution.warnings
+    assert "saddle" in text and "bars push" in text and solution.solver["smallest_pivot"] == -1
+    assert solution.solver["slack_nodes"] == 0
+    np.testing.assert_allclose(solution.stress, -0.1 * MODULUS, rtol=1e-12)
+    taut = straight("linear", 0.1)
+    assert taut.warnings == [] and taut.solver["smallest_pivot"] == 1
+
+
+def test_warning_names_the_load_steps_it_holds_for():
+    """The chain is slack at the first of two steps, and pulled taut from one end at the second."""
+    ends = refweb.Motion(node=3, displacement=[(1.0, 0.0, 0.0, 0.0), (2.0, 1.0, 0.0, 0.0)])
+    solution = straight("tension-only", -0.1)
+    solution = refweb.run(solution.scene.replace(effects=(ends,), solve=refweb.Static(load_steps=(1, 2))))
+    (text,) = solution.warnings
+    assert "2 nodes hang on slack lines" in text and text.endswith("(load step 1)")
+    assert [step["solver"]["slack_nodes"] for step in solution.steps] == [2, 0]
+
+
+def test_utilisation():
+    """Stress over strength, where a strength is given."""
+    assert straight("linear", 0.1).state.utilisation is None
+    found = straight("linear", 0.1, strength=4e4).state.utilisation
+    np.testing.assert_allclose(found, 0.1 * MODULUS / 4e4, rtol=1e-12)
+    weak = straight("linear", 0.1, groups={"weak": refweb.Group(strength=8e3)})
+    np.testing.assert_allclose(weak.state.utilisation, [0, 0.1 * MODULUS / 8e3, 0], rtol=1e-12)
+    (text,) = weak.warnings
+    assert "line 1 breaks" in text and "1.25" in text
+
+
+def test_utilisation_in_the_box(capsys, tmp_path):
+    from refweb.console import after
+
+    after(straight("linear", 0.1, groups={"weak": refweb.Group(strength=2e4)}), tmp_path)
+    box = capsys.readouterr().out
+    assert "│ strength  utilisation 0.50 at line 1 " in box and f"results in {tmp_path}" in box
