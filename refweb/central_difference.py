@@ -20,7 +20,7 @@ import numpy as np
 from .compiled import BOUND, ENERGY, FORCE, INDICES, MATRIX, VECTOR, kernel, typed_list
 from .errors import SolverError
 from .inputs import InputError
-from .probes import INTEGERS, PROBE
+from .probes import INTEGERS, PLACE, PROBE
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
@@ -47,7 +47,7 @@ def advance(
 ):  # fmt: skip
     """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse."""
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    rows, where = x.shape[0], np.zeros(1, dtype=np.int64)
+    rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
     before, power, reaction = np.empty((driven.size, 7)), 0.0, np.zeros(3)
     for i in working:
         for c in range(outs[i].shape[0]):
@@ -94,7 +94,9 @@ def advance(
         for i in followed:
             value = probes[i](now, x, v, f, outs[0], probe_rows[i], probe_data[i], where)
             if signs[i] * value > signs[i] * peaks[i]:
-                peaks[i], times[i], places[i] = value, now, where[0]
+                where[1] = PLACE
+                probes[i](now, x, v, f, outs[0], probe_rows[i], probe_data[i], where)
+                peaks[i], times[i], places[i], where[1] = value, now, where[0], 0
         if watch.shape[0]:
             book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, total)
             for j in range(watch.shape[0]):
@@ -130,7 +132,7 @@ def rows_ahead(
     """
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
-    rows, where, rates = x.shape[0], np.zeros(1, dtype=np.int64), np.empty(x.shape[0])
+    rows, where, rates = x.shape[0], np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
     total = np.zeros(len(energies) + 2)
     for n in range(ends.size):
         interval = ends[n] - state[0]
@@ -171,8 +173,6 @@ def rows_ahead(
             for r in range(rows):
                 if inverse[r, k] > 0.0:
                     row[at + k] += v[r, k] / inverse[r, k]
-        if state[1] == 0.0:
-            state[3] = energy - book[0]
         state[4] = max(state[4], stored)
         drift = abs(energy - book[0] - state[3])
         state[5] = max(state[5], drift)
@@ -331,17 +331,18 @@ class CentralDifference:
         for family, out in zip(system.families, self._outs, strict=True):
             family.force(0.0, saved[0], saved[1], saved[2], family.cells, family.data, out)
         signs, probes = self._probes[3], self._seeing
-        values, where = np.zeros(len(signs)), np.zeros((len(signs), 1), dtype=np.int64)
+        values, where = np.zeros(len(signs)), np.full((len(signs), 2), PLACE)
         for i, (probe, rows, data, _) in enumerate(probes):
             rows, data = np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float)
             values[i] = probe(0.0, saved[0], saved[1], saved[2], self._outs[0], rows, data, where[i])
-        if len(self._watch):
-            total = np.zeros(len(system.families) + 2)
-            book_energies(
-                0.0, saved[0], saved[1], self._masses[0], self._cells, self._data, *self._energies, np.zeros(1), total
-            )
-            values[len(probes) :] = self._watch @ total
-        return Run(np.zeros(6), saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3))
+        total = np.zeros(len(system.families) + 2)
+        book_energies(
+            0.0, saved[0], saved[1], self._masses[0], self._cells, self._data, *self._energies, np.zeros(1), total
+        )
+        values[len(probes) :] = self._watch @ total
+        own = np.delete(total[:-1], self._ends[2])
+        state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
+        return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3))
 
     def _peaks(self, run):
         return (*self._probes, run.peaks, run.times, run.places, run.work, run.impulse)

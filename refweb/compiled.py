@@ -79,9 +79,8 @@ def kernel(signature=None, **options):
     Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
     """
     arguments = () if signature is None else (signature,)
-    return lambda function: _compile(
-        numba.njit(*arguments, cache=True, error_model="numpy", fastmath={"contract"}, nogil=True, **options), function
-    )
+    options = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
+    return lambda function: _compile(numba.njit(*arguments, **options), function)
 
 
 def ufunc(signatures):

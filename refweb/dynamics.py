@@ -38,14 +38,15 @@ def probe_of(observable, system):
     net, quantity = system.net, observable.quantity
     if quantity == "slack_fraction":
         margin = net.line_data[:, SLACKNESS] if net.law.number == SMOOTH else np.zeros(len(net.cells))
-        return probes.slack_fraction, [0], margin[:, None]
+        return probes.slack_fraction, [], margin[:, None]
     if quantity in LINE:
-        one = -1 if observable.line is None else int(np.flatnonzero(net.line == observable.line)[0])
+        elements = np.arange(len(net.line)) if observable.line is None else np.flatnonzero(net.line == observable.line)
         scale = 1.0 / net.area if quantity == "stress" else np.ones(len(net.cells))
-        return probes.line, [1 if quantity == "strain" else 0, one], scale[:, None]
+        return probes.line, [1 if quantity == "strain" else 0, elements[0], elements[-1] + 1], scale[:, None]
     component = probes.MAGNITUDE if observable.component is None else observable.component
     rows = observable.rows(system)
-    numbers = [component, *rows]
+    consecutive = len(rows) == 1 or (np.diff(rows) == 1).all()
+    numbers = [component, rows[0], rows[-1] + 1] if consecutive else [component, -1, -1, *rows]
     if quantity == "reaction":
         weight = np.where(system.supported[rows], 1.0, 0.0)
         rest = np.zeros((len(rows), 3))
@@ -191,7 +192,7 @@ class Motion:
         return CentralDifference(
             self.system,
             probes=[(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed]
-            + [(probes.line, [0, -1], scale[:, None], 1) for scale in self._own.values()],
+            + [(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()],
             watch=[(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched],
             safety=safety / finer,
             step_size=None if step is None else step / finer,
@@ -266,16 +267,14 @@ class Motion:
             for first, history in blocks(solver, run, times, stops):
                 table = self.table(history, run)
                 last = first + len(table) - 1
-                self._note(solver, run)
                 self.rows += table.tolist() if folder is None else [table[-1].tolist()]
                 for row in table if folder is not None else ():
                     folder.row(row)
                 if last in stops:
-                    self._frame(last, folder)
+                    self._frame(last, folder, run)
                 tell((last + 1) / len(times))
-        except SolverError:
-            self._note(solver, run)
-            raise
+        finally:
+            self._note(run)
         return self.results(run, table[-1])
 
     def _times(self):
@@ -283,7 +282,7 @@ class Motion:
         times = row_times(self.scene)
         return times, np.unique(np.append(np.arange(0, len(times), self.scene.output.frames), len(times) - 1))
 
-    def _note(self, solver, run):
+    def _note(self, run):
         """Take the state of a run over into the solution."""
         self._peaks = dict(zip(self._own, run.peaks[len(self.probed) :], strict=False))
         if np.isfinite(run.x).all():
@@ -292,11 +291,12 @@ class Motion:
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None
 
-    def _frame(self, number, folder):
+    def _frame(self, number, folder, run):
+        state = State(self.system, run.time, run.x.copy(), run.v.copy())
         if folder is None:
-            self.solution.frames.append((number, self.solution.state))
+            self.solution.frames.append((number, state))
         else:
-            folder.frame(number, self.solution.state)
+            folder.frame(number, state)
 
     def remarks(self):
         """What a reader of the results has to know."""

@@ -1,7 +1,8 @@
 """Compiled probes: what an explicit loop looks at in every step, one scalar each.
 
 A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``lines`` holds tension and strain of
-each element, ``rows`` and ``data`` the probe's own numbers; it writes the row or element it stands at to ``where[0]``.
+each element, ``rows`` and ``data`` the probe's own numbers; where ``where[1]`` is `PLACE`
+it writes the row or element it stands at to ``where[0]``.
 """
 
 from __future__ import annotations
@@ -15,33 +16,50 @@ from .compiled import _array, kernel
 
 _f, _i = types.float64, types.int64
 PROBE = _f(_f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 1), _array(_f, 2), _array(_i, 1))
+VECTOR_MATH = {"contract", "nnan", "nsz", "reassoc"}
+"""Arithmetic under which a largest value vectorizes; a number that is not finite ends a run elsewhere."""
 MAGNITUDE = 3
 """Component number of a magnitude."""
 
 
+PLACE = 1
+"""Value of ``where[1]`` that asks a probe for the place of its value as well."""
+
+
 @kernel()
-def component_of(a, row, component):
-    """A component of a row, or its magnitude."""
+def _value(a, data, row, n, component):
     if component < MAGNITUDE:
-        return a[row, component]
-    return math.sqrt(a[row, 0] * a[row, 0] + a[row, 1] * a[row, 1] + a[row, 2] * a[row, 2])
+        return a[row, component] + data[n, component]
+    x, y, z = a[row, 0] + data[n, 0], a[row, 1] + data[n, 1], a[row, 2] + data[n, 2]
+    return x * x + y * y + z * z
 
 
-@kernel()
+@kernel(fastmath=VECTOR_MATH)
 def largest_of(a, data, rows, where):
-    """Largest component, or magnitude, of ``a + data`` over some rows; ``rows`` is (component, row, row, ...)."""
-    component, best, at = rows[0], -math.inf, rows[1]
-    for n in range(1, rows.size):
-        r = rows[n]
-        if component < MAGNITUDE:
-            value = a[r, component] + data[n - 1, component]
-        else:
-            x, y, z = a[r, 0] + data[n - 1, 0], a[r, 1] + data[n - 1, 1], a[r, 2] + data[n - 1, 2]
-            value = x * x + y * y + z * z
-        if value > best:
-            best, at = value, r
-    where[0] = at
-    return best if component < MAGNITUDE else math.sqrt(best)
+    """Largest component, or magnitude, of ``a + data`` over some rows.
+
+    ``rows`` is (component, first, last + 1), or (component, −1, −1, row, row, ...); the value is found first, in a loop
+    that vectorizes, and its place only where it is asked for.
+    """
+    component, first, last = rows[0], rows[1], rows[2]
+    best = -math.inf
+    if first >= 0 and component == MAGNITUDE:
+        for n in range(last - first):
+            x, y, z = a[first + n, 0] + data[n, 0], a[first + n, 1] + data[n, 1], a[first + n, 2] + data[n, 2]
+            best = max(best, x * x + y * y + z * z)
+    elif first >= 0:
+        for n in range(last - first):
+            best = max(best, a[first + n, component] + data[n, component])
+    else:
+        for n in range(rows.size - 3):
+            best = max(best, _value(a, data, rows[3 + n], n, component))
+    if where[1] == PLACE:
+        where[0] = -1
+        for n in range(data.shape[0]):
+            r = first + n if first >= 0 else rows[3 + n]
+            if where[0] < 0 and _value(a, data, r, n, component) >= best * (1.0 - 1e-15):
+                where[0] = r
+    return math.sqrt(best) if component == MAGNITUDE else best
 
 
 @kernel(PROBE)
@@ -59,24 +77,31 @@ def velocity(t, x, v, f, lines, rows, data, where):
 @kernel(PROBE)
 def reaction(t, x, v, f, lines, rows, data, where):
     """Component or magnitude of Σ w (g − f) over rows; data holds w and g, shape (rows, 6)."""
-    where[0] = rows[1]
-    total = np.zeros((1, 3))
-    for n in range(1, rows.size):
-        for k in range(3):
-            total[0, k] += data[n - 1, k] * (data[n - 1, 3 + k] - f[rows[n], k])
-    return component_of(total, 0, rows[0])
+    x = y = z = 0.0
+    first = rows[1]
+    for n in range(data.shape[0]):
+        r = first + n if first >= 0 else rows[3 + n]
+        x += data[n, 0] * (data[n, 3] - f[r, 0])
+        y += data[n, 1] * (data[n, 4] - f[r, 1])
+        z += data[n, 2] * (data[n, 5] - f[r, 2])
+    where[0] = first if first >= 0 else rows[3]
+    if rows[0] == MAGNITUDE:
+        return math.sqrt(x * x + y * y + z * z)
+    return x if rows[0] == 0 else y if rows[0] == 1 else z
 
 
-@kernel(PROBE)
+@kernel(PROBE, fastmath=VECTOR_MATH)
 def line(t, x, v, f, lines, rows, data, where):
-    """Largest of data × column over elements; ``rows`` is (column, element) or (column, −1) for all."""
-    column, best, at = rows[0], -math.inf, 0
-    first, last = (0, lines.shape[0]) if rows[1] < 0 else (rows[1], rows[1] + 1)
+    """Largest of data × column over elements; ``rows`` is (column, first, last + 1)."""
+    column, first, last = rows[0], rows[1], rows[2]
+    best = -math.inf
     for c in range(first, last):
-        value = lines[c, column] * data[c, 0]
-        if value > best:
-            best, at = value, c
-    where[0] = at
+        best = max(best, lines[c, column] * data[c, 0])
+    if where[1] == PLACE:
+        where[0] = first
+        for c in range(last - 1, first - 1, -1):
+            if lines[c, column] * data[c, 0] == best:
+                where[0] = c
     return best
 
 

@@ -16,7 +16,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, components, integer, nearest, nodes, numbers_list, real, short, shown, text
+from .inputs import (
+    InputError,
+    Table,
+    choice,
+    components,
+    integer,
+    nearest,
+    nodes,
+    numbers_list,
+    real,
+    short,
+    shown,
+    text,
+)
 
 WEBS = {
     "paper": "refweb.lattices:Paper",

@@ -25,7 +25,9 @@ from .interior import InteriorPoint
 from .laws import LINEAR, TENSION_ONLY
 
 TOLERANCE = 1e-10
-"""Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step."""
+"""Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step.
+
+A slack net under loads below 1e-7 of EA ends at what rounding of its displacements makes of EA, which can be more."""
 LIMIT = 1e-9
 
 
@@ -142,6 +144,11 @@ class Newton:
         values[self.loose] += 1e-10 * self.stiffest
         return values
 
+    def _rounding(self, x):
+        """Largest force that rounding of the displacements makes in a line [N]."""
+        net, reach = self.system.net, np.abs(x).max(axis=1)
+        return np.finfo(float).eps * (net.line_data[:, 1] / net.natural_length * reach[net.cells].max(axis=1)).max()
+
     def _step(self, t, x, r, shift, compressed, stats):
         """Newton step of the shifted tangent, and the shift that it took."""
         definite = False
@@ -199,22 +206,23 @@ class Newton:
         stats = dict(nsteps=0, nfev=1, njev=0, nlu=0)
         force, out = system.forces(t, x)
         tension = out[0][:, 0]
-        scale = self.scale = max(self.scale, force_scale(system, t, x, tension))
+        scale = max(self.scale, force_scale(system, t, x, tension))
         shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2) * (1e-4 if warm else 1.0)
         energy, best = system.energy(t, x), np.inf
         while True:
             r = force.ravel()[system.free]
-            error = residual(system, force, max(self.scale, force_scale(system, t, x, tension)))
+            scale = max(self.scale, force_scale(system, t, x, tension))
+            error, limit = residual(system, force, scale), max(LIMIT, self._rounding(x) / scale if scale else 0.0)
             if not np.isfinite(error):
                 raise SolverError(f"non-finite force at step {t:g}, node {np.argmax(~np.isfinite(force).all(axis=1))}")
-            if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
+            if error <= TOLERANCE or (error <= limit and error > 0.5 * best):
                 break
             best = min(best, error)
             if stats["nlu"] >= most:
                 node = np.linalg.norm(np.where(system.supported, 0, force), axis=1).argmax()
                 raise NotFound(
                     f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node {node}, "
-                    f"limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
+                    f"limit {limit:.3g}; raise the load in smaller load_steps, or use a larger smoothing",
                     stats,
                 )
             p, shift = self._step(t, x, r, shift, bool((tension < 0.0).any()), stats)
@@ -224,9 +232,24 @@ class Newton:
             stats["nsteps"] += 1
             stats["nfev"] += 1
             self.progress(f"step {t:g}, residual {error:.0e}")
+        if stats["nlu"]:
+            x, force, tension, error = self._polished(t, x, force, tension, error, scale, stats)
         stats["residual"] = float(error)
         self.scale = max(self.scale, force_scale(system, t, x, tension))
         return Equilibrium(t, x, tension.copy(), force, stats)
+
+    def _polished(self, t, x, force, tension, error, scale, stats):
+        """One more step with the factorization at hand, kept where it lowers the residual."""
+        system, y = self.system, x.copy()
+        p = self.factor.solve(force.ravel()[system.free])
+        if p is not None:
+            y.ravel()[system.free] += p
+            new_force, out = system.forces(t, y)
+            stats["nfev"] += 1
+            new_error = residual(system, new_force, scale)
+            if new_error < error:
+                return y, new_force, out[0][:, 0], new_error
+        return x, force, tension, error
 
     def _search(self, t, x, p, slope, energy, shift, stats):
         """Line search along p: on the energy, or on its slope once energy differences drown in rounding."""
@@ -240,7 +263,7 @@ class Newton:
             stats["nfev"] += 1
             if drowned:
                 here = system.force(t, y).ravel()[system.free] @ p
-                if abs(here) <= 0.9 * slope:
+                if here >= -0.9 * slope:
                     break
                 a *= 0.5
                 continue

@@ -63,7 +63,7 @@ def structure(u, v, w):
 @skfem.LinearForm
 def lumped_mass(v, w):
     """Row sums of the consistent mass ∫ ρA δx·dx ds."""
-    return w.density * w.A * v.value.sum(axis=0)
+    return w.density * w.A * v.sum(axis=0)
 
 
 class Oracle:

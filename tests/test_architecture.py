@@ -1,9 +1,9 @@
 """The order of the modules, read off their imports.
 
-`LAYERS` stands from the bottom to the top. A module imports only modules of layers below its own, at its head and inside
-its functions alike: what a solver sees is the system, what an effect sees is the net, and a scene alone knows every
-effect's name. The package itself, ``refweb/__init__.py``, is below all of them: it holds the version, and the names it
-exports are imported when they are used.
+`LAYERS` stands from the bottom to the top. A module imports only modules of layers below its own, at its head and
+inside its functions alike: what a solver sees is the system, what an effect sees is the net, and a scene alone knows
+every effect's name. The package itself, ``refweb/__init__.py``, is below all of them: it holds the version, and the
+names it exports are imported when they are used.
 """
 
 import ast
@@ -70,6 +70,15 @@ def imports(name, tree=None):
     return [found for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for found in imported(name, node)]
 
 
+def at_head(tree):
+    """Statements that run when a module is imported."""
+    for node in tree.body:
+        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node
+        elif isinstance(node, ast.ClassDef):
+            yield from at_head(node)
+
+
 def uses(name):
     """Modules of the package that a module imports, the longest name that is one."""
     found = set()
@@ -133,13 +142,8 @@ def test_imports_from_outside(name):
     """Neither tests nor validation; libraries for pictures, files and SUNDIALS only inside functions."""
     outside = {absolute.split(".")[0] for absolute in imports(name)}
     assert not outside & {"tests", "validation", "pytest"}
-    functions = [node for node in ast.walk(MODULES[name]) if isinstance(node, ast.FunctionDef)]
-    inside = [found for function in functions for found in imports(name, function)]
-    head = list(imports(name))
-    for found in inside:
-        if found in head:
-            head.remove(found)
-    assert not {found.split(".")[0] for found in head} & {"pyvista", "matplotlib", "meshio", "sksundae", "PIL"}
+    head = {found.split(".")[0] for node in at_head(MODULES[name]) for found in imports(name, node)}
+    assert not head & {"pyvista", "matplotlib", "meshio", "sksundae", "PIL"}
 
 
 def test_names_say_something():

@@ -175,8 +175,9 @@ def test_failed_run_keeps_its_folder(here, capsys):
     assert "failed" in out and "carried off" in out
 
 
-def test_numbers_that_overflow(here, capsys):
-    (here.parent / "scenes" / "big.toml").write_text(SCENE.replace("0.0, 1.0]", "0.0, 1e308]"), encoding="utf-8")
+@pytest.mark.parametrize("old, new", [("0.0, 1.0]", "0.0, 1e308]"), ("[1, 2, 3]", "[1e308]")])
+def test_numbers_that_overflow(here, capsys, old, new):
+    (here.parent / "scenes" / "big.toml").write_text(SCENE.replace(old, new), encoding="utf-8")
     assert main(["run", "../scenes/big.toml", "--out", "out"]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and "non-finite" in err

@@ -250,6 +250,16 @@ def test_save_writes_what_run_writes(tmp_path, written, solution):
     assert contents(tmp_path / "saved") == (run, found)
 
 
+def test_a_save_that_is_cut_short_is_marked(tmp_path, solution, monkeypatch):
+    def full(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("refweb.io.write_frame", full)
+    with pytest.raises(OSError, match="disk full"):
+        solution.save(tmp_path / "out")
+    assert read_json(tmp_path / "out")["status"] == "running" and listed(tmp_path / "out") == []
+
+
 def test_nothing_is_left_of_a_refused_run(tmp_path):
     with pytest.raises(refweb.InputError, match="names no node"):
         refweb.run(scene(support=[refweb.Supports(nodes="tip")]), out=tmp_path / "out")
@@ -259,7 +269,7 @@ def test_nothing_is_left_of_a_refused_run(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def straight(law, prestrain, groups=None, smoothing=None, strength=None):
+def straight(law, prestrain, groups=None, strength=None, **smooth):
     """The run of a straight cable of three lines pulled by its prestrain."""
     given = dict(law=law, modulus=MODULUS, area=AREA, density=1.0, prestrain=prestrain)
     return refweb.run(
@@ -270,7 +280,7 @@ def straight(law, prestrain, groups=None, smoothing=None, strength=None):
                 supports=[0, 3],
                 groups=["", "weak", ""],
             ),
-            cable=refweb.Cable(**given, smoothing=smoothing, strength=strength, groups=groups or {}),
+            cable=refweb.Cable(**given, **smooth, strength=strength, groups=groups or {}),
         )
     )
 
@@ -290,6 +300,12 @@ def test_slack_nodes_are_counted():
     (text,) = solution.warnings
     assert "2 nodes hang on slack lines" in text and "1, 2" in text
     assert solution.solver["slack_nodes"] == 2 and solution.state.slack.all() and not solution.tension.any()
+
+
+@pytest.mark.parametrize("slackness, slack", [(0.0199, False), (0.0201, True)])
+def test_slack_is_up_to_the_slackness(slackness, slack):
+    """Of a cable that is strained by 2 %."""
+    assert (straight("smooth", 0.02, slackness=slackness).state.slack == slack).all()
 
 
 def test_saddle_is_named():

@@ -14,6 +14,8 @@ import functools
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import Table
 from ..laws import energy_density, prepared_stress, stress, tangent
@@ -23,11 +25,11 @@ from . import Family
 
 @kernel()
 def strain(x, cells, data, c, q, nodes, gradients):
-    """(dx/dξ, its magnitude, ε) at quadrature point q of cell c."""
+    """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c, of one division and one root."""
     at = POINT + 4 * q
     u0 = u1 = u2 = 0.0
     for a in range(nodes):
-        row, d = cells[c, a], gradients[q * nodes + a]
+        row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]  # unsigned: no row counts from the end
         u0 += d * x[row, 0]
         u1 += d * x[row, 1]
         u2 += d * x[row, 2]
@@ -36,7 +38,11 @@ def strain(x, cells, data, c, q, nodes, gradients):
     p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
     length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
     square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)
-    return p0, p1, p2, length, square / (natural * (length + natural))
+    if length == 0.0:
+        return p0, p1, p2, 0.0, square / (natural * natural)
+    both = natural * (length + natural)
+    inverse = 1.0 / (both * length)
+    return p0, p1, p2, both * inverse, square * length * inverse
 
 
 @functools.cache
@@ -60,18 +66,17 @@ def kernels(law, gradients, weights):
         for c in range(cells.shape[0]):
             largest, stretched = -math.inf, 0.0
             for q in range(points):
-                p0, p1, p2, length, e = strain(x, cells, data, c, q, nodes, flat)
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
                 tension = prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if tension > largest:
                     largest, stretched = tension, e
-                if length > 0.0:
-                    s = weights[q] * tension / length
-                    for a in range(nodes):
-                        row, d = cells[c, a], s * flat[q * nodes + a]
-                        f[row, 0] -= d * p0
-                        f[row, 1] -= d * p1
-                        f[row, 2] -= d * p2
+                s = weights[q] * tension * inverse
+                for a in range(nodes):
+                    row, d = np.uint64(cells[c, a]), s * flat[q * nodes + a]
+                    f[row, 0] -= d * p0
+                    f[row, 1] -= d * p1
+                    f[row, 2] -= d * p2
             out[c, 0] = largest
             out[c, 1] = stretched
 
@@ -89,18 +94,12 @@ def kernels(law, gradients, weights):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
             for q in range(points):
-                p0, p1, p2, length, e = strain(x, cells, data, c, q, nodes, flat)
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
                 along = weights[q] * tangent(law, e, axial, slack, smooth) / data[c, LENGTH]
                 tension = stress(law, e, axial, slack, smooth)
-                across = 0.0
-                if length > 0.0 and not (definite and tension < 0.0):
-                    across = weights[q] * tension / length
-                if length > 0.0:
-                    p0, p1, p2 = p0 / length, p1 / length, p2 / length
-                else:
-                    p0, p1, p2 = 0.0, 0.0, 0.0
-                p = (p0, p1, p2)
+                across = 0.0 if definite and tension < 0.0 else weights[q] * tension * inverse
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for a in range(nodes):
                     for b in range(nodes):
                         d = flat[q * nodes + a] * flat[q * nodes + b]

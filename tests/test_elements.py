@@ -1,0 +1,154 @@
+"""The compiled elements against the weak form on the page, and the digits of their strain."""
+
+import mpmath
+import numpy as np
+import pytest
+import skfem
+from nets import LAWS, skew_cable, skew_net, skew_web, system
+from oracle import Oracle
+
+from refweb import lines
+from refweb.cables import Cable
+from refweb.state import State
+from refweb.webs import Web
+
+# Both ways sum a dozen products of numbers with a relative rounding of 1e-16 each, and the oracle's strain λ − 1 is
+# rounded to 1e-16 of a largest strain near 0.1: 1e-15 of the largest entry, and a factor of 100 to be safe.
+TIGHT = 1e-13
+
+
+def displacement(seed, size=0.05):
+    return size * np.random.default_rng(seed).standard_normal((6, 3))
+
+
+def skew_system(law):
+    """The skew net with two nodes held and a third in one direction only."""
+    supported = np.zeros((6, 3), dtype=bool)
+    supported[[0, 2]] = True
+    supported[4, 1] = True
+    return system(skew_web(), skew_cable(law), supported=supported)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", range(5))
+def test_kernels_equal_the_weak_form(law, seed):
+    oracle, net_system, x = Oracle(skew_web(), skew_cable(law)), skew_system(law), displacement(seed)
+    expected = oracle.force(x)
+    np.testing.assert_allclose(net_system.force(1.0, x), expected, rtol=0, atol=TIGHT * np.abs(expected).max())
+    free = net_system.free
+    expected = oracle.stiffness(x)[free][:, free].toarray()
+    got = net_system.pattern.matrix(net_system.stiffness(1.0, x)).toarray()
+    np.testing.assert_allclose(got, expected, rtol=0, atol=TIGHT * np.abs(expected).max())
+    expected = oracle.energy(x)
+    got = net_system.energy_of(net_system.families[0], 1.0, x)
+    np.testing.assert_allclose(got, expected, rtol=0, atol=TIGHT * np.abs(expected).max())
+
+
+def test_basis_is_scikit_fems():
+    net = skew_net()
+    for element in (None, skfem.ElementLineP2(), skfem.ElementVector(skfem.ElementLineP1(), 3)):
+        basis = lines.basis(net.points, net.web.lines, net.natural_length, element)
+        assert type(basis) is skfem.Basis
+        # ∫ ds: the metric is the natural length, whatever the distance of the nodes.
+        np.testing.assert_allclose(basis.dx.sum(axis=1), net.natural_length, rtol=1e-15)
+    basis = lines.basis(net.points, net.web.lines, net.natural_length)
+    ends = basis.interpolate(np.arange(6.0)).grad[0, :, 0] * net.natural_length
+    np.testing.assert_allclose(ends, np.diff(net.web.lines, axis=1)[:, 0], rtol=1e-15)
+
+
+def test_mass_follows_natural_length():
+    # Eighths are exact in binary, and so are the products and sums of a few of them: no rounding to allow for.
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [3, 1, 0]]) / 8
+    pairs, length = np.array([[0, 1], [1, 2], [2, 3], [0, 2]]), np.array([1.25, 0.5, 2.0, 1.75])
+    web = Web(points=points, lines=pairs, natural_length=length, groups=("", "thick", "", ""))
+    cable = Cable(modulus=1.0, area=0.25, density=512.0, groups={"thick": dict(area=0.5, density=256.0)})
+    per_line = np.array([512 * 0.25, 256 * 0.5, 512 * 0.25, 512 * 0.25]) * length
+    mass = lines.build(web, cable).mass
+    by_node = [per_line[[0, 3]].sum(), per_line[[0, 1]].sum(), per_line[1:].sum(), per_line[2]]
+    assert mass.tolist() == [share / 2 for share in by_node]
+    assert mass.sum() == per_line.sum()
+
+
+def test_lumped_mass_is_the_row_sum_of_the_consistent_one():
+    expected = Oracle(skew_web(), skew_cable()).mass()
+    mass = lines.build(skew_web(), skew_cable()).mass
+    np.testing.assert_allclose(np.repeat(mass[:, None], 3, axis=1), expected, rtol=1e-15)
+
+
+def one_line(end, natural_length=None):
+    """A line from the origin, of a law without parameters, free at both ends."""
+    length = None if natural_length is None else [natural_length]
+    web = Web(points=[[0, 0, 0], end], lines=[[0, 1]], natural_length=length)
+    cable = Cable(law="linear", modulus=1e5, area=1e-4, density=300.0)
+    return system(web, cable, supported=np.zeros((2, 3), dtype=bool))
+
+
+def exact_strain(end, natural_length, u):
+    """Strain in 60 digits of the doubles given."""
+    with mpmath.workdps(60):
+        square = sum((mpmath.mpf(float(p)) + mpmath.mpf(float(d))) ** 2 for p, d in zip(end, u, strict=True))
+        return mpmath.sqrt(square) / mpmath.mpf(float(natural_length)) - 1
+
+
+@pytest.mark.parametrize("direction", ["along", "oblique", "across"])
+@pytest.mark.parametrize("size", 10.0 ** np.arange(-12, 1))
+def test_strain_keeps_its_digits_at_tiny_displacements(direction, size):
+    """The strain has a relative error of a few roundings however small it is; λ − 1 has an absolute one of 1e-16.
+
+    Where no terms of 2 X'·u' + u'·u' cancel, its relative error is that of about ten operations, 10 × 1.1e-16 at most
+    with those of the length: 1e-14 leaves room and is far below the 1e-16/ε of λ − 1. The line (3, 4, 12)/8 has the
+    length 13/8 exactly, so that its strain at rest is zero in both computations. Across it u' is normal to X' in every
+    component, as in a flat web, and the strain is of second order: 1e-25 at 1e-12 m.
+    """
+    end = np.array([4.0, 0.0, 3.0]) / 8 if direction == "across" else np.array([3.0, 4.0, 12.0]) / 8
+    unit = dict(along=end, oblique=np.array([0.7, 0.1, -0.2]), across=np.array([0.0, 1.0, 0.0]))[direction]
+    u = size * unit
+    net_system = one_line(end)
+    assert net_system.net.natural_length[0] == (5 / 8 if direction == "across" else 13 / 8)
+    exact = exact_strain(end, net_system.net.natural_length[0], u)
+    got = State(net_system, 0.0, np.array([np.zeros(3), u])).strain[0]
+    assert abs(got - exact) <= 1e-14 * abs(exact)
+
+
+@pytest.mark.parametrize("size", [0.0, *10.0 ** np.arange(-12, 1)])
+@pytest.mark.parametrize("factor", [0.75, 1.5])
+def test_strain_of_a_prestressed_line(size, factor):
+    """With natural length L ≠ |X'| the strain has a constant part, and the digits are those of that part."""
+    end, u = np.array([3.0, 4.0, 12.0]) / 8, size * np.array([0.2, 0.4, 0.3])
+    exact = exact_strain(end, factor * 13 / 8, u)
+    got = State(one_line(end, factor * 13 / 8), 0.0, np.array([np.zeros(3), u])).strain[0]
+    assert abs(got - exact) <= 1e-14 * max(abs(exact), abs(1 / factor - 1))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_pattern_is_the_adjacency_and_stays(law):
+    net_system = skew_system(law)
+    free, pattern = net_system.free, net_system.pattern
+    adjacency = Oracle(skew_web(), skew_cable(law)).structure().tocsc()[:, free][free]
+    adjacency.sort_indices()
+    np.testing.assert_array_equal(pattern.indptr, adjacency.indptr)
+    np.testing.assert_array_equal(pattern.indices, adjacency.indices)
+    assert pattern.indices.dtype == pattern.indptr.dtype == np.int32
+    # From all lines taut to all slack: the web blown up, as it is, and shrunk to a tenth.
+    for factor in (1.0, 0.0, -0.9):
+        K = pattern.matrix(net_system.stiffness(0.0, factor * net_system.net.points))
+        assert np.array_equal(K.indices, adjacency.indices) and np.array_equal(K.indptr, adjacency.indptr)
+    if law == "tension-only":
+        assert not K.data.any()
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("start, moved", [(0.5, -0.5), (0.0, 0.0)])
+def test_line_of_zero_length(law, start, moved):
+    """Two ends at one place, by displacement or from the start: no direction, hence no force, and a finite tangent."""
+    web = Web(points=[[0, 0, 0], [1, 0, 0], [1, start, 0]], lines=[[0, 1], [1, 2]], natural_length=[0.5, 0.5])
+    cable = Cable(modulus=1e5, area=1e-4, density=300.0, **LAWS[law])
+    net_system = system(web, cable, supported=np.zeros((3, 3), dtype=bool))
+    u = np.array([[0, 0, 0], [0, 0, 0], [0, moved, 0]], dtype=float)
+    assert State(net_system, 0.0, u).strain.tolist() == [1.0, -1.0]
+    force = net_system.force(0.0, u)
+    assert np.isfinite(force).all() and force[1, 0] < 0.0 and not force[2].any()
+    assert np.isfinite(net_system.energy(0.0, u))
+    for definite in (True, False):
+        K = net_system.pattern.matrix(net_system.stiffness(0.0, u, definite=definite)).toarray()
+        assert np.isfinite(K).all() and K[0, 0] > 0.0
