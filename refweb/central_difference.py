@@ -48,6 +48,7 @@ def advance(
     """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse."""
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
+    first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
     before, power, reaction = np.empty((driven.size, 7)), 0.0, np.zeros(3)
     for i in working:
         for c in range(outs[i].shape[0]):
@@ -68,7 +69,8 @@ def advance(
             flat_f[q] = 0.0
         for i in range(len(drives)):
             drives[i](now, x, v, f, drive_cells[i], drive_data[i], drive_outs[i])
-        for i in range(len(kernels)):
+        first(now, x, v, f, first_cells, first_data, lines)
+        for i in range(1, len(kernels)):
             kernels[i](now, x, v, f, cells[i], data[i], outs[i])
         for q in range(3 * rows):
             flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
@@ -92,10 +94,10 @@ def advance(
         for k in range(3):
             impulse[k] += 0.5 * h * reaction[k]
         for i in followed:
-            value = probes[i](now, x, v, f, outs[0], probe_rows[i], probe_data[i], where)
+            value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
             if signs[i] * value > signs[i] * peaks[i]:
                 where[1] = PLACE
-                probes[i](now, x, v, f, outs[0], probe_rows[i], probe_data[i], where)
+                probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
                 peaks[i], times[i], places[i], where[1] = value, now, where[0], 0
         if watch.shape[0]:
             book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, total)
@@ -172,7 +174,8 @@ def rows_ahead(
             row[at + k], row[at + 3 + k] = 0.0, impulse[k]
             for r in range(rows):
                 if inverse[r, k] > 0.0:
-                    row[at + k] += v[r, k] / inverse[r, k]
+                    row[at + k] += mass[r] * v[r, k]
+        row[at + 6] = state[2]
         state[4] = max(state[4], stored)
         drift = abs(energy - book[0] - state[3])
         state[5] = max(state[5], drift)
@@ -354,7 +357,7 @@ class CentralDifference:
         -------
         ndarray, shape (rows, columns)
             Time, value of each probe, energy of each family, kinetic energy, work, momentum of all that is free and
-            impulse of the supports (3 columns each).
+            impulse of the supports (3 columns each), last step.
 
         Raises
         ------
@@ -364,7 +367,7 @@ class CentralDifference:
             At the first number that is not finite; names node, line and time.
         """
         ends = np.atleast_1d(np.asarray(ends, dtype=float))
-        history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 8))
+        history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
         step, start = self.step_size or 0.0, run.time
         done = rows_ahead(
             ends, self.safety, step, DRIFT, run.state, run.saved, *self._masses, self._moving, *self._ends,

@@ -24,11 +24,15 @@ import functools
 import hashlib
 import os
 import pathlib
+import warnings
 
 import numba
 import numba.typed
 from numba import types
 from numba.core.typing import Signature
+
+# Kernels in typed lists are numba's first-class functions, which it calls experimental at every compilation.
+warnings.filterwarnings("ignore", message="First-class function type feature is experimental")
 
 _f, _i = types.float64, types.int32
 

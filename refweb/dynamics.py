@@ -128,7 +128,7 @@ class _Twin:
             for _, history in blocks(solver, run, *motion._times()):
                 if self._stop.is_set():
                     return
-            self._results = motion.results(run, motion.table(history, run)[-1])
+            self._results = motion.results(run, motion.table(history)[-1])
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self._failure = error
 
@@ -170,7 +170,7 @@ class Motion:
         self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
         self._own = self._hidden()
         self._solver = self.solver(scene.solve.safety)
-        self._book = np.array([_weights(system, name) for name in self.energies])
+        self._columns = self._places()
 
     @property
     def done(self):
@@ -198,19 +198,29 @@ class Motion:
             step_size=None if step is None else step / finer,
         )
 
-    def table(self, history, run):
+    def table(self, history):
         """Rows of the solver as rows of ``history.csv``."""
-        count, families = len(self.probed) + len(self._own), len(self.system.families) + 2
-        energies = history[:, 1 + count : 1 + count + families]
-        table = [history[:, 0]]
+        return history @ self._columns
+
+    def _places(self):
+        """What each column of ``history.csv`` is of the solver's columns, shape (solver columns, columns)."""
+        first = 1 + len(self.probed) + len(self._own)
+        families = len(self.system.families) + 2
+        count = first + families + 7
+        columns = [np.eye(count)[0]]
         for o in self.scene.observables:
+            column = np.zeros(count)
             if o in self.probed:
-                table.append(history[:, 1 + self.probed.index(o)])
+                column[1 + self.probed.index(o)] = 1.0
             elif o.quantity == "step_size":
-                table.append(np.full(len(history), run.state[2]))
+                column[-1] = 1.0
             else:
-                table.append(energies @ _weights(self.system, o.quantity))
-        return np.column_stack([*table, energies @ self._book.T, history[:, 1 + count + families :]])
+                column[first : first + families] = _weights(self.system, o.quantity)
+            columns.append(column)
+        for name in self.energies:
+            columns.append(np.zeros(count))
+            columns[-1][first : first + families] = _weights(self.system, name)
+        return np.column_stack([*columns, np.eye(count)[:, -7:-1]])
 
     def results(self, run, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
@@ -265,7 +275,7 @@ class Motion:
         tell(0.0)
         try:
             for first, history in blocks(solver, run, times, stops):
-                table = self.table(history, run)
+                table = self.table(history)
                 last = first + len(table) - 1
                 self.rows += table.tolist() if folder is None else [table[-1].tolist()]
                 for row in table if folder is not None else ():

@@ -98,7 +98,7 @@ class InteriorPoint:
             worst = max(
                 np.abs(force.ravel()[free]).max(initial=0.0) / scale,
                 np.abs(mismatch).max(),
-                product.max() / self.g.max() ** 2,
+                product.max() / max(self.g.max() ** 2, np.finfo(float).tiny),
             )
             if worst < tolerance:
                 break

@@ -16,8 +16,6 @@ from .compiled import _array, kernel
 
 _f, _i = types.float64, types.int64
 PROBE = _f(_f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 1), _array(_f, 2), _array(_i, 1))
-VECTOR_MATH = {"contract", "nnan", "nsz", "reassoc"}
-"""Arithmetic under which a largest value vectorizes; a number that is not finite ends a run elsewhere."""
 MAGNITUDE = 3
 """Component number of a magnitude."""
 
@@ -27,32 +25,36 @@ PLACE = 1
 
 
 @kernel()
-def _value(a, data, row, n, component):
-    if component < MAGNITUDE:
-        return a[row, component] + data[n, component]
+def _larger(a, b):
+    return b if b > a else a
+
+
+@kernel()
+def _square(a, data, row, n):
     x, y, z = a[row, 0] + data[n, 0], a[row, 1] + data[n, 1], a[row, 2] + data[n, 2]
     return x * x + y * y + z * z
 
 
-@kernel(fastmath=VECTOR_MATH)
+@kernel()
+def _value(a, data, row, n, component):
+    return a[row, component] + data[n, component] if component < MAGNITUDE else _square(a, data, row, n)
+
+
+@kernel()
 def largest_of(a, data, rows, where):
     """Largest component, or magnitude, of ``a + data`` over some rows.
 
-    ``rows`` is (component, first, last + 1), or (component, −1, −1, row, row, ...); the value is found first, in a loop
-    that vectorizes, and its place only where it is asked for.
+    ``rows`` is (component, first, last + 1), or (component, −1, −1, row, row, ...); the value is found first, and
+    its place only where it is asked for.
     """
-    component, first, last = rows[0], rows[1], rows[2]
-    best = -math.inf
-    if first >= 0 and component == MAGNITUDE:
-        for n in range(last - first):
-            x, y, z = a[first + n, 0] + data[n, 0], a[first + n, 1] + data[n, 1], a[first + n, 2] + data[n, 2]
-            best = max(best, x * x + y * y + z * z)
-    elif first >= 0:
-        for n in range(last - first):
-            best = max(best, a[first + n, component] + data[n, component])
+    component, first, last, best = rows[0], rows[1], rows[2], -math.inf
+    if first >= 0:
+        part = a[first:last]  # a view whose index starts at 0: no check for rows counted from the end
+        for n in range(part.shape[0]):
+            best = _larger(best, _value(part, data, n, n, component))
     else:
         for n in range(rows.size - 3):
-            best = max(best, _value(a, data, rows[3 + n], n, component))
+            best = _larger(best, _value(a, data, rows[3 + n], n, component))
     if where[1] == PLACE:
         where[0] = -1
         for n in range(data.shape[0]):
@@ -90,18 +92,18 @@ def reaction(t, x, v, f, lines, rows, data, where):
     return x if rows[0] == 0 else y if rows[0] == 1 else z
 
 
-@kernel(PROBE, fastmath=VECTOR_MATH)
+@kernel(PROBE)
 def line(t, x, v, f, lines, rows, data, where):
     """Largest of data × column over elements; ``rows`` is (column, first, last + 1)."""
     column, first, last = rows[0], rows[1], rows[2]
-    best = -math.inf
-    for c in range(first, last):
-        best = max(best, lines[c, column] * data[c, 0])
+    values, scales, best = lines[first:last, column], data[first:last, 0], -math.inf
+    for n in range(values.size):
+        best = _larger(best, values[n] * scales[n])
     if where[1] == PLACE:
         where[0] = first
-        for c in range(last - 1, first - 1, -1):
-            if lines[c, column] * data[c, 0] == best:
-                where[0] = c
+        for n in range(values.size - 1, -1, -1):
+            if values[n] * scales[n] == best:
+                where[0] = first + n
     return best
 
 

@@ -23,11 +23,10 @@ from .errors import SolverError
 from .factor import Factor
 from .interior import InteriorPoint
 from .laws import LINEAR, TENSION_ONLY
+from .lines import AXIAL_STIFFNESS
 
 TOLERANCE = 1e-10
-"""Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step.
-
-A slack net under loads below 1e-7 of EA ends at what rounding of its displacements makes of EA, which can be more."""
+"""Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
 
 
@@ -104,9 +103,15 @@ def check_supported(system, t):
 
 
 def force_scale(system, t, x, tension):
-    """What residuals are measured against [N]: the largest of nodal load, nodal weight and tension."""
+    """What residuals are measured against [N]: the largest of nodal load, nodal weight and tension.
+
+    At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
+    under loads below 1e-7 EA.
+    """
+    net, reach = system.net, np.abs(x).max(axis=1)
+    rounding = np.finfo(float).eps * net.line_data[:, AXIAL_STIFFNESS] / net.natural_length * reach[net.cells].max(axis=1)
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in system.families if not f.internal]
-    return max([*loads, np.abs(tension).max(initial=0.0)])
+    return max([*loads, np.abs(tension).max(initial=0.0), rounding.max() / LIMIT])
 
 
 def residual(system, force, scale):
@@ -125,8 +130,8 @@ class Newton:
         unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
         blocks = np.kron(unit, np.eye(3))[None] / net.natural_length[:, None, None]
         self.geometric = system.assemble_lines(blocks)
-        self.stiffest = (net.line_data[:, 1] / net.natural_length).max()
-        self.axial = net.line_data[:, 1].max()
+        self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
+        self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
         self.factor = Factor(system.pattern)
         self.loose = np.zeros(0, dtype=int)
         self.scale = 0.0
@@ -143,11 +148,6 @@ class Newton:
         values += shift * self.geometric
         values[self.loose] += 1e-10 * self.stiffest
         return values
-
-    def _rounding(self, x):
-        """Largest force that rounding of the displacements makes in a line [N]."""
-        net, reach = self.system.net, np.abs(x).max(axis=1)
-        return np.finfo(float).eps * (net.line_data[:, 1] / net.natural_length * reach[net.cells].max(axis=1)).max()
 
     def _step(self, t, x, r, shift, compressed, stats):
         """Newton step of the shifted tangent, and the shift that it took."""
@@ -212,17 +212,17 @@ class Newton:
         while True:
             r = force.ravel()[system.free]
             scale = max(self.scale, force_scale(system, t, x, tension))
-            error, limit = residual(system, force, scale), max(LIMIT, self._rounding(x) / scale if scale else 0.0)
+            error = residual(system, force, scale)
             if not np.isfinite(error):
                 raise SolverError(f"non-finite force at step {t:g}, node {np.argmax(~np.isfinite(force).all(axis=1))}")
-            if error <= TOLERANCE or (error <= limit and error > 0.5 * best):
+            if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
                 break
             best = min(best, error)
             if stats["nlu"] >= most:
                 node = np.linalg.norm(np.where(system.supported, 0, force), axis=1).argmax()
                 raise NotFound(
                     f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node {node}, "
-                    f"limit {limit:.3g}; raise the load in smaller load_steps, or use a larger smoothing",
+                    f"limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
                     stats,
                 )
             p, shift = self._step(t, x, r, shift, bool((tension < 0.0).any()), stats)

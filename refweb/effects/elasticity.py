@@ -25,7 +25,7 @@ from . import Family
 
 @kernel()
 def strain(x, cells, data, c, q, nodes, gradients):
-    """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c, of one division and one root."""
+    """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
     at = POINT + 4 * q
     u0 = u1 = u2 = 0.0
     for a in range(nodes):
@@ -38,11 +38,8 @@ def strain(x, cells, data, c, q, nodes, gradients):
     p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
     length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
     square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)
-    if length == 0.0:
-        return p0, p1, p2, 0.0, square / (natural * natural)
-    both = natural * (length + natural)
-    inverse = 1.0 / (both * length)
-    return p0, p1, p2, both * inverse, square * length * inverse
+    inverse = 1.0 / length if length > 0.0 else 0.0
+    return p0, p1, p2, inverse, square / (natural * (length + natural))
 
 
 @functools.cache
@@ -64,12 +61,12 @@ def kernels(law, gradients, weights):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            largest, stretched = -math.inf, 0.0
+            largest = stretched = 0.0
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
                 tension = prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
-                if tension > largest:
+                if q == 0 or tension > largest:
                     largest, stretched = tension, e
                 s = weights[q] * tension * inverse
                 for a in range(nodes):
@@ -111,13 +108,13 @@ def kernels(law, gradients, weights):
     @kernel(BOUND)
     def bound(reach, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
+            axial = data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
             for q in range(points):
                 total = 0.0
                 for a in range(nodes):
                     total += abs(flat[q * nodes + a])
                 for a in range(nodes):
-                    share = abs(flat[q * nodes + a]) * total
-                    rates[cells[c, a]] += weights[q] * share * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
+                    rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * axial
 
     @kernel(ENERGY)
     def strains(t, x, cells, data, out):
