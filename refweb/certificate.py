@@ -1,14 +1,14 @@
 """A bound on the error of a static solution, from convex duality.
 
-For the tension-only law the potential Π(x) = Σ ½ k (l − L)₊² − f·x, k = EA/L, is convex in the positions. Element forces
-s, vectors that balance the loads at every free node, give the dual value D(s) ≤ min Π. The gap is a sum over lines of
-terms that are never negative,
+For the tension-only law the potential Π(x) = Σ ½ k (l − L)₊² − f·x, k = EA/L, is convex in the positions. Element
+forces s, vectors that balance the loads at every free node, give the dual value D(s) ≤ min Π. The gap is a sum over
+lines of terms that are never negative,
 
     Π − D = Σ ½ k (l − L)₊² + |s|²/2k + L|s| − s·d,      d the line's vector, l = |d|,
 
-evaluated here without cancellation: with T = k (l − L)₊, (T − |s|)²/2k on taut lines, |s|²/2k + |s|(L − l) on slack ones,
-plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic and its gradient Lipschitz
-with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
+evaluated here without cancellation: with T = k (l − L)₊, (T − |s|)²/2k on taut lines, |s|²/2k + |s|(L − l) on slack
+ones, plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic and its gradient
+Lipschitz with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
 
 The balancing correction of the computed forces runs over taut lines first. It is kept in extended precision, where the
 platform has it, since what it leaves unbalanced enters the gap multiplied by a displacement.
@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from .factor import Factor
 from .laws import TENSION_ONLY
@@ -56,15 +57,15 @@ def applies(system):
     return system.net.law.number == TENSION_ONLY and straight_and_dead(system)
 
 
-def _resultant(cells, s, rows):
-    total = np.zeros((rows, 3), dtype=s.dtype)
-    np.add.at(total, cells[:, 0], s)
-    np.subtract.at(total, cells[:, 1], s)
-    return total
+def _incidence(cells, rows):
+    """Matrix (rows, cells) of what a force along each element does to its ends: + at the first, − at the second."""
+    ends = np.arange(0, 2 * len(cells) + 1, 2)
+    signs = np.tile(np.array([1, -1], dtype=np.longdouble), len(cells))
+    return csc_array((signs, cells.ravel(), ends), shape=(rows, len(cells)))
 
 
-def certify(system, equilibrium):
-    """The `Certificate` of an equilibrium of a system to which it `applies`."""
+def certify(system, equilibrium, factor=None):
+    """The `Certificate` of an equilibrium of a system to which it `applies`; ``factor``, if given, is used again."""
     net, x, cells = system.net, equilibrium.x, system.net.cells
     stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
     vector = (net.points[cells[:, 1]] - net.points[cells[:, 0]]) + (x[cells[:, 1]] - x[cells[:, 0]])
@@ -77,18 +78,19 @@ def certify(system, equilibrium):
     blocks = weight[:, None, None] * np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3))
     values = system.assemble_lines(blocks)
     values[system.pattern.diagonal] += 1e-14 * stiffness.max()
-    factor = Factor(system.pattern)
+    factor = factor or Factor(system.pattern)
     factor.update(values)
+    resultant = _incidence(cells, system.rows)
 
     force = (tension[:, None] * direction).astype(np.longdouble)
     correction = np.zeros_like(force)
     for _ in range(3):
-        unbalanced = outer + _resultant(cells, force + correction, system.rows)
+        unbalanced = outer + resultant @ (force + correction)
         unbalanced[system.supported] = 0.0
         y = np.zeros((system.rows, 3))
         y.ravel()[system.free] = factor.solve(unbalanced.ravel()[system.free].astype(float))
         correction += weight[:, None] * (y[cells[:, 1]] - y[cells[:, 0]])
-    unbalanced = outer + _resultant(cells, force + correction, system.rows)
+    unbalanced = outer + resultant @ (force + correction)
     unbalanced[system.supported] = 0.0
     balanced = force + correction
 

@@ -2,8 +2,8 @@
 
 Every effect writes its force once, as a kernel of the one signature `FORCE`, so that the explicit loop can call any
 mixture of them without Python, and every other solver calls the same code. ``x`` in a kernel is the *displacement* of
-each row from its reference position: with the strain formula of `refweb.effects.elasticity` a net under 1e-9 N keeps all
-its digits, which it loses when positions are the unknowns.
+each row from its reference position: with the strain formula of `refweb.effects.elasticity` a net under 1e-9 N keeps
+all its digits, which it loses when positions are the unknowns.
 
 =============  ==========================================================================================
 `FORCE`        ``(t, x, v, f, cells, data, out)``: adds forces [N] to ``f``, writes ``out`` per cell
@@ -14,8 +14,8 @@ its digits, which it loses when positions are the unknowns.
                all that can act before a row has moved by ``reach`` [m]
 =============  ==========================================================================================
 
-Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at the
-file a function stands in, and would go on using a kernel whose law, in another file, has changed.
+Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at
+the file a function stands in, and would go on using a kernel whose law, in another file, has changed.
 """
 
 from __future__ import annotations

@@ -10,7 +10,6 @@ import numpy as np
 
 from . import probes
 from .central_difference import CentralDifference, OpenBook
-from .errors import SolverError
 from .laws import SMOOTH
 from .lines import SLACKNESS
 from .observables import LINE, NODAL, Result
@@ -125,10 +124,12 @@ class _Twin:
         try:
             solver = motion.solver(self._safety, math.sqrt(2.0))
             run = solver.start()
+            last = None
             for _, history in blocks(solver, run, *motion._times()):
+                last = history[-1:]
                 if self._stop.is_set():
                     return
-            self._results = motion.results(run, motion.table(history)[-1])
+            self._results = motion.results(run, motion.table(last)[0])
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self._failure = error
 
@@ -235,7 +236,8 @@ class Motion:
                     where = o.value(State(self.system, run.time, run.x, run.v)).where
                 if o.quantity in LINE and o.reduce != "final":
                     where = int(net.line[where])
-                if o.quantity == "slack_fraction" or o.body is not None or (o.quantity == "reaction" and o.node is None):
+                summed = o.quantity == "slack_fraction" or (o.quantity == "reaction" and o.node is None)
+                if summed or o.body is not None:
                     where = None
             elif o in self.watched:
                 at = len(self.probed) + len(self._own) + self.watched.index(o)

@@ -18,6 +18,8 @@ class Factor:
         import qdldl
 
         self._matrix = self.pattern.upper_matrix(values)
+        if not self.pattern.size:
+            return
         if self._solver is None:
             self._solver = qdldl.Solver(self._matrix, upper=True)
         else:
@@ -28,6 +30,8 @@ class Factor:
 
         qdldl reports no breakdown, so the residual of the solution is looked at and, where it is large, refined away.
         """
+        if not self.pattern.size:
+            return np.zeros(0)
         upper, y, rest = self._matrix, np.zeros_like(b), b
         bound = np.abs(b).max(initial=0.0)
         for _ in range(3):
@@ -40,4 +44,6 @@ class Factor:
 
     def negative_pivots(self):
         """Number of pivots that are not positive."""
+        if not self.pattern.size:
+            return 0
         return int(np.count_nonzero(~(self._solver.factors()[1] > 0.0)))

@@ -109,11 +109,11 @@ def check_folder(folder, force=False):
         raise InputError(f"{name}: holds no run.json, so it is no result of refweb: nothing was removed")
 
 
-def clear(folder, keep="run.json"):
+def clear(folder, keep=("run.json",)):
     """Remove what a run wrote except ``keep``, and nothing else."""
     for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
         name = path.relative_to(folder).as_posix()
-        if path.is_file() and OWN.fullmatch(name) and name != keep:
+        if path.is_file() and OWN.fullmatch(name) and name not in keep:
             path.unlink()
 
 
@@ -162,8 +162,7 @@ class Folder:
         """Remove rows and frames and begin anew; ``run`` is the content of ``run.json``."""
         self.close()
         self.summary(run)
-        for path in (self.path / "frames").glob("*_??????.vtu"):
-            path.unlink()
+        clear(self.path, keep=("run.json", "scene.toml"))
         self._start()
 
     def row(self, values):

@@ -77,7 +77,8 @@ def energy_density(law, strain, modulus, slackness, smoothing):
     g0, r0 = branch(-slackness, smoothing)
     if abs(strain) < 1e-4 * max(slackness, 2.0 * smoothing):
         q = 2.0 * smoothing * smoothing / (r0 * r0 * r0)
-        return modulus * strain * strain * (0.5 * g0 / r0 + strain * (q / 6.0) * (1.0 + 0.75 * strain * slackness / (r0 * r0)))
+        rest = strain * (q / 6.0) * (1.0 + 0.75 * strain * slackness / (r0 * r0))
+        return modulus * strain * strain * (0.5 * g0 / r0 + rest)
     g, r = branch(s, smoothing)
     energy = 0.5 * (s * g + slackness * g0) - g0 * strain
     if smoothing > 0.0:

@@ -1,7 +1,7 @@
 """Nodal line elements over natural arc length.
 
-A cable is a curve x(s) ∈ R³ over its natural arc length s. scikit-fem knows such an element once the mapping's metric is
-the natural length: `NaturalLength` has DF = detDF = L and invDF = 1/L, so that ``grad(u)`` of an
+A cable is a curve x(s) ∈ R³ over its natural arc length s. scikit-fem knows such an element once the mapping's metric
+is the natural length: `NaturalLength` has DF = detDF = L and invDF = 1/L, so that ``grad(u)`` of an
 ``ElementVector(ElementLineP1(), 3)`` is du/ds, and branching, closed and prestressed nets need nothing extra. From the
 `skfem.Basis` only the dofs, the quadrature and the reference derivatives dN/dξ are kept; the compiled kernels do the
 rest. Another order is another element here.
@@ -37,7 +37,8 @@ class Net:
     line : ndarray of int32, shape (cells,)
         The web's line that each element belongs to.
     line_data : ndarray, shape (cells, columns)
-        Natural length [m], EA [N], ε0, η, their (g0, r0) of `refweb.laws`, then dX/dξ and its magnitude at each quadrature point [m].
+        Natural length [m], EA [N], ε0, η, their (g0, r0) of `refweb.laws`, then dX/dξ and its magnitude at each
+        quadrature point [m].
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
     gradients : ndarray, shape (points, nodes per cell)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .compiled import BOUND, FORCE, INDICES, MATRIX, kernel, typed_list
+from .compiled import FORCE, INDICES, MATRIX, kernel, typed_list
 from .statics import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale
 
 SAFETY = 0.9

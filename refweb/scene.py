@@ -35,9 +35,9 @@ WEBS = {
     "paper": "refweb.lattices:Paper",
     "window": "refweb.lattices:Window",
     "layers": "refweb.lattices:Layers",
-    "cable": "refweb.webs:SingleCable",
-    "inline": "refweb.webs:Inline",
-    "file": "refweb.webs:File",
+    "cable": "refweb.single_cable:SingleCable",
+    "inline": "refweb.given_webs:Inline",
+    "file": "refweb.given_webs:File",
 }
 EFFECTS = {
     "gravity": "refweb.effects.gravity:Gravity",

@@ -89,7 +89,7 @@ def unsupported(system):
 
 def check_supported(system, t):
     """Refuse a load that no support carries; return the loose parts, whose loads balance."""
-    outer = sum((system.force_of(f, t, np.zeros((system.rows, 3))) for f in system.families if not f.internal))
+    outer = sum(system.force_of(f, t, np.zeros((system.rows, 3))) for f in system.families if not f.internal)
     loose = unsupported(system)
     for rows, axis in loose:
         resultant = np.sum(outer[rows, axis]) if np.ndim(outer) else 0.0
@@ -338,6 +338,6 @@ def solve(system, load_steps, progress=None):
             state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
         _add(state.stats, spent)
         if certificate.applies(system):
-            state.certificate = certificate.certify(system, state)
+            state.certificate = certificate.certify(system, state, newton.factor)
         x = state.x
         yield state

@@ -17,7 +17,7 @@ import refweb
 LAYERS = [
     ["inputs", "errors", "compiled", "bodies"],
     ["laws", "time_tables", "probes", "webs"],
-    ["lattices", "cables"],
+    ["lattices", "single_cable", "given_webs", "cables"],
     ["lines"],
     ["pattern", "factor"],
     ["effects"],

@@ -21,8 +21,9 @@ from refweb.effects.gravity import Gravity
 from refweb.effects.load import Load
 from refweb.effects.motion import Motion
 from refweb.lattices import Paper, Window
+from refweb.single_cable import SingleCable
 from refweb.state import State
-from refweb.webs import SingleCable, Web
+from refweb.webs import Web
 
 RESIDUAL = 1e-9
 GAP = 1e-10

@@ -7,9 +7,11 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from refweb.given_webs import File, Inline
 from refweb.inputs import InputError
 from refweb.lattices import Layers, Paper, Window, closed_form, limit_ratio
-from refweb.webs import File, Inline, SingleCable, Web
+from refweb.single_cable import SingleCable
+from refweb.webs import Web
 
 MESHES = ("triangle", "square", "hexagon")
 # Section 3.2, captions of Figures 11–13: meshes, nodes, and elements (5165 where the paper prints 5156); fixed ends

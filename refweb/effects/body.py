@@ -32,7 +32,7 @@ class Body(Table):
         Whether it does not move.
     """
 
-    name: str = text()
+    name: str = text(most=80)
     shape: str = choice("sphere", default="sphere")
     radius: float = real(above=0, unit="m")
     mass: float | None = real(None, above=0, unit="kg")

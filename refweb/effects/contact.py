@@ -16,7 +16,8 @@ from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import InputError, Table, field, nearest, real
 from . import Family
 
-RADIUS, PENALTY = 6, 7  # columns of data; before them the vectors from the centre to the line's ends in the web's position
+# Columns of data; before them stand the vectors from the centre to the line's ends in the web's position.
+RADIUS, PENALTY = 6, 7
 
 
 @kernel()

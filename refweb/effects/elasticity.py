@@ -83,7 +83,8 @@ def kernels(law, gradients, weights):
             total = 0.0
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                total += weights[q] * energy_density(law, e, data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING])
+                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
+                total += weights[q] * energy_density(law, e, axial, slack, smooth)
             out[c] = total * data[c, LENGTH]
 
     @kernel(STIFFNESS)

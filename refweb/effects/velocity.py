@@ -30,5 +30,6 @@ class Velocity(Table):
             allowed = [axis for axis in range(3) if not supported[node, axis]]
             stopped = [axis for axis in range(3) if supported[node, axis] and self.value[axis] != 0.0]
             if stopped and self.node != "all":
-                raise InputError(f"node = {node} is supported along {'xyz'[stopped[0]]}: it cannot have a velocity there")
+                axis = "xyz"[stopped[0]]
+                raise InputError(f"node = {node} is supported along {axis}: it cannot have a velocity there")
             v[node, allowed] = [self.value[axis] for axis in allowed]
