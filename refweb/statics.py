@@ -108,10 +108,10 @@ def force_scale(system, t, x, tension):
     At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
     under loads below 1e-7 EA.
     """
-    net, reach = system.net, np.abs(x).max(axis=1)
-    rounding = np.finfo(float).eps * net.line_data[:, AXIAL_STIFFNESS] / net.natural_length * reach[net.cells].max(axis=1)
+    stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.net.natural_length
+    rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in system.families if not f.internal]
-    return max([*loads, np.abs(tension).max(initial=0.0), rounding.max() / LIMIT])
+    return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 
 
 def residual(system, force, scale):
@@ -221,8 +221,8 @@ class Newton:
             if stats["nlu"] >= most:
                 node = np.linalg.norm(np.where(system.supported, 0, force), axis=1).argmax()
                 raise NotFound(
-                    f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node {node}, "
-                    f"limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
+                    f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node "
+                    f"{node}, limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
                     stats,
                 )
             p, shift = self._step(t, x, r, shift, bool((tension < 0.0).any()), stats)

@@ -104,17 +104,25 @@ def stiffness(t, x, v, blocks, cells, data, definite):
 @kernel(BOUND)
 def bound(reach, x, mass, rates, cells, data):
     for c in range(cells.shape[0]):
-        if math.sqrt(closest(x, cells, data, c)[3]) - data[c, RADIUS] >= reach:
+        d, _, _, square = closest(x, cells, data, c)
+        radius, penalty, distance = data[c, RADIUS], data[c, PENALTY], math.sqrt(square)
+        if distance - radius >= reach:
             continue
         i, j, b = cells[c, 0], cells[c, 1], cells[c, 2]
-        # Scaling the body's unknown by δ makes its share of a node's row small where the body is heavy.
-        delta = 0.0
-        if mass[b] > 0.0:
-            delta = min(math.sqrt(min(mass[i], mass[j]) / mass[b]), 1.0)
-        rates[i] += data[c, PENALTY] * (1.0 + delta)
-        rates[j] += data[c, PENALTY] * (1.0 + delta)
-        if delta > 0.0:
-            rates[b] += data[c, PENALTY] * (1.0 + 1.0 / delta)
+        # Scaling the body's unknown by δ makes its share of a node's row small where the body is heavy. Nodes without
+        # mass are supported and have no row.
+        light = min(mass[i], mass[j]) if min(mass[i], mass[j]) > 0.0 else max(mass[i], mass[j])
+        delta = min(math.sqrt(light / mass[b]), 1.0) if mass[b] > 0.0 else 0.0
+        # The line turns under a push that slides along it, which adds by depth over length.
+        turn = own = 0.0
+        if square < radius * radius and d[0] * d[0] + d[1] * d[1] + d[2] * d[2] > 0.0:
+            length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+            turn = (radius - distance) / length
+            own = 2.0 * penalty * turn * (1.0 + distance / length)
+        own += penalty * (1.0 + delta) * (1.0 + turn)
+        rates[i] += own
+        rates[j] += own
+        rates[b] += penalty * (1.0 + turn) * (1.0 + 1.0 / delta if delta > 0.0 else 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
