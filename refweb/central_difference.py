@@ -22,6 +22,8 @@ from .errors import SolverError
 from .inputs import InputError
 from .probes import INTEGERS, PLACE, PROBE
 
+MOST = 1e12
+"""Largest number of steps of a history row."""
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
 
@@ -50,9 +52,10 @@ def advance(
     rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
     first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
     before, power, reaction = np.empty((driven.size, 7)), 0.0, np.zeros(3)
+    unused = np.zeros((rows if working.size else 0, 3))
     for i in working:
-        for c in range(outs[i].shape[0]):
-            power += outs[i][c, 0]
+        kernels[i](t, x, v, unused, cells[i], data[i], outs[i])
+        power += outs[i][:, 0].sum()
     for s in range(held.size):
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
@@ -76,9 +79,9 @@ def advance(
             flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
         if working.size:
             gained = 0.0
-            for i in working:
-                for c in range(outs[i].shape[0]):
-                    gained += outs[i][c, 0]
+            for i in working:  # the power at the full step: the forces above see the velocity at its middle
+                kernels[i](now, x, v, unused, cells[i], data[i], outs[i])
+                gained += outs[i][:, 0].sum()
             book[0] += 0.5 * h * (power + gained)
             power = gained
         for d in range(driven.size):
@@ -130,7 +133,7 @@ def rows_ahead(
 
     ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
     done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
-    x, v and f at the row before.
+    x, v and f at the row before. Returns −1 where a row takes too many steps.
     """
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
@@ -140,14 +143,19 @@ def rows_ahead(
         interval = ends[n] - state[0]
         if interval > 0.0:
             back[0], back[1], back[2] = x, v, f
-            fastest = 0.0
+            speed = push = 0.0
             for r in range(rows):
-                fastest = max(fastest, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+                speed = max(speed, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+                a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
+                push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
             if step_size > 0.0:
                 steps = interval / step_size
             else:
-                reach = 4.0 * interval * math.sqrt(fastest)
+                reach = 4.0 * interval * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))
                 steps = interval / (safety * step_bound(reach, x, mass, free, rates, bounds, cells, data))
+            if steps > MOST:
+                state[2] = interval / steps
+                return -1
             count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
             h = interval / count
             advance(
@@ -374,6 +382,8 @@ class CentralDifference:
             *self._forces, self._seen, *self._energies, self._bounds, *self._drives, *self._peaks(run),
             self._watch, history,
         )  # fmt: skip
+        if done < 0:
+            raise SolverError(f"a step of {run.state[2]:.3g} s at t = {run.time:.6g} s is more than {MOST:g} steps to a row")
         if done < len(ends):
             before = ends[done - 1] if done else start
             if not np.isfinite(history[done]).all():
@@ -395,24 +405,30 @@ class CentralDifference:
             wrong = ~np.isfinite(x + v + f).all(axis=1)
             if wrong.any():
                 row = int(np.flatnonzero(wrong)[0])
-                nodes = len(net.web.points)
-                name = f"node {row}" if row < nodes else f'body "{net.bodies[row - nodes].name}"'
+                name = self._row_name(row)
                 lines = net.line[(net.cells == row).any(axis=1)]
                 name += f", line {lines[0]}," if len(lines) else ""
                 raise SolverError(f"number not finite at {name} t = {before + step * h:.6g} s: use a smaller safety")
         raise SolverError(f"energy not finite at t = {run.time:.6g} s: use a smaller safety")
 
+    def _row_name(self, row):
+        nodes = len(self.system.net.web.points)
+        return f"node {row}" if row < nodes else f'body "{self.system.net.bodies[row - nodes].name}"'
+
     def _name_drift(self, run, before):
         """Say where energy came in: the effect and cell whose energy grew most in the last row."""
-        system, grown = self.system, (-np.inf, "", 0)
+        system, most, of, cell = self.system, -np.inf, self.system.families[0], 0
         for family in system.families:
             if family.energy is not None and family.book != "work":
                 change = system.energy_of(family, run.time, run.x) - system.energy_of(family, before, run.saved[3])
-                cell = int(change.argmax())
-                grown = max(grown, (float(change[cell]), family.name, cell))
-        _, name, cell = grown
-        line = system.net.line[cell % len(system.net.line)]
+                if change.max(initial=-np.inf) > most:
+                    most, of, cell = change.max(), family, int(change.argmax())
+        if of.cells.shape[1] > 1:
+            place = f"line {system.net.line[cell % len(system.net.line)]}"
+        else:
+            place = self._row_name(of.cells[cell, 0])
+        smaller = f"step_size than {self.step_size:g}" if self.step_size else f"safety than {self.safety:g}"
         raise OpenBook(
             f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, limit "
-            f"{DRIFT:g}: energy came in with {name} at line {line}; use a smaller safety than {self.safety:g}"
+            f"{DRIFT:g}: energy came in with {of.name} at {place}; use a smaller {smaller}"
         )

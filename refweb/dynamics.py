@@ -279,7 +279,7 @@ class Motion:
             for first, history in blocks(solver, run, times, stops):
                 table = self.table(history)
                 last = first + len(table) - 1
-                self.rows += table.tolist() if folder is None else [table[-1].tolist()]
+                self.rows = self.rows + table.tolist() if folder is None else [table[-1].tolist()]
                 for row in table if folder is not None else ():
                     folder.row(row)
                 if last in stops:

@@ -58,7 +58,7 @@ def largest_of(a, data, rows, where):
         where[0] = -1
         for n in range(data.shape[0]):
             r = first + n if first >= 0 else rows[3 + n]
-            if where[0] < 0 and _value(a, data, r, n, component) >= best * (1.0 - 1e-15):
+            if where[0] < 0 and _value(a, data, r, n, component) >= best - 1e-15 * abs(best):
                 where[0] = r
     return math.sqrt(best) if component == MAGNITUDE else best
 
