@@ -8,10 +8,10 @@ __version__ = "0.1.0"
 _HOME = {
     "run": "runner",
     "Scene": "scene",
-    "Static": "scene",
-    "Dynamic": "scene",
-    "Supports": "scene",
-    "Output": "scene",
+    "Static": "settings",
+    "Dynamic": "settings",
+    "Supports": "settings",
+    "Output": "settings",
     "Observe": "observables",
     "Solution": "solution",
     "Cable": "cables",
@@ -31,7 +31,7 @@ _HOME = {
     "Velocity": "effects.velocity",
     "Body": "effects.body",
     "Contact": "effects.contact",
-    "Accuracy": "scene",
+    "Accuracy": "settings",
     "InputError": "inputs",
     "SolverError": "errors",
 }

@@ -133,7 +133,7 @@ def rows_ahead(
 
     ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
     done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
-    x, v and f at the row before. Returns −1 where a row takes too many steps.
+    x, v and f at the row before; −1 where a row takes more than `MOST` steps.
     """
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
@@ -383,7 +383,10 @@ class CentralDifference:
             self._watch, history,
         )  # fmt: skip
         if done < 0:
-            raise SolverError(f"a step of {run.state[2]:.3g} s at t = {run.time:.6g} s is more than {MOST:g} steps to a row")
+            raise SolverError(
+                f"the step at t = {run.time:.6g} s is {run.state[2]:.3g} s, more than {MOST:g} steps to the next row: "
+                "lower the stiffness that asks for it"
+            )
         if done < len(ends):
             before = ends[done - 1] if done else start
             if not np.isfinite(history[done]).all():

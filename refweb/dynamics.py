@@ -108,7 +108,7 @@ class _Twin:
         self._stop = threading.Event()
 
     def __enter__(self):
-        self._thread, self._results, self._failure = None, None, None
+        self._thread, self._ended, self._failure = None, None, None
         if self._wanted:
             self._thread = threading.Thread(target=self._run, daemon=True)
             self._thread.start()
@@ -129,7 +129,7 @@ class _Twin:
                 last = history[-1:]
                 if self._stop.is_set():
                     return
-            self._results = motion.results(run, motion.table(last)[0])
+            self._ended = run, motion.table(last)[0]
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self._failure = error
 
@@ -137,7 +137,7 @@ class _Twin:
         """Wait for it; (results, None), or (None, why it failed), or (None, None) where it was not wanted."""
         if self._thread is not None:
             self._thread.join()
-        return self._results, self._failure
+        return self._motion.results(*self._ended) if self._ended else None, self._failure
 
 
 class Motion:
@@ -245,8 +245,6 @@ class Motion:
             results[o.name] = Result(value, None, o.unit, when, where)
         return results
 
-
-
     def follow(self, folder, tell):
         """Run; a run whose energy book is open is repeated with half the step, twice at most."""
         scene, solution, safety = self.scene, self.solution, self.scene.solve.safety
@@ -279,9 +277,12 @@ class Motion:
             for first, history in blocks(solver, run, times, stops):
                 table = self.table(history)
                 last = first + len(table) - 1
-                self.rows = self.rows + table.tolist() if folder is None else [table[-1].tolist()]
-                for row in table if folder is not None else ():
-                    folder.row(row)
+                if folder is None:
+                    self.rows += table.tolist()
+                else:
+                    self.rows = [table[-1].tolist()]
+                    for row in table:
+                        folder.row(row)
                 if last in stops:
                     self._frame(last, folder, run)
                 tell((last + 1) / len(times))
