@@ -30,7 +30,7 @@ DRIFT = 1e-2
 
 @kernel()
 def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, total):
-    """Write the energy of each family, the kinetic energy and the work to ``total``."""
+    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays."""
     count = len(energies)
     for i in range(count):
         energies[i](t, x, cells[i], data[i], energy_outs[i])
@@ -138,7 +138,7 @@ def rows_ahead(
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
     rows, where, rates = x.shape[0], np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
-    total = np.zeros(len(energies) + 2)
+    total = np.zeros(len(energies) + 3)
     for n in range(ends.size):
         interval = ends[n] - state[0]
         if interval > 0.0:
@@ -157,7 +157,7 @@ def rows_ahead(
                 state[2] = interval / steps
                 return -1
             count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
-            h = interval / count
+            h = total[-1] = interval / count
             advance(
                 count, h, state[0], x, v, f, mass, inverse, held, driven, working,
                 kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
@@ -171,8 +171,9 @@ def rows_ahead(
             row[at] = probes[i](state[0], x, v, f, outs[0], probe_rows[i], probe_data[i], where)
             at += 1
         book_energies(state[0], x, v, mass, cells, data, energies, energy_outs, book, total)
-        stored = np.abs(total[:-1]).sum()
-        energy = total[:-1].sum()
+        total[-1] = state[2]
+        stored = np.abs(total[:-2]).sum()
+        energy = total[:-2].sum()
         for i in working:
             stored -= abs(total[i])
             energy -= total[i]
@@ -183,7 +184,6 @@ def rows_ahead(
             for r in range(rows):
                 if inverse[r, k] > 0.0:
                     row[at + k] += mass[r] * v[r, k]
-        row[at + 6] = state[2]
         state[4] = max(state[4], stored)
         drift = abs(energy - book[0] - state[3])
         state[5] = max(state[5], drift)
@@ -269,7 +269,7 @@ class CentralDifference:
         What to look at, see `refweb.probes`: at every row, and with sign 1 (−1) the largest (smallest) value over all
         steps.
     watch : sequence of (weights, sign)
-        Sums of energies to follow in every step: weights of (each family, kinetic energy, work), shape (families + 2,).
+        Sums to follow in every step: weights of (energy of each family, kinetic energy, work, step size).
     safety : float
         Share of the step bound, 0 < safety ≤ 1.
     step_size : float, optional
@@ -313,7 +313,7 @@ class CentralDifference:
             typed_list(MATRIX, [np.zeros((len(d.cells), 0)) for d in drives]),
         )
         signs = np.array([float(p[-1]) for p in (*probes, *watch)])
-        self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 2)
+        self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
         self._seeing = list(probes)
         self._probes = (
             typed_list(PROBE, [p[0] for p in probes]),
@@ -346,12 +346,14 @@ class CentralDifference:
         for i, (probe, rows, data, _) in enumerate(probes):
             rows, data = np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float)
             values[i] = probe(0.0, saved[0], saved[1], saved[2], self._outs[0], rows, data, where[i])
-        total = np.zeros(len(system.families) + 2)
+        total = np.zeros(len(system.families) + 3)
         book_energies(
             0.0, saved[0], saved[1], self._masses[0], self._cells, self._data, *self._energies, np.zeros(1), total
         )
         values[len(probes) :] = self._watch @ total
-        own = np.delete(total[:-1], self._ends[2])
+        stepping = len(probes) + np.flatnonzero(self._watch[:, -1])
+        values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        own = np.delete(total[:-2], self._ends[2])
         state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
         return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3))
 
@@ -364,8 +366,8 @@ class CentralDifference:
         Returns
         -------
         ndarray, shape (rows, columns)
-            Time, value of each probe, energy of each family, kinetic energy, work, momentum of all that is free and
-            impulse of the supports (3 columns each), last step.
+            Time, value of each probe, energy of each family, kinetic energy, work, step size, momentum of all that is
+            free and impulse of the supports (3 columns each).
 
         Raises
         ------
@@ -399,7 +401,7 @@ class CentralDifference:
         system, h = self.system, run.state[2]
         net = system.net
         x, v, f = run.saved[3:].copy()
-        count, total = round((run.time - before) / h), np.zeros(len(system.families) + 2)
+        count, total = round((run.time - before) / h), np.zeros(len(system.families) + 3)
         for step in range(1, count + 1):
             advance(
                 1, h, before + (step - 1) * h, x, v, f, *self._masses, *self._ends, *self._forces, self._seen,

@@ -21,15 +21,11 @@ _VECTORS = ("momentum", "support_impulse")
 
 
 def _weights(system, quantity):
-    """Weights of (each family, kinetic energy, work) that make an energy of the book."""
-    families = [f.book for f in system.families]
-    weights = np.zeros(len(families) + 2)
-    weights[:-2] = [book != "work" if quantity == "total_energy" else book == quantity for book in families]
-    weights[-2] = quantity in ("kinetic_energy", "total_energy")
-    weights[-1] = quantity == "work"
-    if quantity == "work":
-        weights[:-2] = 0.0
-    return weights
+    """Weights of (energy of each family, kinetic energy, work, step size) that make a quantity of the whole net."""
+    total, energies = quantity == "total_energy", [f.book for f in system.families]
+    weights = [book != "work" and (total or book == quantity) for book in energies]
+    weights += [total or quantity == "kinetic_energy", quantity == "work", quantity == "step_size"]
+    return np.array(weights, dtype=float)
 
 
 def probe_of(observable, system):
@@ -162,7 +158,7 @@ class Motion:
         self.scene, self.system, self.solution = scene, system, solution
         self.rows = []
         self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
-        self.watched = [o for o in scene.observables if o.quantity in ENERGIES and o.reduce != "final"]
+        self.watched = [o for o in scene.observables if o.quantity in (*ENERGIES, "step_size") and o.reduce != "final"]
         books = {f.book for f in system.families}
         books |= {"kinetic_energy", "total_energy"} | ({"work"} if system.drives else set())
         self.energies = [name for name in ENERGIES if name in books]
@@ -206,22 +202,20 @@ class Motion:
     def _places(self):
         """What each column of ``history.csv`` is of the solver's columns, shape (solver columns, columns)."""
         first = 1 + len(self.probed) + len(self._own)
-        families = len(self.system.families) + 2
-        count = first + families + 7
+        sums = len(self.system.families) + 3
+        count = first + sums + 6
         columns = [np.eye(count)[0]]
         for o in self.scene.observables:
             column = np.zeros(count)
             if o in self.probed:
                 column[1 + self.probed.index(o)] = 1.0
-            elif o.quantity == "step_size":
-                column[-1] = 1.0
             else:
-                column[first : first + families] = _weights(self.system, o.quantity)
+                column[first : first + sums] = _weights(self.system, o.quantity)
             columns.append(column)
         for name in self.energies:
             columns.append(np.zeros(count))
-            columns[-1][first : first + families] = _weights(self.system, name)
-        return np.column_stack([*columns, np.eye(count)[:, -7:-1]])
+            columns[-1][first : first + sums] = _weights(self.system, name)
+        return np.column_stack([*columns, np.eye(count)[:, -6:]])
 
     def results(self, run, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""

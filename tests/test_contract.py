@@ -1,6 +1,7 @@
-"""What every effect keeps: forces from energies, tangents from forces, invariance of what is internal.
+"""What every effect keeps: forces from energies, tangents from forces, invariance of what is internal, a bound that bounds.
 
-Every class in `refweb.effects` that has ``on`` is found by itself; one without an example here fails.
+Every class in `refweb.effects` that has ``on``, ``extend`` or ``start`` is found by itself; one without an example here
+fails.
 """
 
 import importlib
@@ -9,10 +10,13 @@ import pkgutil
 
 import numpy as np
 import pytest
+import scipy.linalg
 from nets import LAWS, skew_net
 
 import refweb.effects
+from refweb.central_difference import CentralDifference
 from refweb.effects import Drive
+from refweb.inputs import InputError
 from refweb.system import System
 
 EXAMPLES = {
@@ -23,7 +27,15 @@ EXAMPLES = {
         dict(node=3, force=(1.0, 0.5, 2.0), factor=[(0.0, 0.0), (1.0, 2.0), (3.0, -1.0)]),
     ],
     "Motion": [dict(node=[1, 3], displacement=[(0.0, 0.0, 0.0, 0.0), (1.0, 0.1, 0.2, -0.3), (2.0, 0.0, 0.0, 1.0)])],
+    "PointMass": [dict(node=[1, 4], mass=0.7)],
+    "Velocity": [dict(node="all", value=(1.0, -2.0, 3.0))],
+    "Body": [
+        dict(name="ball", radius=0.3, mass=0.5, position=(0.6, 0.3, 0.2), velocity=(1.0, 2.0, 3.0)),
+        dict(name="wall", radius=0.4, position=(0.2, 0.9, -0.1), fixed=True),
+    ],
+    "Contact": [dict(stiffness=1e3), dict(stiffness=1e2, bodies=dict(wall=dict(stiffness=1e4)))],
 }
+ROLES = ("on", "extend", "start")
 
 
 def effect_classes():
@@ -31,20 +43,37 @@ def effect_classes():
     for module in pkgutil.iter_modules(refweb.effects.__path__):
         content = importlib.import_module(f"refweb.effects.{module.name}")
         for name, value in inspect.getmembers(content, inspect.isclass):
-            if value.__module__ == content.__name__ and hasattr(value, "on"):
+            if value.__module__ == content.__name__ and any(hasattr(value, role) for role in ROLES):
                 found[name] = value
     return found
 
 
 CLASSES = effect_classes()
-CASES = [(name, i, law) for name in CLASSES for i in range(len(EXAMPLES.get(name, [None]))) for law in LAWS]
+
+
+def cases(role):
+    """(name, number) of each example of the classes that have a role."""
+    return [(name, i) for name, c in CLASSES.items() if hasattr(c, role) for i in range(len(EXAMPLES.get(name, [0])))]
+
+
+CASES = [(*case, law) for case in cases("on") for law in LAWS]
+
+
+def example(name, i):
+    return CLASSES[name](**EXAMPLES[name][i])
 
 
 def make(name, i, law):
-    assert name in EXAMPLES, f"effect {name} has no example in the contract test"
+    """(rows' net, system of one effect); a contact has both bodies to touch, which reach 2 and 5 of the lines."""
     net = skew_net(law)
-    acting = CLASSES[name](**EXAMPLES[name][i])
-    return net, System(net, [acting], np.zeros((len(net.points), 3), dtype=bool))
+    bodies = [example("Body", 0), example("Body", 1)] if name == "Contact" else []
+    system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
+    return system.net, system
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_every_effect_has_an_example(name):
+    assert EXAMPLES.get(name), f"effect {name} has no example in the contract test"
 
 
 def state(net, seed):
@@ -65,7 +94,7 @@ def test_effect(name, i, law, seed):
     (family,) = system.families
     assert family.cells.dtype == np.int32 and len(family.cells) == len(family.data)
     x, v = state(net, seed)
-    d = state(net, seed + 100)[0]
+    d = np.where(system.supported, 0.0, state(net, seed + 100)[0])
     # Steps that cross no kink: the lines of this net are at least 1e-3 of strain from it at these states.
     steps = np.array([2e-3, 1e-3, 5e-4, 2.5e-4])
     t = 0.7
@@ -81,9 +110,9 @@ def test_effect(name, i, law, seed):
         np.testing.assert_array_equal(system.force(t, x + d, v), force)
     else:
         K = system.pattern.matrix(system.stiffness(t, x, v))
-        remainder = [
-            np.linalg.norm(system.force(t, x + h * d, v).ravel() - force.ravel() + h * (K @ d.ravel())) for h in steps
-        ]
+        forces = [system.force(t, x + h * d, v).ravel()[system.free] - force.ravel()[system.free] for h in steps]
+        product = K @ d.ravel()[system.free]
+        remainder = [np.linalg.norm(f + h * product) for h, f in zip(steps, forces, strict=True)]
         assert abs(slope(remainder, steps) - 2) < 0.1
         if family.energy is not None:
             assert abs(K - K.T).max() <= 1e-13 * abs(K).max()

@@ -386,6 +386,25 @@ def test_certificate_holds_away_from_the_equilibrium(prestrain, size):
         assert abs(energy - stored) <= found.strain_energy + own.strain_energy
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_gap_of_a_hanging_line_is_its_energy_above_the_least(seed):
+    """A line with a weight F balances in one way only: the dual value is Π* = −F²/2k exactly, and the gap is Π − Π*.
+
+    Energies count from the start at depth L, where f·x = 0. All terms are of order 1 J, with a few roundings each.
+    """
+    axial, length, weight = 100.0, 2.0, 3.0
+    points, cable = [[0, 0, 0], [0, 0, -length]], Cable(law="tension-only", modulus=1e6, area=1e-4, density=0.0)
+    net_system = joined(points, [[0, 1]], None, [0], cable, Load(node=1, force=(0.0, 0.0, -weight)))
+    x = np.zeros((2, 3))
+    x[1] = np.random.default_rng(seed).standard_normal(3)
+    force, out = net_system.forces(1.0, x)
+    found = certificate.certify(net_system, statics.Equilibrium(1.0, x, out[0][:, 0].copy(), force))
+    stretched = max(np.linalg.norm(points[1] + x[1]) - length, 0.0)
+    above = axial / length * stretched**2 / 2 + weight * x[1, 2] + weight**2 * length / axial / 2
+    assert found.gap == pytest.approx(above, rel=1e-13, abs=1e-14)
+    assert abs(out[0][0, 0] - weight) <= found.tension[0]
+
+
 # Any start, load, slackness.
 
 
