@@ -205,7 +205,7 @@ class Newton:
         system.drive(t, x)
         stats = dict(nsteps=0, nfev=1, njev=0, nlu=0)
         force, out = system.forces(t, x)
-        tension = out[0][:, 0]
+        tension = out[0][:, 0].copy()
         scale = max(self.scale, force_scale(system, t, x, tension))
         shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2) * (1e-4 if warm else 1.0)
         energy, best = system.energy(t, x), np.inf
@@ -228,7 +228,7 @@ class Newton:
             p, shift = self._step(t, x, r, shift, bool((tension < 0.0).any()), stats)
             x, energy, shift = self._search(t, x, p, r @ p, energy, shift, stats)
             force, out = system.forces(t, x)
-            tension = out[0][:, 0]
+            tension = out[0][:, 0].copy()
             stats["nsteps"] += 1
             stats["nfev"] += 1
             self.progress(f"step {t:g}, residual {error:.0e}")
@@ -236,7 +236,7 @@ class Newton:
             x, force, tension, error = self._polished(t, x, force, tension, error, scale, stats)
         stats["residual"] = float(error)
         self.scale = max(self.scale, force_scale(system, t, x, tension))
-        return Equilibrium(t, x, tension.copy(), force, stats)
+        return Equilibrium(t, x, tension, force, stats)
 
     def _polished(self, t, x, force, tension, error, scale, stats):
         """One more step with the factorization at hand, kept where it lowers the residual."""
@@ -248,7 +248,7 @@ class Newton:
             stats["nfev"] += 1
             new_error = residual(system, new_force, scale)
             if new_error < error:
-                return y, new_force, out[0][:, 0], new_error
+                return y, new_force, out[0][:, 0].copy(), new_error
         return x, force, tension, error
 
     def _search(self, t, x, p, slope, energy, shift, stats):
