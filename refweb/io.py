@@ -9,6 +9,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import tempfile
 from xml.sax.saxutils import quoteattr
 
@@ -115,6 +116,17 @@ def clear(folder, keep=("run.json",)):
         name = path.relative_to(folder).as_posix()
         if path.is_file() and OWN.fullmatch(name) and name not in keep:
             path.unlink()
+
+
+def copy(source, target):
+    """Copy what a run wrote from one folder to another, ``run.json`` last."""
+    target = pathlib.Path(target)
+    (target / "frames").mkdir(parents=True, exist_ok=True)
+    clear(target)
+    own = [p for p in source.rglob("*") if p.is_file() and OWN.fullmatch(p.relative_to(source).as_posix())]
+    for path in sorted(own, key=lambda p: p.name == "run.json"):
+        place = target / path.relative_to(source)
+        write_atomically(place, lambda name, path=path: shutil.copyfile(path, name))
 
 
 def number(value):

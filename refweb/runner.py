@@ -71,7 +71,10 @@ def run(scene, out=None, force=False, progress=None, announce=None):
         solution.status, solution.message = "failed", f"{type(error).__name__}: {error}"
         raise
     finally:
-        solution.history = as_history([c.rsplit(" [", 1)[0] for c in solution.columns], follower.rows)
+        if folder is None or scene.solve.kind == "static":
+            solution.table = as_history(solution.columns, follower.rows)
+        else:
+            solution.path = folder.path.absolute()
         solution.cost = _cost(system, solution, started)
         solution.warnings += follower.remarks()
         if folder is not None:

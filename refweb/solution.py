@@ -31,8 +31,6 @@ class Solution:
         What was solved.
     state : refweb.state.State
         The last state.
-    history : dict of str to ndarray
-        Columns of the history by name: ``step`` (statics), every observable, energies [J]; one entry per row.
     columns : list of str
         The same names with units, as ``history.csv`` heads them.
     steps : list of dict
@@ -43,6 +41,10 @@ class Solution:
         How it ended; ``message`` says why.
     warnings : list of str
         What a reader of the results has to know.
+    table : dict of str to ndarray, optional
+        The history, where it is held in memory.
+    path : pathlib.Path, optional
+        The result folder that a run wrote while it went.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
     frames : list of (int, refweb.state.State)
@@ -51,7 +53,8 @@ class Solution:
 
     scene: object
     state: object = None
-    history: dict = field(default_factory=dict)
+    table: dict | None = None
+    path: object = None
     columns: list = field(default_factory=list)
     steps: list = field(default_factory=list)
     solver: dict = field(default_factory=SOLVER.copy)
@@ -68,6 +71,19 @@ class Solution:
     def results(self):
         """Results by name, each a `refweb.observables.Result`; of the last load step."""
         return Names(self.steps[-1]["results"] if self.steps else self.reduced)
+
+    @property
+    def history(self):
+        """Columns of the history by name, a dict of arrays with one entry per row.
+
+        First ``time`` [s], in statics ``step``, then every observable and the energies [J], in dynamics the momentum of
+        all that is free and the impulse of the supports [N s] as well. A dynamic run that writes a folder holds none of
+        it in memory: it is read from there.
+        """
+        if self.table is not None:
+            return self.table
+        rows = np.loadtxt(self.path / "history.csv", delimiter=",", skiprows=1, ndmin=2)
+        return as_history(self.columns, rows)
 
     @property
     def positions(self):
@@ -130,9 +146,12 @@ class Solution:
         InputError
             Where the folder is not empty or cannot be written.
         """
-        from .io import Folder, check_folder
+        from .io import Folder, check_folder, copy
 
         check_folder(folder, force)
+        if self.table is None:
+            copy(self.path, folder)
+            return
         out = Folder(folder, self.scene, self.columns, {**self.summary(), "status": "running"})
         for row in zip(*self.history.values(), strict=True):
             out.row(row)
@@ -142,7 +161,8 @@ class Solution:
         out.summary(self.summary())
 
 
-def as_history(names, rows):
-    """Rows of numbers as a dict of columns."""
+def as_history(columns, rows):
+    """Rows of numbers as a dict by name; ``columns`` are names with units."""
+    names = [column.rsplit(" [", 1)[0] for column in columns]
     table = np.array(rows, dtype=float).reshape(len(rows), len(names))
     return Names(zip(names, table.T, strict=True))

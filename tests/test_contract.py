@@ -1,4 +1,4 @@
-"""What every effect keeps: forces from energies, tangents from forces, invariance of what is internal, a bound that bounds.
+"""What every effect keeps: forces from energies, tangents from forces, invariance of what is internal, and the bound.
 
 Every class in `refweb.effects` that has ``on``, ``extend`` or ``start`` is found by itself; one without an example here
 fails.
@@ -7,12 +7,15 @@ fails.
 import importlib
 import inspect
 import pkgutil
+from dataclasses import replace
 
+import nets
 import numpy as np
 import pytest
 import scipy.linalg
 from nets import LAWS, skew_net
 
+import refweb
 import refweb.effects
 from refweb.central_difference import CentralDifference
 from refweb.effects import Drive
@@ -64,7 +67,7 @@ def example(name, i):
 
 
 def make(name, i, law):
-    """(rows' net, system of one effect); a contact has both bodies to touch, which reach 2 and 5 of the lines."""
+    """(net, system of one effect); a contact has two bodies to touch, with ends of lines and with their middles."""
     net = skew_net(law)
     bodies = [example("Body", 0), example("Body", 1)] if name == "Contact" else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
@@ -128,6 +131,106 @@ def test_effect(name, i, law, seed):
         turn *= np.linalg.det(turn)
         moved = position @ turn.T + [3.0, -2.0, 1.0] - net.points
         np.testing.assert_allclose(system.force(t, moved, v @ turn.T), force @ turn.T, atol=1e-12 * size)
+
+
+@pytest.mark.parametrize("name, i", cases("extend"))
+def test_extension(name, i):
+    """Rows and mass are added, what was there stays, and the given net is left alone."""
+    net = skew_net()
+    before = net.points.copy(), net.mass.copy()
+    effect = example(name, i)
+    longer = effect.extend(net)
+    rows = len(net.points)
+    np.testing.assert_array_equal(net.points, before[0])
+    np.testing.assert_array_equal(net.mass, before[1])
+    np.testing.assert_array_equal(longer.points[:rows], net.points)
+    assert (longer.mass[:rows] >= net.mass).all() and len(longer.mass) == len(longer.points) >= rows
+    assert longer.web is net.web and longer.cells is net.cells and longer.line_data is net.line_data
+    added = getattr(effect, "mass", 0.0) or 0.0
+    times = len(effect.node) if hasattr(effect, "node") else 1
+    np.testing.assert_allclose(longer.mass.sum() - net.mass.sum(), times * added, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name, i", cases("start"))
+def test_start(name, i):
+    """Velocities are written to what is free, and to nothing else."""
+    net, effect = skew_net(), example(name, i)
+    supported = np.random.default_rng(i).random(net.points.shape) < 0.5
+    v = np.full_like(net.points, np.nan)
+    effect.start(net, supported, v)
+    assert np.isnan(v[supported]).all() and np.isfinite(v[~supported]).all()
+
+
+def test_a_body_is_a_row():
+    ball = example("Body", 0)
+    net = ball.extend(skew_net())
+    (body,) = net.bodies
+    assert (body.name, body.row, body.radius, body.velocity) == ("ball", 6, ball.radius, ball.velocity)
+    assert tuple(net.points[6]) == ball.position and net.mass[6] == ball.mass
+    system = System(net, [example("Body", 1)], np.zeros((6, 3), dtype=bool))
+    assert system.supported[7].all() and not system.supported[:7].any()
+    np.testing.assert_array_equal(system.initial_velocity(), [[0.0] * 3] * 6 + [list(ball.velocity), [0.0] * 3])
+
+
+def test_point_masses_add_up():
+    mass = CLASSES["PointMass"]
+    net = mass(node=4, mass=0.25).extend(mass(node=[4, 1], mass=0.5).extend(skew_net()))
+    np.testing.assert_allclose(net.mass - skew_net().mass, [0, 0.5, 0, 0, 0.75, 0], atol=1e-15)
+
+
+def test_contact_is_per_body():
+    """The table of a body replaces the stiffness for that body alone."""
+    (family,) = make("Contact", 1, "linear")[1].families
+    assert len(family.cells) == 18 and set(family.data[:9, 7]) == {1e2} and set(family.data[9:, 7]) == {1e4}
+    with pytest.raises(InputError, match='bodies."walls" is no body, did you mean "wall"'):
+        CLASSES["Contact"](stiffness=1.0, bodies=dict(walls=dict(stiffness=1.0))).on(make("Contact", 0, "linear")[0])
+
+
+def largest_frequency(system, x):
+    """Of M⁻¹K over all that is free [1/s²]."""
+    K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+    M = np.diag(np.repeat(system.net.mass, 3)[system.free])
+    return scipy.linalg.eigvalsh(K, M)[-1]
+
+
+@pytest.mark.parametrize("effects", [["Elasticity"], ["Contact"], ["Elasticity", "Contact"]])
+@pytest.mark.parametrize("mass", [1e-6, 1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("law", LAWS)
+def test_bound_bounds(effects, mass, law):
+    """2/ω of the tangent is never below it: bodies light and heavy, deep touches, supports without mass."""
+    bodies = [CLASSES["Body"](**{**EXAMPLES["Body"][0], "mass": mass}), example("Body", 1)]
+    acting = [*bodies, *(example(name, 0) for name in effects)]
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        supported = rng.random(6) < 0.4
+        net = replace(skew_net(law), mass=np.where(supported, 0.0, 10.0 ** rng.uniform(-3, 0, 6)))
+        system = System(net, acting, np.repeat(supported[:, None], 3, axis=1))
+        x = state(system.net, seed)[0]
+        limit = CentralDifference(system).bound(x, reach=0.0)
+        assert limit <= 2.0 / np.sqrt(max(largest_frequency(system, x), 0.0) or 1e-300) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_bound_of_a_uniform_cable_is_the_time_of_sound(law):
+    """L/c of one element, whatever the strain."""
+    web = refweb.SingleCable(start=(0, 0, 0), end=(2, 0, 0), elements=20).web()
+    cable = refweb.Cable(modulus=7e7, area=1e-4, density=200.0, prestrain=0.1, **LAWS[law])
+    length, sound = 0.1 / 1.1, np.sqrt(7e7 / 200.0)
+    bound = CentralDifference(nets.system(web, cable)).bound()
+    np.testing.assert_allclose(bound, length / sound, rtol=1e-14)
+
+
+def test_bound_sees_only_bodies_within_reach():
+    """A wall 0.5 m above a line that is 1 m long does not count before something comes that far."""
+    web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=2).web()
+    cable = refweb.Cable(law="linear", modulus=1e3, area=1e-4, density=100.0)
+    wall = CLASSES["Body"](name="wall", radius=0.1, position=(0.5, 0.0, 0.6), fixed=True)
+    system = nets.system(web, cable, [wall, CLASSES["Contact"](stiffness=1e6)])
+    far, near = (CentralDifference(system).bound(reach=reach) for reach in (0.49, 0.51))
+    mass = 100.0 * 1e-4 * 0.5
+    np.testing.assert_allclose(far, 2.0 / np.sqrt(4 * 1e3 * 1e-4 / 0.5 / mass), rtol=1e-14)
+    # Both lines may push on the node between them with all of the penalty.
+    np.testing.assert_allclose(near, 2.0 / np.sqrt((4 * 1e3 * 1e-4 / 0.5 + 2e6) / mass), rtol=1e-14)
 
 
 def drive(net, system):

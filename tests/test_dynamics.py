@@ -1,0 +1,734 @@
+"""Explicit dynamics: order, what is conserved, the book of work, observables, rows and files, refusals."""
+
+import copy
+import csv
+import json
+import re
+import threading
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import meshio
+import nets
+import numpy as np
+import pytest
+from scipy.integrate import DOP853
+
+import refweb
+from refweb import central_difference, dynamics
+from refweb.__main__ import main
+from refweb.central_difference import CentralDifference, OpenBook
+from refweb.state import State
+
+MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
+SOUND = np.sqrt(MODULUS / DENSITY)
+ROUND_OFF = 1e-12
+"""Of sums over a thousand steps: each rounds to 1e-16, and a thousand of them, all of one sign, make 1e-13."""
+
+
+def cable(**changes):
+    return refweb.Cable(**{**dict(law="tension-only", modulus=MODULUS, area=AREA, density=DENSITY), **changes})
+
+
+def window(mesh="square", side=0.2, size=4):
+    return refweb.Window(mesh=mesh, rows=size, columns=size, side=side)
+
+
+def taut_system(effects=(), law="tension-only"):
+    """A web whose lines are strained by 5 % and stay taut, away from every kink."""
+    return nets.system(window().web(), cable(prestrain=0.05, law=law), effects, quasi_static=False)
+
+
+def free_system(mesh="hexagon", effects=(), **changes):
+    """A web without supports."""
+    web = window(mesh).web()
+    return nets.system(web, cable(**changes), effects, False, np.zeros((len(web.points), 3), dtype=bool))
+
+
+def bump(system):
+    """Velocities of a smooth hit [m/s]."""
+    x, y, _ = system.net.points.T / 0.4
+    shape = np.where(system.supported[:, 2], 0.0, np.exp(-3.0 * (x**2 + y**2)))
+    return shape[:, None] * [2.0, -1.0, 5.0]
+
+
+def exact(system, v, end):
+    """Displacement and velocity at a time, by an explicit method of order 8 at a tolerance of 1e-12."""
+    free, mass = system.free, np.repeat(system.net.mass, 3)[system.free]
+
+    def rate(t, y):
+        x = np.zeros((system.rows, 3))
+        x.ravel()[free] = y[: len(free)]
+        return np.concatenate([y[len(free) :], system.force(t, x).ravel()[free] / mass])
+
+    method = DOP853(rate, 0.0, np.concatenate([np.zeros(len(free)), v.ravel()[free]]), end, rtol=1e-12, atol=1e-13)
+    while method.status == "running":
+        method.step()
+    return method.y[: len(free)], method.y[len(free) :]
+
+
+def slope(errors, steps):
+    return np.polyfit(np.log(steps), np.log(errors), 1)[0]
+
+
+def run_at(system, safety, ends, v=None, **options):
+    solver = CentralDifference(system, safety=safety, **options)
+    run = solver.start(v=v)
+    return run, solver.rows(run, ends)
+
+
+SAFETIES = (0.2, 0.1, 0.05, 0.025)
+
+
+@pytest.mark.parametrize("law", ["tension-only", "linear"])
+def test_order_two(law):
+    """Position and velocity converge with the square of the step; a fit over a factor of 8 in step has it to 2 %."""
+    system, end = taut_system(law=law), 0.01
+    v = bump(system)
+    x_end, v_end = exact(system, v, end)
+    errors = []
+    for safety in SAFETIES:
+        run, _ = run_at(system, safety, [end], v)
+        free = system.free
+        assert State(system, end, run.x).tension.min() > 0.0
+        error = np.abs(run.x.ravel()[free] - x_end).max(), np.abs(run.v.ravel()[free] - v_end).max()
+        errors.append([run.nsteps, *error])
+    nsteps, position, velocity = np.array(errors).T
+    # The next term of the error is (ωh)² ≤ (2 · 0.2)² of this one in the coarsest step and tilts the fit by half of it.
+    assert abs(slope(position, 1.0 / nsteps) - 2.0) < 0.1
+    assert abs(slope(velocity, 1.0 / nsteps) - 2.0) < 0.1
+
+
+def test_drift_is_of_second_order():
+    system, ends = taut_system(), np.linspace(0.0, 0.02, 201)
+    runs = [run_at(system, safety, ends, bump(system))[0] for safety in SAFETIES]
+    drift, nsteps = np.array([[run.drift, run.nsteps] for run in runs]).T
+    assert drift[-1] < 1e-5 and abs(slope(drift, 1.0 / nsteps) - 2.0) < 0.1
+
+
+def test_time_reversal():
+    """The method is its own inverse: with the velocities turned it goes back to where it started."""
+    system, end, h = taut_system(), 0.02, 0.02 / 200
+    solver = CentralDifference(system, step_size=h * (1 + 1e-12))
+    run = solver.start(v=bump(system))
+    solver.rows(run, [end])
+    back = solver.start(run.x, -run.v)
+    solver.rows(back, [end])
+    assert run.nsteps == back.nsteps == 200 and np.abs(run.x).max() > 1e-3
+    np.testing.assert_allclose(back.x, 0.0, atol=ROUND_OFF * np.abs(run.x).max())
+    np.testing.assert_allclose(back.v, -bump(system), atol=ROUND_OFF * np.abs(bump(system)).max())
+
+
+@pytest.mark.parametrize("mesh", ["triangle", "square", "hexagon"])
+def test_momentum_and_angular_momentum_of_a_free_web(mesh):
+    """A web that drifts, spins and is stretched: lines go slack and taut, and neither changes."""
+    system = free_system(mesh)
+    points, mass = system.net.points, system.net.mass[:, None]
+    solver = CentralDifference(system, safety=0.1)
+    v = np.cross([1.0, -2.0, 20.0], 1.05 * points) + [0.3, -0.2, 0.5]
+    run = solver.start(0.05 * points, v)
+    position, lines = points + run.x, np.abs(run.saved[2]).max()
+    momentum, turning = (mass * v).sum(axis=0), np.cross(position, mass * v).sum(axis=0)
+    for end in np.linspace(0.01, 0.1, 10):
+        solver.rows(run, [end])
+        parts = mass * run.v
+        np.testing.assert_allclose(parts.sum(axis=0), momentum, atol=ROUND_OFF * np.abs(mass * v).sum())
+        parts = np.cross(points + run.x, parts)
+        np.testing.assert_allclose(parts.sum(axis=0), turning, atol=ROUND_OFF * np.abs(parts).sum())
+    assert run.nsteps > 500 and lines > 1.0 and State(system, run.time, run.x).slack.any()
+
+
+def test_free_fall():
+    """A web without tension falls by ½gt², exactly as the method integrates a parabola, and keeps its energy."""
+    gravity = np.array([0.5, 0.0, -9.81])
+    system = free_system("square", [refweb.Gravity(acceleration=gravity)])
+    run, rows = run_at(system, 0.5, np.linspace(0.0, 0.1, 11))
+    np.testing.assert_allclose(run.x, np.tile(0.5 * gravity * 0.1**2, (system.rows, 1)), rtol=0, atol=1e-12 * 0.05)
+    np.testing.assert_allclose(run.v, np.tile(gravity * 0.1, (system.rows, 1)), rtol=0, atol=1e-12)
+    kinetic = 0.5 * system.net.mass.sum() * (gravity @ gravity) * 0.1**2
+    np.testing.assert_allclose(rows[-1, 3], kinetic, rtol=1e-12)
+    np.testing.assert_allclose(rows[:, 1:4].sum(axis=1), 0.0, atol=1e-12 * kinetic)
+    assert run.drift < 1e-12
+
+
+def slack_pair(effects):
+    """Two nodes of 2 kg on a massless line so slack that it never acts."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], natural_length=100.0).web()
+    effects = [refweb.PointMass(node="all", mass=2.0), *effects]
+    return nets.system(web, cable(density=0.0), effects, False, np.zeros((2, 3), dtype=bool))
+
+
+def test_work_of_a_load():
+    """A constant force F has done F²t²/2m, a force growing as t/T F²t⁴/8mT², by trapezia to the square of the step."""
+    force, end = np.array([1.0, 2.0, -2.0]), 0.5
+    run, _ = run_at(slack_pair([refweb.Load(node=1, force=force)]), 0.5, [0.25, end])
+    np.testing.assert_allclose(run.work[0], 9.0 * end**2 / 4.0, rtol=1e-12)
+    np.testing.assert_allclose(run.x[1], 0.5 * force / 2.0 * end**2, rtol=1e-12)
+    system = slack_pair([refweb.Load(node=1, force=force, factor=[(0.0, 0.0), (2.0, 1.0)])])
+    errors, counts = [], (20, 40, 80)
+    for count in counts:
+        run, _ = run_at(system, 0.5, [end], step_size=end / count)
+        assert run.nsteps == count
+        errors.append(abs(run.work[0] - 9.0 * end**4 / (8 * 2.0 * 2.0**2)))
+    assert abs(slope(errors, 1.0 / np.array(counts)) - 2.0) < 0.02
+
+
+MOTION = [(0.0, 0.0, 0.0, 0.0), (0.0051, 0.0, 0.0, 0.01), (0.0113, 0.002, 0.0, -0.01)]
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        refweb.Motion(node=0, displacement=MOTION),
+        refweb.Load(node="centre", force=(1.0, 2.0, 30.0), factor=[(0.0, 0.0), (0.0051, 1.0), (0.0113, -1.0)]),
+    ],
+)
+def test_work_closes_the_book_to_second_order(effect):
+    """Also where the prescribed velocity jumps in the middle of a step, by which the book errs once by O(h²)."""
+    system, ends = taut_system([effect]), np.linspace(0.0, 0.02, 101)
+    runs = [run_at(system, safety, ends)[0] for safety in SAFETIES]
+    work, drift, nsteps = np.array([[run.work[0], run.drift, run.nsteps] for run in runs]).T
+    assert abs(work).min() > 1e-3 and drift[0] < 1e-5 and abs(slope(drift, 1.0 / nsteps) - 2.0) < 0.1
+
+
+def test_prescribed_motion_is_followed():
+    system = taut_system([refweb.Motion(node=0, displacement=MOTION)])
+    solver = CentralDifference(system)
+    run = solver.start()
+    table = np.array(MOTION)
+    for end in (0.002, 0.0051, 0.008, 0.02):
+        solver.rows(run, [end])
+        expected = [np.interp(end, table[:, 0], column) for column in table.T[1:]]
+        np.testing.assert_allclose(run.x[0], expected, rtol=0, atol=1e-15)
+        assert not run.x[system.net.web.rim[1:]].any()
+    assert not run.v[0].any()
+
+
+# Rows and resumed runs
+
+
+def impact_system():
+    """Gravity, a load, prescribed motion, a ball: all that a run's state has to remember."""
+    effects = [
+        refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
+        refweb.Load(node=3, force=(0.0, 1.0, 2.0), factor=[(0.0, 0.0), (0.01, 1.0)]),
+        refweb.Motion(node=0, displacement=MOTION),
+        *ball(),
+    ]
+    return scene(effects=effects).build()
+
+
+def ball(stiffness=1e5, **changes):
+    given = dict(name="ball", radius=0.1, mass=1.0, position=(0.01, 0.02, -0.105), velocity=(0.0, 0.5, 1.0))
+    return refweb.Body(**{**given, **changes}), refweb.Contact(stiffness=stiffness)
+
+
+def observed():
+    return (
+        refweb.Observe(name="deflection", quantity="displacement", reduce="max"),
+        refweb.Observe(name="tension", quantity="tension", reduce="max"),
+        refweb.Observe(name="energy", quantity="total_energy", reduce="max"),
+    )
+
+
+def scene(duration=0.02, interval=1e-3, frames=5, error="none", **changes):
+    """A square web hit by a ball."""
+    solve = {key: changes.pop(key) for key in ("safety", "step_size") if key in changes}
+    given = dict(
+        web=window(),
+        cable=cable(),
+        effects=ball(),
+        solve=refweb.Dynamic(duration=duration, **solve),
+        output=refweb.Output(interval=interval, frames=frames),
+        accuracy=refweb.Accuracy(error=error),
+        observe=observed(),
+    )
+    return refweb.Scene(**{**given, **changes})
+
+
+def everything(run):
+    return [run.state, run.saved[:3], run.peaks, run.times, run.places, run.work, run.impulse]
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """(solver, times, run, rows) of one undisturbed run."""
+    solver, times = full_solver(), np.linspace(0.0, 0.02, 21)
+    run = solver.start()
+    return times, run, solver.rows(run, times)
+
+
+def full_solver():
+    system = impact_system()
+    motion = dynamics.Motion(scene(), system, refweb.Solution(scene()))
+    return motion.solver(0.5)
+
+
+@pytest.mark.parametrize("sizes", [[1] * 21, [2, 3, 5, 11], [20, 1]])
+def test_blocks_of_rows_do_not_matter(whole, sizes):
+    """One after another, or many in one call: the same history bit for bit."""
+    times, run, rows = whole
+    solver = full_solver()
+    other = solver.start()
+    parts = [solver.rows(other, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
+    np.testing.assert_array_equal(np.vstack(parts), rows)
+    for a, b in zip(everything(run), everything(other), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_a_run_is_its_whole_state(whole):
+    """A copy goes on as the run itself does, in a solver of its own and beside another run in the same solver."""
+    times, run, rows = whole
+    solver = full_solver()
+    first = solver.start()
+    solver.rows(first, times[:9])
+    second, third = copy.deepcopy(first), copy.deepcopy(first)
+    parts = []
+    for end in times[9:]:
+        solver.rows(first, [end])
+        parts.append(solver.rows(second, [end]))
+        solver.rows(solver.start(), [5e-4])
+    np.testing.assert_array_equal(np.vstack(parts), rows[9:])
+    np.testing.assert_array_equal(full_solver().rows(third, times[9:]), rows[9:])
+    for other in (first, second, third):
+        for a, b in zip(everything(run), everything(other), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("duration, interval, last", [(0.01, 3e-3, 4), (0.01, 0.01, 1), (0.7, 0.1, 7)])
+def test_rows_are_multiples_of_the_interval_and_the_end(duration, interval, last):
+    times = dynamics.row_times(scene(duration, interval))
+    np.testing.assert_allclose(times[:-1], interval * np.arange(last), rtol=1e-15)
+    assert times[-1] == duration and len(times) == last + 1
+
+
+# Observables
+
+
+def choices(system):
+    """Observables of every quantity and selection that the scene has, without their reduction."""
+    nodal = [dict(node="centre"), dict(node=[1, 5, 9]), dict(), dict(body="ball")]
+    for quantity in ("displacement", "position", "velocity", "reaction"):
+        for selection in nodal:
+            yield from (dict(quantity=quantity, component=k, **selection) for k in (None, "x", "y", "z"))
+    for quantity in ("tension", "stress", "strain"):
+        yield from (dict(quantity=quantity, **selection) for selection in (dict(), dict(line=7)))
+    for quantity in ("kinetic", "strain", "potential", "contact", "total"):
+        yield dict(quantity=f"{quantity}_energy")
+    yield from (dict(quantity="work"), dict(quantity="slack_fraction"), dict(quantity="step_size"))
+
+
+@pytest.fixture(scope="module")
+def followed():
+    """(observables, run with a row and a frame at every step, the same run with a row every 30 steps)."""
+    system = impact_system()
+    observe = [
+        refweb.Observe(name=f"{i} {reduce}", reduce=reduce, **given)
+        for i, given in enumerate(choices(system))
+        for reduce in ("max", "min", "final")
+    ]
+    effects = [e.effect if hasattr(e, "effect") else e for e in system.effects][1:]
+    h = 1e-4
+    fine = scene(interval=h, frames=1, step_size=h, effects=effects, observe=observe)
+    return observe, refweb.run(fine), refweb.run(fine.replace(output=refweb.Output(interval=30 * h)))
+
+
+def recomputed(observe, state):
+    """The value of an observable from positions and velocities of a state, or None."""
+    net, web = state.system.net, state.system.net.web
+    if observe.quantity in ("displacement", "position", "velocity"):
+        values = {"displacement": state.x, "position": net.points + state.x, "velocity": state.v}[observe.quantity]
+        if observe.body is not None:
+            values = values[len(web.points) :]
+        else:
+            values = values[: len(web.points)] if observe.node is None else values[web.find(observe.node)]
+        values = np.linalg.norm(values, axis=1) if observe.component is None else values[:, observe.component]
+        return values.max()
+    if observe.quantity in ("tension", "stress", "strain"):
+        ends = (net.points + state.x)[web.lines]
+        strain = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / web.natural_length - 1.0
+        values = {"strain": strain, "stress": MODULUS * np.maximum(strain, 0.0)}.get(observe.quantity)
+        values = MODULUS * AREA * np.maximum(strain, 0.0) if values is None else values
+        return values.max() if observe.line is None else values[observe.line]
+    if observe.quantity == "kinetic_energy":
+        return 0.5 * np.sum(net.mass[:, None] * state.v**2)
+    if observe.quantity in ("work", "step_size"):
+        return None
+    if observe.quantity == "total_energy":
+        book = state.energies
+        return sum(book[f"{name}_energy"] for name in ("strain", "potential", "contact")) + 0.5 * np.sum(
+            net.mass[:, None] * state.v**2
+        )
+    return observe.value(state).value
+
+
+def test_observables_at_every_row(followed):
+    """Columns are what positions and velocities of the frames say."""
+    observe, fine, _ = followed
+    states = [state for _, state in fine.frames]
+    assert len(states) == len(fine.history["time"]) == 201
+    for o in observe[::3]:
+        values = [recomputed(o, state) for state in states]
+        if None not in values:
+            column = fine.history[o.name]
+            # A strain of 1e-3 is found here from lengths that are rounded to 1e-16: 1e-13 of itself, and as much of EA.
+            scale = {"tension": MODULUS * AREA, "stress": MODULUS, "reaction": MODULUS * AREA}.get(o.quantity, 1.0)
+            np.testing.assert_allclose(column, values, rtol=1e-9, atol=1e-13 * scale, err_msg=str(o))
+
+
+def test_reductions_see_every_step(followed):
+    """Largest and smallest of all steps, when it was, and where; the last value is that of the last row."""
+    observe, fine, coarse = followed
+    times, states = fine.history["time"], [state for _, state in fine.frames]
+    for o in observe:
+        column, result = fine.history[o.name], fine.results[o.name]
+        first = 1 if o.quantity == "step_size" else 0  # no step leads to the first row
+        pick = {"max": np.argmax, "min": np.argmin, "final": lambda a: len(a) - 1}[o.reduce](column[first:]) + first
+        assert (result.value, result.time) == (column[pick], times[pick]), o
+        single = o.quantity in ("reaction", "slack_fraction") or o.quantity.endswith("_energy")
+        if single or o.body is not None or o.quantity in ("work", "step_size"):
+            continue
+        if o.quantity in ("tension", "stress", "strain"):
+            there = replace(o, line=result.where)
+            assert o.line is None or result.where == o.line
+        else:
+            there = replace(o, node=result.where)
+            assert o.node is None or result.where in fine.state.system.net.web.find(o.node)
+        scale = {"tension": MODULUS * AREA, "stress": MODULUS}.get(o.quantity, 1.0)
+        np.testing.assert_allclose(recomputed(there, states[pick]), result.value, rtol=1e-9, atol=1e-13 * scale)
+
+
+def test_peaks_between_rows(followed):
+    """With a row every 30 steps the extremes are those of the steps, above what the rows show."""
+    observe, fine, coarse = followed
+    above = 0
+    for o in observe:
+        if o.quantity == "step_size":
+            continue
+        sign = {"max": 1.0, "min": -1.0, "final": 0.0}[o.reduce]
+        value, column = coarse.results[o.name].value, coarse.history[o.name]
+        # The steps are the same up to the rounding of times, which a smooth motion of 200 steps hardly amplifies.
+        scale = max(np.abs(fine.history[o.name]).max(), 1e-9)
+        np.testing.assert_allclose(value, fine.results[o.name].value, rtol=0, atol=1e-8 * scale, err_msg=str(o))
+        assert (sign * value >= sign * column).all()
+        above += (sign * value > sign * column).all() and sign != 0.0
+    assert above > 40
+
+
+def test_step_size_follows_contact():
+    """The step shrinks when the ball comes within reach of the web: seen by the largest and the smallest step."""
+    observe = [refweb.Observe(name=r, quantity="step_size", reduce=r) for r in ("max", "min", "final")]
+    effects = ball(1e7, position=(0.0, 0.0, -0.12), velocity=(0.0, 0.0, 1.0))
+    solution = refweb.run(scene(0.04, effects=effects, observe=observe))
+    steps = solution.history["min"][1:]
+    largest, smallest = solution.results["max"], solution.results["min"]
+    assert (largest.value, smallest.value) == (steps.max(), steps.min()) and smallest.value < 0.2 * largest.value
+    # Without contact the web allows L/c, of which half is taken, less what rows need to be met.
+    assert 0.9 * 0.5 * 0.2 / SOUND < largest.value <= 0.5 * 0.2 / SOUND
+
+
+def test_default_observables_are_peaks():
+    solution = refweb.run(scene(observe=()))
+    assert list(solution.results) == ["deflection", "max_stress", "max_tension"]
+    for name, result in solution.results.items():
+        assert result.value >= solution.history[name].max() > 0.0 and 0.0 < result.time <= 0.02
+
+
+# Errors
+
+
+def test_errors_are_twice_the_difference_to_a_run_of_half_the_error():
+    """The twin is a run at 1/√2 of the step, as one makes it by hand."""
+    with_twin, plain = refweb.run(scene(error="twin")), refweb.run(scene())
+    by_hand = refweb.run(scene(safety=0.5 / np.sqrt(2.0)))
+    for name, result in with_twin.results.items():
+        assert plain.results[name] == result._replace(error=None)
+        expected = 2.0 * abs(result.value - by_hand.results[name].value) + 4e-16 * abs(result.value)
+        assert result.error == expected > 0.0
+    for name, column in plain.history.items():
+        np.testing.assert_array_equal(with_twin.history[name], column)
+
+
+def test_errors_cover_the_truth_on_a_smooth_motion():
+    """On a taut web the ± is the distance to the limit of small steps; a run at a tenth of the step stands for it."""
+    effects = [refweb.Velocity(node="all", value=(0.0, 0.0, 1.0))]
+    observe = [refweb.Observe(name="z", quantity="displacement", node="centre", component="z")]
+    taut = dict(effects=effects, observe=observe, cable=cable(prestrain=0.05))
+    value, error = refweb.run(scene(error="twin", **taut)).results["z"][:2]
+    true = refweb.run(scene(safety=0.05, **taut)).results["z"].value
+    # The run that stands for the limit errs itself by 1 %, and the next order of the error is (ωh)² ≤ 1/4 at most.
+    assert 0.75 < error / abs(value - true) < 1.3
+
+
+def test_a_twin_that_fails_is_said(monkeypatch):
+    def rows(self, run, ends, own=CentralDifference.rows):
+        if threading.current_thread() is not threading.main_thread():
+            raise refweb.SolverError("no twin today")
+        return own(self, run, ends)
+
+    monkeypatch.setattr(CentralDifference, "rows", rows)
+    solution = refweb.run(scene(error="twin"))
+    assert all(result.error is None for result in solution.results.values())
+    assert solution.status == "solved" and any("no twin today" in text for text in solution.warnings)
+
+
+# Files
+
+
+def read_json(folder):
+    return json.loads((folder / "run.json").read_text(encoding="utf-8"))
+
+
+def read_history(folder):
+    with open(folder / "history.csv", encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    return header, np.array(rows, dtype=float)
+
+
+def listed(folder):
+    root = ElementTree.parse(folder / "web.pvd").getroot()
+    return [(float(entry.get("timestep")), entry.get("file")) for entry in root.iter("DataSet")]
+
+
+@pytest.mark.parametrize("error", ["none", "twin"])
+def test_two_runs_write_the_same_bytes(tmp_path, error):
+    for name in "ab":
+        refweb.run(scene(error=error), out=tmp_path / name)
+    assert not read_json(tmp_path / "a")["warnings"]
+    for path in sorted((tmp_path / "a").rglob("*")):
+        if path.suffix in (".csv", ".vtu", ".pvd"):
+            other = tmp_path / "b" / path.relative_to(tmp_path / "a")
+            assert path.read_bytes() == other.read_bytes(), path.name
+    results = [read_json(tmp_path / name)["results"] for name in "ab"]
+    assert results[0] == results[1] and (results[0]["tension"]["error"] is None) == (error == "none")
+
+
+def test_folder_and_memory_agree(tmp_path):
+    written, kept = refweb.run(scene(), out=tmp_path / "out"), refweb.run(scene())
+    header, rows = read_history(tmp_path / "out")
+    assert header == kept.columns == written.columns
+    np.testing.assert_array_equal(rows, np.column_stack(list(kept.history.values())))
+    assert written.results == kept.results
+    for (number, state), (time, name) in zip(kept.frames, listed(tmp_path / "out")[::2], strict=True):
+        mesh = meshio.read(tmp_path / "out" / name)
+        assert name == f"frames/web_{number:06d}.vtu" and time == state.time
+        np.testing.assert_array_equal(mesh.points, state.position[: len(mesh.points)])
+        np.testing.assert_array_equal(mesh.point_data["velocity"], state.v[: len(mesh.points)])
+
+
+def test_memory_does_not_grow_with_duration(tmp_path):
+    """What a run with a folder keeps is one state and one row, however long it lasts."""
+    for name, duration in (("short", 0.01), ("long", 0.08)):
+        solution = refweb.run(scene(duration, 1e-4, 2), out=tmp_path / name)
+        assert len(read_history(tmp_path / name)[1]) == round(duration / 1e-4) + 1
+        assert solution.frames == [] and len(solution.history["time"]) <= 1
+        assert read_json(tmp_path / name)["results"]["deflection"]["value"] == solution.results["deflection"].value
+
+
+def test_interrupted(tmp_path, monkeypatch, capsys):
+    """Ctrl-C after a few blocks: status 130, a folder marked so whose files open, no thread left behind."""
+    calls = []
+
+    def rows(self, run, ends, own=CentralDifference.rows):
+        if threading.current_thread() is threading.main_thread():
+            calls.append(len(ends))
+            if len(calls) > 8:
+                raise KeyboardInterrupt
+        return own(self, run, ends)
+
+    monkeypatch.setattr(CentralDifference, "rows", rows)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(refweb.Scene, "load", lambda source: scene(0.5, 1e-4, 3, error="twin"))
+    assert main(["run", "any.toml", "--out", "out"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    folder = tmp_path / "out"
+    summary, (_, history) = read_json(folder), read_history(folder)
+    assert summary["status"] == "interrupted" and summary["message"] == f"interrupted after t = {history[-1, 0]:.6g} s"
+    assert len(history) == sum(calls[:-1]) and (np.diff(history[:, 0]) > 0).all()
+    frames = listed(folder)
+    assert len(frames) >= 4
+    assert {name for _, name in frames} == {f"frames/{path.name}" for path in (folder / "frames").iterdir()}
+    for time, name in frames:
+        assert np.isfinite(meshio.read(folder / name).points).all() and time <= history[-1, 0]
+    assert np.load(folder / "checkpoint.npz")["time"] == frames[-1][0]
+    assert threading.active_count() == 1
+
+
+# The book of energies
+
+
+def drift_at(safety):
+    return refweb.run(scene(0.05, safety=safety)).solver["energy_drift"]
+
+
+def test_an_open_book_is_repeated_with_half_the_step(tmp_path, monkeypatch):
+    """With a limit between the drifts at half and a quarter of the bound the run that counts is the second one."""
+    drifts = drift_at(0.5), drift_at(0.25)
+    assert drifts[1] < 0.5 * drifts[0]
+    monkeypatch.setattr(central_difference, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
+    kept, written = refweb.run(scene(0.05)), refweb.run(scene(0.05, error="twin"), out=tmp_path / "out")
+    expected = refweb.run(scene(0.05, safety=0.25))
+    for solution in (kept, written):
+        assert {n: r._replace(error=None) for n, r in solution.results.items()} == expected.results
+        (warning,) = solution.warnings
+        assert "energy drift" in warning and warning.endswith("repeated with safety = 0.25")
+        assert solution.solver == expected.solver
+    header, rows = read_history(tmp_path / "out")
+    np.testing.assert_array_equal(rows, np.column_stack(list(expected.history.values())))
+    np.testing.assert_array_equal(np.column_stack(list(kept.history.values())), rows)
+    assert [number for number, _ in kept.frames] == [number for number, _ in expected.frames]
+    assert read_json(tmp_path / "out")["warnings"] == written.warnings
+    names = [name for _, name in listed(tmp_path / "out")]
+    assert len(names) == 2 * len(expected.frames)
+    assert sorted(names) == sorted(f"frames/{path.name}" for path in (tmp_path / "out" / "frames").iterdir())
+
+
+def test_a_book_that_stays_open_fails(tmp_path, monkeypatch, capsys):
+    """After the third run; what was computed is kept, and the message says with what, where and when."""
+    monkeypatch.setattr(central_difference, "DRIFT", 1e-9)
+    monkeypatch.setattr(refweb.Scene, "load", lambda source: scene(0.05, error="twin"))
+    assert main(["run", "any.toml", "--out", str(tmp_path / "out")]) == 1
+    summary = read_json(tmp_path / "out")
+    assert summary["status"] == "failed" and summary["results"] == {}
+    assert summary["message"] in capsys.readouterr().err
+    found = re.search(
+        r"energy drift \S+ of the largest energy between t = (\S+) and (\S+) s, limit 1e-09: energy came in with "
+        r"(elasticity|contact) at line \d+; use a smaller safety than 0.125",
+        summary["message"],
+    )
+    before, after = float(found[1]), float(found[2])
+    np.testing.assert_allclose(after - before, 1e-3, rtol=1e-9)
+    again = [text.rpartition("; ")[2] for text in summary["warnings"]]
+    assert again == ["repeated with safety = 0.25", "repeated with safety = 0.125"]
+    assert read_history(tmp_path / "out")[1][-1, 0] <= after
+    assert threading.active_count() == 1
+
+
+def test_a_fixed_step_is_never_halved(monkeypatch):
+    monkeypatch.setattr(central_difference, "DRIFT", 1e-9)
+    steps = []
+
+    class Noted(CentralDifference):
+        def __init__(self, *arguments, **named):
+            steps.append(named["step_size"])
+            super().__init__(*arguments, **named)
+
+    monkeypatch.setattr(dynamics, "CentralDifference", Noted)
+    with pytest.raises(OpenBook, match="use a smaller step_size than 0.0001"):
+        refweb.run(scene(step_size=1e-4))
+    assert steps == [1e-4]
+
+
+def test_the_limit_of_the_drift():
+    assert central_difference.DRIFT == 1e-2
+
+
+def test_step_above_the_bound_is_refused(tmp_path):
+    """The bound of a square web is L/c, to which contact adds: five lines' stiffnesses and that of the contact."""
+    plain = scene(effects=[refweb.Velocity(node="centre", value=(0, 0, 1))])
+    limit = 0.2 / SOUND
+    with pytest.raises(refweb.InputError, match=rf"step_size = 0\.0003\d* must be ≤ {limit:.6g} \[s\]"):
+        refweb.run(plain.replace(solve=refweb.Dynamic(duration=0.01, step_size=1.01 * limit)), out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    steps = refweb.run(plain.replace(solve=refweb.Dynamic(duration=0.01, step_size=0.99 * limit))).history
+    assert len(steps["time"]) == 11
+    with pytest.raises(refweb.InputError, match="the bound of stability"):
+        refweb.run(scene(step_size=0.99 * limit))
+
+
+def test_too_many_steps_are_refused():
+    with pytest.raises(refweb.SolverError, match="at t = 0 s is 1e-30 s, more than 1e[+]12 steps to the next row"):
+        refweb.run(scene(step_size=1e-30))
+
+
+def test_blow_up_names_node_line_and_time(monkeypatch):
+    """Above the bound a linear web grows step by step until numbers end: who is first, and when."""
+    system = taut_system(law="linear")
+    h = 1.5 * CentralDifference(system).bound()
+    monkeypatch.setattr(CentralDifference, "bound", lambda self: np.inf)
+    with pytest.raises(refweb.SolverError) as caught, np.errstate(all="ignore"):
+        run_at(system, 0.5, [1000 * h], bump(system), step_size=h * (1 + 1e-12))
+    pattern = r"number not finite at node (\d+), line (\d+), t = (\S+) s: use a smaller \S+"
+    found = re.fullmatch(pattern, str(caught.value))
+    node, line, time = int(found[1]), int(found[2]), float(found[3])
+    x, v = np.zeros((system.rows, 3)), bump(system)
+    inverse = np.where(system.supported, 0.0, 1.0 / system.net.mass[:, None])
+    f = system.force(0.0, x)
+    with np.errstate(all="ignore"):
+        for step in range(1, 1001):
+            v = v + 0.5 * h * inverse * f
+            x = x + h * v
+            f = system.force(step * h, x)
+            v = v + 0.5 * h * inverse * f
+            wrong = ~np.isfinite(x + v + f).all(axis=1)
+            if wrong.any():
+                break
+    np.testing.assert_allclose(time, step * h, rtol=1e-5)  # as many digits as the message has
+    assert wrong[node] and node in system.net.web.lines[line]
+
+
+# What is refused
+
+
+def refused(match, tmp_path, **changes):
+    with pytest.raises(refweb.InputError, match=match):
+        refweb.run(scene(**changes), out=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_massless_node(tmp_path):
+    rim = set(window().web().rim)
+    bare = min(set(range(len(window().web().points))) - rim)
+    refused(f"node {bare} has no mass, which central-difference needs", tmp_path, cable=cable(density=0.0))
+    heavy = [refweb.PointMass(node=[n for n in range(bare + 3)], mass=1.0), *ball()]
+    bare = min(set(range(bare + 3, 21)) - rim)
+    refused(f"node {bare} has no mass", tmp_path, cable=cable(density=0.0), effects=heavy)
+
+
+def test_free_body_in_statics(tmp_path):
+    static = dict(solve=refweb.Static(), output=refweb.Output(), accuracy=None)
+    refused("a free body has no place in statics; fixed = true holds it", tmp_path, **static)
+    still = [refweb.Velocity(node="all", value=(0, 0, 1))]
+    refused(r"\[\[velocity\]\] 1 a velocity has no place in statics", tmp_path, effects=still, **static)
+
+
+def test_contact_and_bodies(tmp_path):
+    one, contact = ball()
+    refused(r"\[contact\] there is no \[\[body\]\]", tmp_path, effects=[contact])
+    refused(r'\[\[body\]\] 2 name = "ball" stands twice', tmp_path, effects=[one, one, contact])
+    unknown = [refweb.Observe(name="a", quantity="velocity", body="bal")]
+    refused('body = "bal" is no body, did you mean "ball"', tmp_path, observe=unknown)
+    refused("the scene has no .*body", tmp_path, observe=unknown, effects=())
+    for name in ("web", "Web", "a/b", "", " "):
+        with pytest.raises(refweb.InputError, match="name"):
+            ball(name=name)
+    for wrong in (dict(mass=None), dict(fixed=True), dict(radius=0.0), dict(mass=-1.0)):
+        with pytest.raises(refweb.InputError, match="mass|velocity|radius"):
+            ball(**wrong)
+
+
+def test_velocity_of_a_supported_node(tmp_path):
+    rim = int(window().web().rim[0])
+    for node in (rim, [10, rim], "rim"):
+        effects = [refweb.Velocity(node=node, value=(0.0, 0.0, 1.0))]
+        refused(r"\[\[velocity\]\] 1 node = \d+ is supported along z", tmp_path, effects=effects)
+    moved = refweb.Motion(node=10, displacement=[(0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0)])
+    effects = [refweb.Velocity(node=10, value=(0.0, 0.0, 1.0)), moved]
+    refused("node = 10 is supported along z", tmp_path, effects=effects)
+    partly = [refweb.Supports(nodes=10, components=["x"])]
+    solution = refweb.run(scene(effects=[refweb.Velocity(node=10, value=(0, 0, 1))], support=partly))
+    assert solution.status == "solved" and not solution.state.x[10, 0]
+
+
+def test_all_are_those_that_are_free():
+    solution = refweb.run(scene(effects=[refweb.Velocity(node="all", value=(0.0, 0.0, 1.0))]))
+    _, start = solution.frames[0]
+    web = solution.state.system.net.web
+    np.testing.assert_array_equal(start.v[:, 2], ~np.isin(np.arange(len(web.points)), web.rim))
+
+
+def test_a_body_without_contact_passes_with_a_warning():
+    solution = refweb.run(scene(effects=ball()[:1]))
+    (warning,) = solution.warnings
+    assert "no [contact]" in warning and solution.results["deflection"].value == 0.0
+    assert "contact_energy" not in solution.history
