@@ -96,14 +96,18 @@ def _info(arguments):
 
 
 def _picture(arguments):
+    from .console import progress
     from .pictures import animate, picture
 
     if arguments.animate:
         if arguments.frame is not None:
             raise InputError(f"--frame {arguments.frame} and --animate exclude each other: leave one out")
-        print(animate(arguments.folder, field=arguments.field, out=arguments.out))
+        with progress("drawing") as tell:
+            path = animate(arguments.folder, field=arguments.field, out=arguments.out, progress=tell)
     else:
-        print(picture(arguments.folder, frame=arguments.frame, field=arguments.field, out=arguments.out))
+        with progress("drawing"):
+            path = picture(arguments.folder, frame=arguments.frame, field=arguments.field, out=arguments.out)
+    print(path)
 
 
 def main(arguments=None):

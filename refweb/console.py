@@ -143,7 +143,7 @@ def after(solution, folder):
 
 
 @contextlib.contextmanager
-def progress(delay=2.0):
+def progress(text="loading and, the first time, compiling kernels", delay=2.0):
     """A progress bar for whatever lasts over ``delay`` seconds; silent where nobody looks.
 
     Yields
@@ -160,7 +160,7 @@ def progress(delay=2.0):
         BarColumn(), TextColumn("{task.percentage:3.0f} %"), TimeElapsedColumn(), TextColumn("{task.description}"),
         console=Console(stderr=True), transient=True,
     )
-    task = bar.add_task("loading and, the first time, compiling kernels", total=1.0)
+    task = bar.add_task(text, total=1.0)
     timer = threading.Timer(delay, bar.start)
     timer.daemon = True
     timer.start()

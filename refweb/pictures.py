@@ -64,7 +64,7 @@ def picture(folder, frame=None, field=None, out=None):
     return out
 
 
-def animate(folder, field=None, out=None, fps=10.0):
+def animate(folder, field=None, out=None, fps=10.0, progress=None):
     """Draw all frames of a result folder as a GIF, with one camera and one range of colours.
 
     Parameters
@@ -75,6 +75,8 @@ def animate(folder, field=None, out=None, fps=10.0):
         A ``.gif``; default ``folder/web.gif``.
     fps : float
         Frames per second [1/s], > 0 and ≤ 50; the last one stays for a second.
+    progress : callable, optional
+        Called with a line of text and the share that is done, 0 to 1.
 
     Returns
     -------
@@ -99,6 +101,8 @@ def animate(folder, field=None, out=None, fps=10.0):
     for figure in _figures(reel, field, pins, _heading(folder), FILM_SIZE):
         page = io.BytesIO()
         figure.savefig(page, format="png")
+        if progress is not None:
+            progress("drawing frames", (len(film) + 1) / len(reel))
         film.append(Image.open(page).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE))
     duration = [round(1000 / fps)] * (len(film) - 1) + [1000]
     film[0].save(out, save_all=True, append_images=film[1:], duration=duration, loop=0)
