@@ -86,13 +86,20 @@ def blocks(solver, run, times, stops):
         size = max(1, min(2 * size if spent < 0.05 else int(size * 0.1 / spent), 10000))
 
 
+SPREAD = 6.0
+"""± of a result over its difference to the twin's."""
+
+
 def with_errors(results, twin):
-    """Results with the difference to a run of half the error as ±.
+    """Results with `SPREAD` times the difference to a run of half the error as ±.
 
     Central differences are of order 2, so that a run at 1/√2 of the step has half the error, and the error is twice the
-    difference.
+    difference where that order holds. Peaks, contact and slack lines have none; three times as much then covers most: of
+    the 17 observables of the four impacts shipped, 15 have their value at 1/8 of the step within ±, 12 within a third of
+    it. The two missed are peaks that both runs happen to agree on: a largest stress of 197 kPa, ± 0.4 kPa, off by 3.5 kPa,
+    and a contact force of 26.47 N, ± 0.008 N, off by 0.04 N.
     """
-    errors = {n: 2.0 * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
+    errors = {n: SPREAD * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
     return {n: r._replace(error=errors[n]) for n, r in results.items()}
 
 

@@ -52,12 +52,11 @@ def test_the_smooth_law_has_one_minimum(mesh):
     np.testing.assert_allclose(relaxed.tension, newton.tension, rtol=0, atol=1e-6 * newton.tension.max())
 
 
-PRESS = refweb.Gravity(acceleration=(0.0, 0.0, -981.0))
-BALL = dict(name="ball", radius=0.1, position=(0.01, 0.02, -0.13), fixed=True)
+BALL = dict(name="ball", radius=0.1, position=(0.01, 0.02, -0.06), fixed=True)
 CASES = {
     "weight": [refweb.Gravity(acceleration=(0.0, 0.3, -9.81)), LOAD],
     "moved supports": [refweb.Motion(node="rim", displacement=[(0, 0, 0, 0), (2.0, 0.02, 0.0, 0.1)]), LOAD],
-    "fixed ball": [LOAD, PRESS, refweb.Body(**BALL), refweb.Contact(stiffness=1e5)],
+    "fixed ball": [LOAD, refweb.Body(**BALL), refweb.Contact(stiffness=1e5)],
 }
 
 
