@@ -111,11 +111,11 @@ def advance(
 
 
 @kernel()
-def step_bound(reach, x, mass, free, rates, bounds, cells, data):
+def step_bound(reach, speed, x, mass, free, rates, bounds, cells, data):
     """Largest stable step [s]; infinite where nothing vibrates."""
     rates[:] = 0.0
     for i in range(len(bounds)):
-        bounds[i](reach, x, mass, rates, cells[i], data[i])
+        bounds[i](reach, speed, x, mass, rates, cells[i], data[i])
     rate = 0.0
     for r in free:
         rate = max(rate, rates[r] / mass[r])
@@ -124,7 +124,7 @@ def step_bound(reach, x, mass, free, rates, bounds, cells, data):
 
 @kernel()
 def rows_ahead(
-    ends, safety, step_size, limit, state, saved, mass, inverse, free, held, driven, working,
+    ends, safety, step_size, finer, limit, state, saved, mass, inverse, free, held, driven, working,
     kernels, cells, data, outs, energies, energy_outs, bounds, drives, drive_cells, drive_data, drive_outs,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
     watch, history,
@@ -151,12 +151,15 @@ def rows_ahead(
             if step_size > 0.0:
                 steps = interval / step_size
             else:
-                reach = 4.0 * interval * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))
-                steps = interval / (safety * step_bound(reach, x, mass, free, rates, bounds, cells, data))
+                fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
+                limit_now = step_bound(2.0 * interval * fastest, fastest, x, mass, free, rates, bounds, cells, data)
+                steps = interval / (safety * limit_now)
             if steps > MOST:
                 state[2] = interval / steps
                 return -1
             count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
+            if finer > 1.0:
+                count = int(math.ceil(finer * count))
             h = total[-1] = interval / count
             advance(
                 count, h, state[0], x, v, f, mass, inverse, held, driven, working,
@@ -198,7 +201,7 @@ def no_energy(t, x, cells, data, out):
 
 
 @kernel(BOUND)
-def no_bound(reach, x, mass, rates, cells, data):
+def no_bound(reach, speed, x, mass, rates, cells, data):
     pass
 
 
@@ -274,6 +277,8 @@ class CentralDifference:
         Share of the step bound, 0 < safety ≤ 1.
     step_size : float, optional
         A fixed step instead [s], at most the bound.
+    finer : float
+        Number of steps of each row over what the other arguments make of it, ≥ 1.
 
     Raises
     ------
@@ -281,8 +286,8 @@ class CentralDifference:
         For a free row without mass, or a step above the bound.
     """
 
-    def __init__(self, system, probes=(), watch=(), safety=0.5, step_size=None):
-        self.system, self.safety, self.step_size = system, safety, step_size
+    def __init__(self, system, probes=(), watch=(), safety=0.5, step_size=None, finer=1.0):
+        self.system, self.safety, self.step_size, self.finer = system, safety, step_size, finer
         net, free = system.net, ~system.supported
         bare = np.flatnonzero((net.mass <= 0.0) & free.any(axis=1))
         if len(bare):
@@ -329,7 +334,7 @@ class CentralDifference:
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m]."""
         x = np.zeros((self.system.rows, 3)) if x is None else x
         rates = np.empty(self.system.rows)
-        return step_bound(reach, x, self._masses[0], self._moving, rates, self._bounds, self._cells, self._data)
+        return step_bound(reach, 0.0, x, self._masses[0], self._moving, rates, self._bounds, self._cells, self._data)
 
     def start(self, x=None, v=None):
         """The `Run` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
@@ -380,7 +385,7 @@ class CentralDifference:
         history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
         step, start = self.step_size or 0.0, run.time
         done = rows_ahead(
-            ends, self.safety, step, DRIFT, run.state, run.saved, *self._masses, self._moving, *self._ends,
+            ends, self.safety, step, self.finer, DRIFT, run.state, run.saved, *self._masses, self._moving, *self._ends,
             *self._forces, self._seen, *self._energies, self._bounds, *self._drives, *self._peaks(run),
             self._watch, history,
         )  # fmt: skip

@@ -10,8 +10,8 @@ all its digits, which it loses when positions are the unknowns.
 `ENERGY`       ``(t, x, cells, data, out)``: writes the energy [J] of each cell to ``out (c,)``
 `STIFFNESS`    ``(t, x, v, blocks, cells, data, definite)``: writes −∂f/∂x [N/m] per cell; ``definite`` asks for
                a positive semidefinite part
-`BOUND`        ``(reach, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of |K| [N/m], for
-               all that can act before a row has moved by ``reach`` [m]
+`BOUND`        ``(reach, speed, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of |K|
+               [N/m], for all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most
 =============  ==========================================================================================
 
 Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at
@@ -46,7 +46,7 @@ VECTOR, MATRIX, INDICES = _array(_f, 1), _array(_f, 2), _array(_i, 2)
 _common = (_f, _array(_f, 2), _array(_f, 2))
 FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2))
 ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
-BOUND = types.void(_f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_i, 2), _array(_f, 2))
+BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
 
 

@@ -86,20 +86,21 @@ def blocks(solver, run, times, stops):
         size = max(1, min(2 * size if spent < 0.05 else int(size * 0.1 / spent), 10000))
 
 
-SPREAD = 6.0
-"""± of a result over its difference to the twin's."""
+SPREAD = 3.0
+"""± of a result over its error if the method has its order."""
 
 
-def with_errors(results, twin):
-    """Results with `SPREAD` times the difference to a run of half the error as ±.
+def with_errors(results, twin, order=2.0):
+    """Results with ± from their difference to a run of half the error, times ``order`` and `SPREAD`.
 
-    Central differences are of order 2, so that a run at 1/√2 of the step has half the error, and the error is twice the
-    difference where that order holds. Peaks, contact and slack lines have none; three times as much then covers most: of
-    the 17 observables of the four impacts shipped, 15 have their value at 1/8 of the step within ±, 12 within a third of
-    it. The two missed are peaks that both runs happen to agree on: a largest stress of 197 kPa, ± 0.4 kPa, off by 3.5 kPa,
-    and a contact force of 26.47 N, ± 0.008 N, off by 0.04 N.
+    Central differences are of order 2: a run of √2 times the steps has half the error, so that the error is twice the
+    difference where that order holds (``order`` is that factor for the steps really taken). Peaks, contact and slack
+    lines have none; three times as much then covers most: of the 17 observables of the four impacts shipped, 15 have
+    their value at 1/8 of the step within ±, 12 within a third of it. The two missed are peaks that both runs happen to
+    agree on: a largest stress of 197 kPa, ± 0.4 kPa, off by 3.5 kPa, and a contact force of 26.47 N, ± 0.008 N, off by
+    0.04 N.
     """
-    errors = {n: SPREAD * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
+    errors = {n: SPREAD * order * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
     return {n: r._replace(error=errors[n]) for n, r in results.items()}
 
 
@@ -137,10 +138,13 @@ class _Twin:
             self._failure = error
 
     def results(self):
-        """Wait for it; (results, None), or (None, why it failed), or (None, None) where it was not wanted."""
+        """Wait for it; its results, its number of steps and why it failed, None where there are none."""
         if self._thread is not None:
             self._thread.join()
-        return self._motion.results(*self._ended) if self._ended else None, self._failure
+        if self._ended is None:
+            return None, None, self._failure
+        run, last = self._ended
+        return self._motion.results(run, last), run.nsteps, None
 
 
 class Motion:
@@ -191,15 +195,16 @@ class Motion:
         return own
 
     def solver(self, safety, finer=1.0):
-        """The `CentralDifference` of the scene at a share of the step bound, or a step_size, over ``finer``."""
+        """The `CentralDifference` of the scene at a share of the step bound, or a step_size, ``finer`` times finer."""
         signs, step = {"max": 1, "min": -1, "final": 0}, self.scene.solve.step_size
         return CentralDifference(
             self.system,
             probes=[(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed]
             + [(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()],
             watch=[(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched],
-            safety=safety / finer,
-            step_size=None if step is None else step / finer,
+            safety=safety,
+            step_size=step,
+            finer=finer,
         )
 
     def table(self, history):
@@ -264,9 +269,12 @@ class Motion:
                         folder.restart(solution.summary())
                     continue
                 tell("finding errors by a twin run", 1.0)
-                other, failure = twin.results()
+                other, steps, failure = twin.results()
             break
-        solution.reduced = with_errors(results, other) if other else results
+        solution.reduced = results
+        if other:
+            ratio = solution.solver["nsteps"] / steps
+            solution.reduced = with_errors(results, other, 1.0 / (1.0 - ratio**2))
         if failure:
             solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
 

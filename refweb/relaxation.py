@@ -79,7 +79,7 @@ def solve(system, load_steps, progress=None, most=5_000_000):
     rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
     for family in families:
         if family.bound is not None:
-            family.bound(np.inf, x, np.ones(system.rows), rates, family.cells, family.data)
+            family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
     moving = ~system.supported & (rates > 0.0)[:, None]
     inverse = np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
     scale = 0.0

@@ -102,6 +102,83 @@ def test_ball_is_thrown_back(impact):
     assert back[0] > 0.8 and back[-1] < 0.0
 
 
+# Odd impacts on a small web
+
+
+def ball(**changes):
+    given = dict(name="ball", radius=0.1, mass=1.0, position=(0.0, 0.0, -0.101), velocity=(0.0, 0.0, 1.0))
+    return refweb.Body(**{**given, **changes})
+
+
+WALL = dict(name="wall", fixed=True, mass=None, velocity=(0.0, 0.0, 0.0))
+ODD = {
+    "into a node": ([ball()], 1e5),
+    "into a line": ([ball(position=(0.1, 0.0, -0.101))], 1e5),
+    "into a fixed node": ([ball(position=(0.4, 0.0, -0.101))], 1e5),
+    "against the edge": ([ball(position=(-0.51, 0.03, 0.0), velocity=(1.0, 0.0, 0.0))], 1e5),
+    "from inside": ([ball(position=(0.02, 0.03, -0.05))], 1e4),
+    "light": ([ball(mass=1e-3)], 1e5),
+    "heavy": ([ball(mass=1e3)], 1e5),
+    "fast": ([ball(velocity=(3.0, 2.0, 100.0))], 1e6),
+    "soft": ([ball()], 1e2),
+    "hard": ([ball()], 1e9),
+    "two": ([ball(), ball(name="other", position=(0.2, 0.2, 0.101), velocity=(0.0, 0.0, -2.0))], 1e5),
+    "against a wall": ([ball(), ball(**WALL, position=(0.0, 0.0, 0.11))], 1e5),
+}
+
+
+def small(bodies, stiffness, *effects, duration=0.05, interval=1e-3):
+    return refweb.Scene(
+        web=refweb.Window(mesh="square", rows=4, columns=4, side=0.2),
+        cable=cable(),
+        effects=[*bodies, refweb.Contact(stiffness=stiffness), *effects],
+        solve=refweb.Dynamic(duration=duration),
+        output=refweb.Output(interval=interval, frames=1),
+        accuracy=refweb.Accuracy(error="none"),
+        observe=[refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")],
+    )
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_odd_impacts(case):
+    """Each closes its book, drawn up anew, and its momentum, and touches the web."""
+    bodies, stiffness = ODD[case]
+    solution = refweb.run(small(bodies, stiffness))
+    history, net = solution.history, solution.state.system.net
+    assert book(solution, stiffness) <= 1e-2 and solution.results["force"].value > 0.0
+    free = ~solution.state.system.supported
+    momentum = np.array([(net.mass[:, None] * state.v * free).sum(axis=0) for _, state in solution.frames])
+    for k, axis in enumerate("xyz"):
+        changed = momentum[:, k] - momentum[0, k]
+        scale = max(1.0, np.abs(momentum).max())
+        np.testing.assert_allclose(changed, history[f"support_impulse_{axis}"], rtol=0, atol=1e-10 * scale)
+
+
+def test_a_fixed_ball_stops_a_moving_web():
+    """The work of the moved supports closes the book of a web that is drawn over a ball."""
+    wall = ball(**{**WALL, "name": "ball"})
+    moved = refweb.Motion(node="rim", displacement=[(0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, -1.0)])
+    solution = refweb.run(small([wall], 1e5, moved))
+    total = np.array([sum(energies(state, 1e5)) for _, state in solution.frames])
+    rim = solution.state.system.net.web.rim
+    own = 0.5 * solution.state.system.net.mass[rim].sum() * 1.0**2  # of the supports, which move at 1 m/s
+    work = solution.history["work"]
+    assert work[-1] > 0.1 and np.abs(total - work).max() <= 1e-2 * (total.max() + own)
+    np.testing.assert_allclose(solution.history["kinetic_energy"][0], own, rtol=1e-12)
+
+
+def test_a_ball_that_is_dropped_counts_before_it_moves():
+    """One row for all of it: the ball stands still at its start, and yet the steps are those of contact."""
+    gravity = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
+    still = ball(position=(0.0, 0.0, 0.1001), velocity=(0.0, 0.0, 0.0))
+    solution = refweb.run(small([still], 1e7, gravity, duration=0.1, interval=0.1))
+    assert solution.warnings == [] and solution.results["force"].value > 9.81
+    # Four lines meet where it lands, each with the penalty and what the node and the ball have of it: √(m/M) = 0.06.
+    node = solution.state.system.net.mass[solution.state.system.net.web.centre]
+    longest = 0.5 * 2.0 / np.sqrt(4 * 1e7 / node)
+    assert 0.1 / solution.solver["nsteps"] < longest
+
+
 # Closed forms: one mass, one spring
 
 

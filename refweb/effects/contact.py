@@ -102,7 +102,7 @@ def stiffness(t, x, v, blocks, cells, data, definite):
 
 
 @kernel(BOUND)
-def bound(reach, x, mass, rates, cells, data):
+def bound(reach, speed, x, mass, rates, cells, data):
     for c in range(cells.shape[0]):
         d, _, _, square = closest(x, cells, data, c)
         radius, penalty, distance = data[c, RADIUS], data[c, PENALTY], math.sqrt(square)
@@ -123,6 +123,10 @@ def bound(reach, x, mass, rates, cells, data):
         rates[i] += own
         rates[j] += own
         rates[b] += penalty * (1.0 + turn) * (1.0 + 1.0 / delta if delta > 0.0 else 1.0)
+        # Nothing passes through between two steps: they are at most a tenth of the radius at half the bound.
+        crossing = (10.0 * speed / radius) ** 2
+        for row in (i, j, b):
+            rates[row] = max(rates[row], crossing * mass[row])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -107,7 +107,7 @@ def kernels(law, gradients, weights):
                             blocks[c, 3 * a + i, 3 * b + i] += d * across
 
     @kernel(BOUND)
-    def bound(reach, x, mass, rates, cells, data):
+    def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
             axial = data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
             for q in range(points):
