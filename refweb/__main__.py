@@ -9,7 +9,9 @@ from __future__ import annotations
 import argparse
 import os
 import pathlib
+import signal
 import sys
+import threading
 import warnings
 
 from .inputs import InputError
@@ -82,6 +84,8 @@ def _info(arguments):
                 stored(summary)
         except FileNotFoundError:
             raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
+        except BrokenPipeError:
+            raise
         except (ValueError, OSError, RecursionError) as error:
             raise InputError(f"{folder}/run.json: cannot be read: {error}") from None
         except (KeyError, TypeError, IndexError, AttributeError):
@@ -126,9 +130,12 @@ def main(arguments=None):
         top.print_help()
         return 2
     command = {"run": _run, "check": _check, "info": _info, "picture": _picture}[arguments.command]
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch queue's end is an interruption too
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
+            warnings.filterwarnings("ignore", message="Glyph")  # a title in a script the font of pictures lacks
             command(arguments)
         sys.stdout.flush()
     except InputError as error:

@@ -328,7 +328,7 @@ class CentralDifference:
             np.flatnonzero(signs[: len(probes)]),
         )
         if step_size is not None and step_size > (limit := self.bound()):
-            raise InputError(f"step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
+            raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m]."""

@@ -134,10 +134,11 @@ def stored(summary, more=()):
 
 def after(solution, folder):
     """Print results with their errors, and what they cost."""
-    worst, more = solution.state.utilisation, []
+    worst, more = solution.utilisation, []
     if worst is not None:
-        line = int(worst.argmax())
-        more.append(("strength", f"utilisation {worst[line]:.2f} at line {line}"))
+        used, line = worst
+        digits = ".2f" if 0.01 <= used < 100.0 else ".2g"
+        more.append(("strength", f"utilisation {used:{digits}} at line {line}"))
     stored(solution.summary(), more)
     print(f"results in {folder}")
 

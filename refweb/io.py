@@ -81,6 +81,15 @@ def write_body(path, body, state):
     write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
 
 
+def _is_result(folder):
+    """Whether a folder holds a ``run.json`` that a run of refweb wrote."""
+    try:
+        run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(run, dict) and "refweb" in (run.get("versions") or ())
+
+
 def check_folder(folder, force=False):
     """Refuse a result folder that cannot be written, before anything is computed.
 
@@ -88,7 +97,7 @@ def check_folder(folder, force=False):
     ------
     InputError
         Where ``folder`` is a file, cannot be written, or is not empty and ``force`` is not given; with ``force`` where
-        it holds no ``run.json``.
+        it holds no ``run.json`` of refweb.
     """
     folder = pathlib.Path(folder)
     name = f"result folder {short(str(folder))}"
@@ -105,9 +114,9 @@ def check_folder(folder, force=False):
             raise
         raise InputError(f"{name}: cannot be used: {getattr(error, 'strerror', None) or error}") from None
     if full and not force:
-        raise InputError(f"{name}: is not empty: choose another folder, or --force to replace its results")
-    if full and not (folder / "run.json").is_file():
-        raise InputError(f"{name}: holds no run.json, so it is no result of refweb: nothing was removed")
+        raise InputError(f"{name}: is not empty: choose another folder, or force (--force) to replace its results")
+    if full and not _is_result(folder):
+        raise InputError(f"{name}: holds no run.json of refweb, so it is no result of it: nothing was removed")
 
 
 def clear(folder, keep=("run.json",)):
@@ -193,6 +202,7 @@ class Folder:
             write_body(self.path / surface, body, state)
             self._listed.append((state.time, part, surface))
         arrays = {"time": state.time, "positions": state.position, "velocities": state.v}
+        arrays["supported"] = state.system.supported
         write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self._list_frames()
 

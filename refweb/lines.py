@@ -47,6 +47,8 @@ class Net:
         Quadrature weights, of sum 1.
     quasi_static : bool
         True where time is the load step of statics.
+    cable_mass : float
+        Mass of the lines alone [kg].
     bodies : tuple of refweb.bodies.RigidBody
         Bodies, whose rows follow those of the nodes.
     """
@@ -63,6 +65,7 @@ class Net:
     gradients: np.ndarray
     weights: np.ndarray
     quasi_static: bool = False
+    cable_mass: float = 0.0
     bodies: tuple = ()
 
     @property
@@ -148,4 +151,5 @@ def build(web, cable, quasi_static=False):
         gradients=gradients,
         weights=weights,
         quasi_static=quasi_static,
+        cable_mass=float(mass.sum()),
     )

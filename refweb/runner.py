@@ -13,7 +13,7 @@ from .errors import SolverError
 from .io import Folder, check_folder
 from .laws import LINEAR
 from .observables import Result
-from .scene import Scene
+from .scene import Scene, in_file
 from .solution import SOLVER, Solution, as_history
 from .state import State, floor_remark
 
@@ -54,7 +54,8 @@ def run(scene, out=None, force=False, progress=None, announce=None):
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=_versions())
     solution.warnings += _notices(scene, system)
-    follower = (_LoadSteps if scene.solve.kind == "static" else _dynamics())(scene, system, solution)
+    with in_file(scene.file):
+        follower = (_LoadSteps if scene.solve.kind == "static" else _dynamics())(scene, system, solution)
     solution.columns = follower.columns
     folder = Folder(out, scene, solution.columns, solution.summary()) if out is not None else None
     tell = progress or (lambda text, share: None)
@@ -143,6 +144,8 @@ class _LoadSteps:
                 solution.steps.append({"step": found.step, "results": results, "solver": stats})
                 solution.solver = {**stats, **totals}
                 solution.state = state
+                if (used := state.utilisation) is not None:
+                    solution.utilisation = float(used.max()), int(used.argmax())
                 for kind, text in _remarks(state, stats):
                     self._remarks.setdefault(kind, []).append((found.step, text))
                 self.rows.append(row)
@@ -170,7 +173,7 @@ def web_of(system):
         "cells": int(web.cells),
         "cable_length": float(np.sum(net.natural_length)),
         "area": float(web.area),
-        "mass": float(net.mass.sum()),
+        "mass": net.cable_mass,
     }
 
 
@@ -183,12 +186,31 @@ def _versions():
 def _notices(scene, system):
     if system.net.bodies and not any(f.name == "contact" for f in system.families):
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
+    if scene.solve.kind == "dynamic":
+        yield from _started(system)
     loose = statics.unsupported(system) if scene.solve.kind == "static" else []
     if not loose:
         return
     axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
     nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
     yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
+
+
+def _started(system):
+    """What is not at rest in a dynamic scene before it begins."""
+    x, energy = np.zeros((system.rows, 3)), {}
+    system.drive(0.0, x)
+    for family in system.families:
+        if family.internal:
+            energy[family.name] = system.energy_of(family, 0.0, x)
+    moved = np.flatnonzero(x.any(axis=1))
+    if len(moved):
+        stored = sum(map(sum, energy.values()))
+        yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+    pushed = energy.get("contact", np.zeros(1))
+    if pushed.max() > 0.0:
+        line = int(pushed.argmax()) % len(system.net.line)
+        yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
 
 
 def _cost(system, solution, started):

@@ -98,6 +98,8 @@ class Scene:
         for key, value in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
             object.__setattr__(self, key, value.metadata["read"](key, getattr(self, key)))
         for key in ("effects", "support", "observe"):
+            if not isinstance(getattr(self, key), (list, tuple)):
+                raise InputError(f"{key} = {shown(getattr(self, key))} must be a list")
             object.__setattr__(self, key, tuple(getattr(self, key)))
         for effect in self.effects:
             table_of(effect)
@@ -142,7 +144,7 @@ class Scene:
             given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
         except (ValueError, OSError, RecursionError) as error:  # a ValueError also for a number of thousands of digits
             raise InputError(f"{path.name}: cannot be read: {error}") from None
-        with _in_file(path.name):
+        with in_file(path.name):
             return Scene.from_dict({"title": path.stem, **given}, path.resolve().parent, path.name)
 
     @staticmethod
@@ -222,7 +224,7 @@ class Scene:
         InputError
             For whatever does not fit together; the message names file and table.
         """
-        with _in_file(self.file):
+        with in_file(self.file):
             return self._build()
 
     def _build(self):
@@ -289,11 +291,11 @@ def table_of(effect):
 
 def slug(title):
     """A title as the name of a folder, of at most 80 characters."""
-    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")[:80].strip("-") or "result"
+    return re.sub(r"[\W_]+", "-", title.lower()).strip("-")[:80].strip("-") or "result"
 
 
 @contextlib.contextmanager
-def _in_file(file):
+def in_file(file):
     """Begin refusals with the name of the scene file."""
     try:
         yield

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
@@ -20,7 +22,7 @@ class Shot:
     """One frame of a result folder.
 
     `paths` and `origin` [m], shape (lines, points, 3), are the lines now and undeformed; `tree` says that they close no
-    loop; `fields` are values per line [SI], shape (lines,); `slack` flags, shape (lines,); `pins` where a reaction acts
+    loop; `fields` are values per line [SI], shape (lines,); `slack` flags, shape (lines,); `pins` the supports
     [m], shape (n, 3); `bodies` their points [m], shape (points, 3), and triangles, shape (triangles, 3), by name.
     """
 
@@ -48,6 +50,8 @@ def frames(folder):
     InputError
         Where ``web.pvd`` cannot be read or lists no web.
     """
+    if not Path(folder).is_dir():
+        raise InputError(f'"{folder}" is no folder')
     try:
         sets = list(ElementTree.parse(Path(folder) / "web.pvd").iter("DataSet"))
     except (OSError, ElementTree.ParseError) as error:
@@ -89,7 +93,7 @@ def read(folder, number):
     paths, start = (np.concatenate([_curves(x[cells], samples) for _, cells in blocks]) for x in (points, origin))
     fields = _fields(mesh, blocks)
     slack = np.asarray(fields.get("slack", np.zeros(len(paths)))) > 0.5
-    pins = points[_size(mesh.point_data.get("reaction", np.zeros(len(points)))) > 0]
+    pins = points[_supported(folder, mesh)]
     edges = sum(cells.shape[0] * (cells.shape[1] - 1) for _, cells in blocks)
     tree = edges < len(np.unique(np.concatenate([cells.ravel() for _, cells in blocks])))
     bodies = {name: _surface(_mesh(path)) for name, path in files.items() if name != "web"}
@@ -99,10 +103,23 @@ def read(folder, number):
 def _mesh(path):
     import meshio
 
+    said = io.StringIO()
     try:
-        return meshio.read(path)
-    except (OSError, SystemExit, ElementTree.ParseError, meshio.ReadError) as error:
-        raise InputError(f'"{path}" cannot be read: {error}') from None
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            return meshio.read(path)
+    except (Exception, SystemExit) as error:
+        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        raise InputError(f'"{path}" cannot be read: {reason or type(error).__name__}') from None
+
+
+def _supported(folder, mesh):
+    """Which points are supported: as the checkpoint has it, else those where a reaction acts."""
+    count = len(mesh.points)
+    try:
+        with np.load(Path(folder) / "checkpoint.npz") as checkpoint:
+            return checkpoint["supported"][:count].any(axis=1)
+    except (OSError, ValueError, KeyError, EOFError):
+        return _size(mesh.point_data.get("reaction", np.zeros(count))) > 0
 
 
 def _size(data):

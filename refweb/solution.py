@@ -21,7 +21,7 @@ class Names(dict):
         raise KeyError(f"{key!r} is not among them, {nearest(key, self)}")
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Solution:
     """A solved scene.
 
@@ -45,6 +45,8 @@ class Solution:
         The history, where it is held in memory.
     path : pathlib.Path, optional
         The result folder that a run wrote while it went.
+    utilisation : (float, int), optional
+        Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
     frames : list of (int, refweb.state.State)
@@ -66,6 +68,7 @@ class Solution:
     warnings: list = field(default_factory=list)
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
+    utilisation: tuple | None = None
 
     @property
     def results(self):
@@ -106,9 +109,28 @@ class Solution:
         return self.state.stress
 
     @property
+    def strain(self):
+        """Strain of the lines in the last state [1], shape (lines,)."""
+        return self.state.strain
+
+    @property
+    def slack(self):
+        """Lines that are slack in the last state, bool, shape (lines,)."""
+        return self.state.slack
+
+    @property
+    def velocities(self):
+        """Velocities of the web's nodes in the last state [m/s], shape (nodes, 3)."""
+        return self.state.v[: len(self.state.system.net.web.points)]
+
+    @property
     def reaction(self):
         """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
         return self.state.reaction[: len(self.state.system.net.web.points)]
+
+    def __repr__(self):
+        found = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
+        return f'<Solution of "{self.scene.title}": {self.status}; {found}>'
 
     def summary(self):
         """The content of ``run.json``, a dict of plain values."""

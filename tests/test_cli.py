@@ -127,16 +127,19 @@ def test_folder_in_use(here, capsys):
     (here / "file").write_text("mine")
     (here / "full").mkdir()
     (here / "full" / "mine.txt").write_text("mine")
+    (here / "foreign").mkdir()
+    (here / "foreign" / "run.json").write_text("{}")
     for out, force, message in [
         ("file", [], "file is a file, not a folder"),
         ("file/folder", ["--force"], "file is a file, not a folder"),
-        ("full", [], "is not empty: choose another folder, or --force"),
+        ("full", [], "is not empty: choose another folder, or force (--force)"),
         ("full", ["--force"], "holds no run.json"),
+        ("foreign", ["--force"], "holds no run.json of refweb"),
         ("n" * 300, [], "File name too long"),
     ]:
         assert main(["run", WEB, "--out", out, *force]) == 2
         refused(capsys, f"result folder {out[:50]}", message)
-    assert files(here) == ["file", "full/mine.txt"]
+    assert files(here) == ["file", "foreign/run.json", "full/mine.txt"]
 
 
 def test_force_removes_only_what_a_run_wrote(here, capsys):
@@ -265,7 +268,7 @@ def test_shipped_scene_runs_by_name(here, capsys, name):
 
 def test_slug():
     assert scene.slug("Hexagon web, 5 N!") == "hexagon-web-5-n" and scene.slug("../../etc") == "etc"
-    assert scene.slug("Сеть") == "result" and scene.slug("x" * 200) == "x" * 80
+    assert scene.slug("Сеть!") == "сеть" and scene.slug("?!") == "result" and scene.slug("x" * 200) == "x" * 80
 
 
 def test_no_command_and_wrong_ones(capsys):

@@ -212,7 +212,7 @@ def impact_system():
     """Gravity, a load, prescribed motion, a ball: all that a run's state has to remember."""
     effects = [
         refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
-        refweb.Load(node=3, force=(0.0, 1.0, 2.0), factor=[(0.0, 0.0), (0.01, 1.0)]),
+        refweb.Load(node="centre", force=(0.0, 1.0, 2.0), factor=[(0.0, 1.0), (0.01, 2.0)]),
         refweb.Motion(node=0, displacement=MOTION),
         *ball(),
     ]
@@ -447,6 +447,16 @@ def test_errors_do_not_change_the_run():
         np.testing.assert_array_equal(with_twin.history[name], column)
 
 
+def test_errors_are_the_difference_to_a_finer_run():
+    """Of 10 steps to a row the twin makes 15, more than √2 times as many, as a run by hand does."""
+    solution, by_hand = refweb.run(scene(error="twin", step_size=1e-4)), refweb.run(scene(step_size=1e-3 / 15))
+    assert (solution.solver["nsteps"], by_hand.solver["nsteps"]) == (200, 300)
+    for name, result in solution.results.items():
+        difference = abs(result.value - by_hand.results[name].value)
+        # With errors a h² and a (2h/3)² the first is their difference over 1 − 4/9.
+        np.testing.assert_allclose(result.error, SPREAD * difference / (1.0 - 4.0 / 9.0), rtol=1e-9)
+
+
 def test_errors_cover_the_truth_on_a_smooth_motion():
     """On a taut web the ± is the distance to the limit of small steps; a run at a tenth of the step stands for it."""
     effects = [refweb.Velocity(node="all", value=(0.0, 0.0, 1.0))]
@@ -541,12 +551,20 @@ def test_folder_and_memory_agree(tmp_path):
         np.testing.assert_array_equal(mesh.point_data["velocity"], state.v[: len(mesh.points)])
 
 
-def test_memory_does_not_grow_with_duration(tmp_path):
+def test_memory_does_not_grow_with_duration(tmp_path, monkeypatch):
     """A run with a folder keeps one state and no row, however long it lasts; its history is read from the folder."""
+    followers = []
+
+    class Noted(dynamics.Motion):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            followers.append(self)
+
+    monkeypatch.setattr(dynamics, "Motion", Noted)
     for name, duration in (("short", 0.01), ("long", 0.08)):
         solution = refweb.run(scene(duration, 1e-4, 2), out=tmp_path / name)
         assert len(read_history(tmp_path / name)[1]) == round(duration / 1e-4) + 1
-        assert solution.frames == [] and solution.table is None
+        assert solution.frames == [] and solution.table is None and len(followers.pop().rows) == 1
         assert len(solution.history["time"]) == round(duration / 1e-4) + 1
         assert read_json(tmp_path / name)["results"]["deflection"]["value"] == solution.results["deflection"].value
 
@@ -758,3 +776,32 @@ def test_a_body_without_contact_passes_with_a_warning():
     (warning,) = solution.warnings
     assert "no [contact]" in warning and solution.results["deflection"].value == 0.0
     assert "contact_energy" not in solution.history
+
+
+@pytest.mark.parametrize("speed", [1e3, 7e3])
+def test_a_fast_body_does_not_pass_between_two_steps(speed):
+    """Its largest contact force is that of steps of 1e-6 s, a tenth of those taken and less, within the ±."""
+    web, bar = refweb.Window(mesh="square", rows=10, columns=10, side=0.1), cable(law="tension-only")
+    ball = refweb.Body(name="ball", radius=0.12, mass=0.5, position=(0, 0, 0.2), velocity=(0, 0, -speed))
+    force = refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")
+    hit = refweb.Scene(
+        web=web,
+        cable=bar,
+        effects=[ball, refweb.Contact(stiffness=1e5)],
+        solve=refweb.Dynamic(duration=0.4 / speed),
+        observe=[force],
+    )
+    value, error = refweb.run(hit).results["force"][:2]
+    fine = hit.replace(solve=refweb.Dynamic(duration=0.4 / speed, safety=0.05), accuracy=refweb.Accuracy(error="none"))
+    true = refweb.run(fine).results["force"].value
+    assert true > 1e3 and abs(value - true) <= max(error, 0.02 * true)
+
+
+def test_what_is_not_at_rest_before_the_start_is_said():
+    """A body in the web and a node moved away at t = 0 store energy that nothing put there."""
+    ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.0, 0.0, 0.05))
+    inside = refweb.run(scene(effects=[ball, refweb.Contact(stiffness=10.0)]))
+    assert any("overlaps the web at the start" in text for text in inside.warnings)
+    motion = refweb.Motion(node="centre", displacement=[(0.0, 0.0, 0.0, 1e-3), (1.0, 0.0, 0.0, 1e-3)])
+    moved = refweb.run(scene(effects=[motion]))
+    assert any("[[motion]] has moved node" in text for text in moved.warnings)

@@ -199,7 +199,7 @@ def test_selected_frames(tmp_path, every, kept):
 
 def test_checkpoint(written, solution):
     with np.load(written / "checkpoint.npz") as checkpoint:
-        assert set(checkpoint) == {"time", "positions", "velocities"} and checkpoint["time"] == STEPS[-1]
+        assert set(checkpoint) == {"time", "positions", "velocities", "supported"} and checkpoint["time"] == STEPS[-1]
         np.testing.assert_array_equal(checkpoint["positions"], solution.positions)
         assert checkpoint["velocities"].shape == solution.positions.shape and not checkpoint["velocities"].any()
 
