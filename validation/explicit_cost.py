@@ -5,8 +5,8 @@
 Two scenes: the square web hit by a ball, as shipped, and a taut cable of 100 elements that a point mass plucks. The
 whole run is timed, from the first state to the results, with its history rows (every 1e-3 s) and peaks, and without
 files, frames between the first and the last, or a twin. The C loop takes the same steps with the same cells and data:
-kicks and drifts, tensions, contact, the impulse of the supports and the peaks of the same observables; it has no rows. CPU time, minimum of
-several warm runs, both in this process, one thread.
+kicks and drifts, tensions, contact, the impulse of the supports and the peaks of the same observables; it has no rows.
+CPU time, minimum of several warm runs, both in this process, one thread.
 """
 
 from __future__ import annotations
