@@ -17,6 +17,7 @@ from nets import LAWS, skew_net
 
 import refweb
 import refweb.effects
+from refweb import lines
 from refweb.central_difference import CentralDifference
 from refweb.effects import Drive
 from refweb.inputs import InputError
@@ -208,6 +209,25 @@ def test_bound_bounds(effects, mass, law):
         x = state(system.net, seed)[0]
         limit = CentralDifference(system).bound(x, reach=0.0)
         assert limit <= 2.0 / np.sqrt(max(largest_frequency(system, x), 0.0) or 1e-300) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("mass", [1e-4, 1e-2, 1.0, 100.0])
+@pytest.mark.parametrize(
+    "length, place, height", [(1.0, 1.1, 0.2), (1.0, 0.5, 0.2), (0.1, 0.05, 0.2), (0.02, 0.015, 0.15)]
+)
+@pytest.mark.parametrize("held", [0, 1, 2])
+def test_bound_bounds_one_line(mass, length, place, height, held):
+    """A ball of 0.3 m far into a line, at its end or over a short one that it turns; ends held without a mass."""
+    web = refweb.SingleCable(start=(0, 0, 0), end=(length, 0, 0), elements=1).web()
+    net = lines.build(web, refweb.Cable(law="linear", modulus=1.0, area=1.0, density=0.0))
+    supported = np.arange(2) < held
+    net = replace(net, mass=np.where(supported, 0.0, 1e-2))
+    ball = CLASSES["Body"](name="ball", radius=0.3, mass=mass, position=(place, 0.0, height))
+    effects = [ball, CLASSES["Contact"](stiffness=1e4)]
+    system = System(net, effects, np.repeat(supported[:, None], 3, axis=1))
+    x = np.zeros((3, 3))
+    limit = CentralDifference(system).bound(x, reach=0.0)
+    assert limit <= 2.0 / np.sqrt(largest_frequency(system, x)) * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("law", LAWS)
