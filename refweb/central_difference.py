@@ -12,197 +12,18 @@ book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of th
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from .compiled import BOUND, ENERGY, FORCE, INDICES, MATRIX, VECTOR, kernel, typed_list
+from .compiled import BOUND, ENERGY, FORCE, INDICES, MATRIX, VECTOR, typed_list
 from .errors import SolverError
 from .inputs import InputError
 from .probes import INTEGERS, PLACE, PROBE
+from .stepping import MOST, advance, book_energies, no_bound, no_energy, rows_ahead, step_bound
 
-MOST = 1e12
-"""Largest number of steps of a history row."""
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
-
-
-@kernel()
-def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, total):
-    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays."""
-    count = len(energies)
-    for i in range(count):
-        energies[i](t, x, cells[i], data[i], energy_outs[i])
-        total[i] = energy_outs[i].sum()
-    total[count], total[count + 1] = 0.0, book[0]
-    for r in range(x.shape[0]):
-        total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
-
-
-@kernel()
-def advance(
-    count, h, t, x, v, f, mass, inverse, held, driven, working,
-    kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
-    probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-    energies, energy_outs, watch, total,
-):  # fmt: skip
-    """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse."""
-    flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
-    first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
-    before, power, reaction = np.empty((driven.size, 7)), 0.0, np.zeros(3)
-    unused = np.zeros((rows if working.size else 0, 3))
-    for i in working:
-        kernels[i](t, x, v, unused, cells[i], data[i], outs[i])
-        power += outs[i][:, 0].sum()
-    for s in range(held.size):
-        reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
-    for step in range(1, count + 1):
-        now = t + step * h
-        for d in range(driven.size):
-            r = driven[d]
-            before[d, 6] = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
-            for k in range(3):
-                before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
-        for q in range(3 * rows):
-            speed = flat_v[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
-            flat_v[q] = speed
-            flat_x[q] += h * speed
-            flat_f[q] = 0.0
-        for i in range(len(drives)):
-            drives[i](now, x, v, f, drive_cells[i], drive_data[i], drive_outs[i])
-        first(now, x, v, f, first_cells, first_data, lines)
-        for i in range(1, len(kernels)):
-            kernels[i](now, x, v, f, cells[i], data[i], outs[i])
-        for q in range(3 * rows):
-            flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
-        if working.size:
-            gained = 0.0
-            for i in working:  # the power at the full step: the forces above see the velocity at its middle
-                kernels[i](now, x, v, unused, cells[i], data[i], outs[i])
-                gained += outs[i][:, 0].sum()
-            book[0] += 0.5 * h * (power + gained)
-            power = gained
-        for d in range(driven.size):
-            r = driven[d]
-            book[0] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
-            for k in range(3):
-                book[0] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
-        for k in range(3):
-            impulse[k] += 0.5 * h * reaction[k]
-            reaction[k] = 0.0
-        for s in range(held.size):
-            reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
-        for k in range(3):
-            impulse[k] += 0.5 * h * reaction[k]
-        for i in followed:
-            value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
-            if signs[i] * value > signs[i] * peaks[i]:
-                where[1] = PLACE
-                probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
-                peaks[i], times[i], places[i], where[1] = value, now, where[0], 0
-        if watch.shape[0]:
-            book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, total)
-            for j in range(watch.shape[0]):
-                value, i = np.dot(watch[j], total), len(probes) + j
-                if signs[i] * value > signs[i] * peaks[i]:
-                    peaks[i], times[i] = value, now
-
-
-@kernel()
-def step_bound(reach, speed, x, mass, free, rates, bounds, cells, data):
-    """Largest stable step [s]; infinite where nothing vibrates."""
-    rates[:] = 0.0
-    for i in range(len(bounds)):
-        bounds[i](reach, speed, x, mass, rates, cells[i], data[i])
-    rate = 0.0
-    for r in free:
-        rate = max(rate, rates[r] / mass[r])
-    return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
-
-
-@kernel()
-def rows_ahead(
-    ends, safety, step_size, finer, limit, state, saved, mass, inverse, free, held, driven, working,
-    kernels, cells, data, outs, energies, energy_outs, bounds, drives, drive_cells, drive_data, drive_outs,
-    probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-    watch, history,
-):  # fmt: skip
-    """Advance to each time of ``ends`` and write a row of ``history`` there.
-
-    ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
-    done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
-    x, v and f at the row before; −1 where a row takes more than `MOST` steps.
-    """
-    x, v, f = saved[0], saved[1], saved[2]
-    back = saved[3:]
-    rows, where, rates = x.shape[0], np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
-    total = np.zeros(len(energies) + 3)
-    for n in range(ends.size):
-        interval = ends[n] - state[0]
-        if interval > 0.0:
-            back[0], back[1], back[2] = x, v, f
-            speed = push = 0.0
-            for r in range(rows):
-                speed = max(speed, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
-                a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
-                push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
-            if step_size > 0.0:
-                steps = interval / step_size
-            else:
-                fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
-                limit_now = step_bound(2.0 * interval * fastest, fastest, x, mass, free, rates, bounds, cells, data)
-                steps = interval / (safety * limit_now)
-            if steps > MOST:
-                state[2] = interval / steps
-                return -1
-            count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
-            if finer > 1.0:
-                count = int(math.ceil(finer * count))
-            h = total[-1] = interval / count
-            advance(
-                count, h, state[0], x, v, f, mass, inverse, held, driven, working,
-                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
-                probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-                energies, energy_outs, watch, total,
-            )  # fmt: skip
-            state[0], state[1], state[2] = ends[n], state[1] + count, h
-        row, at = history[n], 1
-        row[0] = state[0]
-        for i in range(len(probes)):
-            row[at] = probes[i](state[0], x, v, f, outs[0], probe_rows[i], probe_data[i], where)
-            at += 1
-        book_energies(state[0], x, v, mass, cells, data, energies, energy_outs, book, total)
-        total[-1] = state[2]
-        stored = np.abs(total[:-2]).sum()
-        energy = total[:-2].sum()
-        for i in working:
-            stored -= abs(total[i])
-            energy -= total[i]
-        row[at : at + total.size] = total
-        at += total.size
-        for k in range(3):
-            row[at + k], row[at + 3 + k] = 0.0, impulse[k]
-            for r in range(rows):
-                if inverse[r, k] > 0.0:
-                    row[at + k] += mass[r] * v[r, k]
-        state[4] = max(state[4], stored)
-        drift = abs(energy - book[0] - state[3])
-        state[5] = max(state[5], drift)
-        if not math.isfinite(drift) or (drift > limit * state[4]):
-            return n
-    return ends.size
-
-
-@kernel(ENERGY)
-def no_energy(t, x, cells, data, out):
-    out[:] = 0.0
-
-
-@kernel(BOUND)
-def no_bound(reach, speed, x, mass, rates, cells, data):
-    pass
 
 
 class OpenBook(SolverError):
@@ -392,7 +213,7 @@ class CentralDifference:
         if done < 0:
             raise SolverError(
                 f"the step at t = {run.time:.6g} s is {run.state[2]:.3g} s, more than {MOST:g} steps to the next row: "
-                "lower the stiffness that asks for it"
+                "ask for shorter rows, or lower the stiffness that asks for the step"
             )
         if done < len(ends):
             before = ends[done - 1] if done else start

@@ -103,14 +103,15 @@ def check_supported(system, t):
 
 
 def force_scale(system, t, x, tension):
-    """What residuals are measured against [N]: the largest of nodal load, nodal weight and tension.
+    """What residuals are measured against [N]: the largest of nodal load, weight and contact, and of tension.
 
     At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
     under loads below 1e-7 EA.
     """
     stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.net.natural_length
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
-    loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in system.families if not f.internal]
+    outer = [f for f in system.families if f.cells is not system.net.cells]
+    loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
     return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 
 

@@ -17,6 +17,7 @@ import refweb
 LAYERS = [
     ["inputs", "errors", "compiled", "bodies"],
     ["laws", "time_tables", "probes", "webs"],
+    ["stepping"],
     ["lattices", "single_cable", "given_webs", "cables", "settings"],
     ["lines"],
     ["pattern", "factor"],

@@ -15,6 +15,7 @@ import scipy.sparse
 from nets import LAWS, skew_cable, skew_web, system
 from oracle import Oracle
 
+import refweb
 from refweb import certificate, statics
 from refweb.cables import Cable
 from refweb.effects.gravity import Gravity
@@ -605,3 +606,24 @@ def test_work_of_reactions_is_the_energy_gained(name):
     gained = net_system.energy(1.0, found[-1].x) - net_system.energy(0.0, found[0].x)
     print(f"{work:.15g} J and {gained:.15g} J")
     assert abs(work - gained) <= 1e-9 * max(f.tension.max() for f in found) * np.linalg.norm(path)
+
+
+def test_a_fixed_body_presses_a_slack_web():
+    """The web starts inside the body and without tension: what balances is the contact, by both ways of solving."""
+    ball = refweb.Body(name="ball", radius=0.1, position=(0.0, 0.0, -0.08), fixed=True)
+    push = refweb.Observe(name="push", quantity="reaction", body="ball")
+    held = refweb.Observe(name="held", quantity="reaction")
+    pressed = refweb.Scene(
+        web=refweb.Window(mesh="square", rows=4, columns=4, side=0.2),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
+        effects=[ball, refweb.Contact(stiffness=1e5)],
+        observe=[push, held],
+    )
+    values = []
+    for method in ("newton", "relaxation"):
+        solution = refweb.run(pressed.replace(solve=refweb.Static(method=method)))
+        found = {name: result.value for name, result in solution.results.items()}
+        # Supports and body hold the web between them, to the residual that a run may end with.
+        assert found["push"] > 1.0 and abs(found["push"] - found["held"]) <= 1e-8 * found["push"]
+        values.append(found["push"])
+    np.testing.assert_allclose(values[0], values[1], rtol=1e-8)
