@@ -61,10 +61,14 @@ def _run(arguments):
 
 def _check(arguments):
     from .console import before
+    from .runner import follower_of
     from .scene import Scene
+    from .solution import Solution
 
     scene = Scene.load(arguments.scene)
-    before(scene, scene.build())
+    system = scene.build()
+    follower_of(scene, system, Solution(scene))
+    before(scene, system)
 
 
 def _info(arguments):

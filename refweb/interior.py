@@ -60,9 +60,7 @@ class InteriorPoint:
         """Force on every row of the tensions EA g."""
         cells, pull = self.system.net.cells, (self.axial * g)[:, None] * direction
         rows = self.system.rows
-        return np.column_stack(
-            [np.bincount(cells[:, 0], p, rows) - np.bincount(cells[:, 1], p, rows) for p in pull.T]
-        )
+        return np.column_stack([np.bincount(cells[:, 0], p, rows) - np.bincount(cells[:, 1], p, rows) for p in pull.T])
 
     def _factorize(self, direction, length):
         """Factorize the Newton matrix; the larger ``ridge``, the stiffer it is made."""

@@ -54,8 +54,7 @@ def run(scene, out=None, force=False, progress=None, announce=None):
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=_versions())
     solution.warnings += _notices(scene, system)
-    with in_file(scene.file):
-        follower = (_LoadSteps if scene.solve.kind == "static" else _dynamics())(scene, system, solution)
+    follower = follower_of(scene, system, solution)
     solution.columns = follower.columns
     folder = Folder(out, scene, solution.columns, solution.summary()) if out is not None else None
     tell = progress or (lambda text, share: None)
@@ -84,10 +83,14 @@ def run(scene, out=None, force=False, progress=None, announce=None):
     return solution
 
 
-def _dynamics():
-    from .dynamics import Motion
+def follower_of(scene, system, solution):
+    """What leads a scene from start to end; refuses what its solver cannot take, with an `InputError`."""
+    with in_file(scene.file):
+        if scene.solve.kind == "static":
+            return _LoadSteps(scene, system, solution)
+        from .dynamics import Motion
 
-    return Motion
+        return Motion(scene, system, solution)
 
 
 class _LoadSteps:
@@ -234,9 +237,12 @@ def _remarks(state, stats):
         yield "floor", text
     if stats["smallest_pivot"] == -1:
         law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
-        yield "saddle", (
-            f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would wrinkle "
-            'or buckle out of this state; law = "tension-only" has no such states'
+        yield (
+            "saddle",
+            (
+                f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would wrinkle "
+                'or buckle out of this state; law = "tension-only" has no such states'
+            ),
         )
     if stats["slack_nodes"]:
         some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")

@@ -336,7 +336,7 @@ def _by_kind(key, given, kinds):
         raise InputError(f"{key} = {shown(given)} must be a table: write [{key}]")
     kind = given.get("kind")
     if kind is None:
-        raise InputError(f'[{key}] kind is missing: one of {", ".join(kinds)}')
+        raise InputError(f"[{key}] kind is missing: one of {', '.join(kinds)}")
     if not isinstance(kind, str) or kind not in kinds:
         raise InputError(f"[{key}] kind = {shown(kind)}: unknown kind, {nearest(kind, kinds)}")
     return _resolve(kinds[kind]).read(f"[{key}]", given)

@@ -334,3 +334,30 @@ def test_statuses_as_the_shell_sees_them(tmp_path):
     done = python("-m", "refweb", "run", "wrong.toml", "--out", "no", cwd=tmp_path)
     assert done.returncode == 2 and done.stdout == "" and not (tmp_path / "no").exists()
     assert done.stderr == "refweb: wrong.toml: [cable] area = -0.0001 must be > 0 [m²]\n"
+
+
+def test_check_refuses_what_the_solver_cannot_take(here, capsys):
+    """A step above the bound and a free node without mass are wrong input, to check as to run."""
+    text = """
+[web]
+kind = "cable"
+start = [0, 0, 0]
+end = [1, 0, 0]
+elements = 2
+[cable]
+law = "linear"
+modulus = 1e6
+area = 1e-4
+density = {density}
+[solve]
+kind = "dynamic"
+duration = 0.1
+step_size = {step}
+"""
+    for density, step, message in [(0, 1e-6, "has no mass"), (100, 1.0, "[solve] step_size = 1 must be ≤")]:
+        (here / "wrong.toml").write_text(text.format(density=density, step=step))
+        for command in ("check", "run"):
+            assert main([command, "wrong.toml"]) == 2
+            err = capsys.readouterr().err
+            assert err.startswith("refweb: wrong.toml: ") and message in err and err.count("\n") == 1
+    assert files(here) == ["wrong.toml"]

@@ -186,4 +186,3 @@ class Contact(Table):
             observed=1,
             internal=True,
         )
-
