@@ -240,8 +240,8 @@ def _remarks(state, stats):
         yield (
             "saddle",
             (
-                f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would wrinkle "
-                'or buckle out of this state; law = "tension-only" has no such states'
+                f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would "
+                'wrinkle or buckle out of this state; law = "tension-only" has no such states'
             ),
         )
     if stats["slack_nodes"]:
