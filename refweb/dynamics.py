@@ -11,10 +11,9 @@ import numpy as np
 from . import probes
 from .central_difference import CentralDifference, OpenBook
 from .laws import SMOOTH
-from .lines import SLACKNESS
 from .observables import LINE, NODAL, Result
 from .solution import SOLVER
-from .state import State, floor_remark
+from .state import State, floor_remark, strength_remark
 
 ENERGIES = ("kinetic_energy", "strain_energy", "potential_energy", "contact_energy", "work", "total_energy")
 _VECTORS = ("momentum", "support_impulse")
@@ -32,8 +31,7 @@ def probe_of(observable, system):
     """An observable as a probe: (kernel, rows, data)."""
     net, quantity = system.net, observable.quantity
     if quantity == "slack_fraction":
-        margin = net.line_data[:, SLACKNESS] if net.law.number == SMOOTH else np.zeros(len(net.cells))
-        return probes.slack_fraction, [], margin[:, None]
+        return probes.slack_fraction, [], net.slackness[:, None]
     if quantity in LINE:
         elements = np.arange(len(net.line)) if observable.line is None else np.flatnonzero(net.line == observable.line)
         scale = 1.0 / net.area if quantity == "stress" else np.ones(len(net.cells))
@@ -231,6 +229,7 @@ class Motion:
     def results(self, run, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
         results, net = {}, self.system.net
+        state = State(self.system, run.time, run.x, run.v)
         for i, o in enumerate(self.scene.observables):
             value, when, where = float(last[1 + i]), run.time, None
             if o in self.probed:
@@ -238,7 +237,7 @@ class Motion:
                 if o.reduce != "final":
                     value, when, where = float(run.peaks[at]), float(run.times[at]), int(run.places[at])
                 elif o.quantity != "slack_fraction":
-                    where = o.value(State(self.system, run.time, run.x, run.v)).where
+                    where = o.value(state).where
                 if o.quantity in LINE and o.reduce != "final":
                     where = int(net.line[where])
                 summed = o.quantity == "slack_fraction" or (o.quantity == "reaction" and o.node is None)
@@ -329,6 +328,4 @@ class Motion:
             return
         if "stress" in self._peaks:
             yield from floor_remark(net, self._peaks["stress"])
-        if self._peaks.get("utilisation", 0.0) > 1.0:
-            used, line = self.solution.utilisation
-            yield f"line {line} breaks: stress over strength is {used:.3g}"
+        yield from strength_remark(self.solution.utilisation)

@@ -16,10 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .effects.elasticity import of
+from .effects.elasticity import strains
 from .factor import Factor
-from .laws import SMOOTH
-from .lines import AXIAL_STIFFNESS, LENGTH, SLACKNESS
+from .lines import AXIAL_STIFFNESS, LENGTH
 
 
 class InteriorPoint:
@@ -38,10 +37,9 @@ class InteriorPoint:
     """
 
     def __init__(self, system, t, x, loose):
-        self.system, self.t, self.x, self.loose = system, t, x.copy(), loose
+        self.system, self.x, self.loose = system, x.copy(), loose
         net = system.net
         self.axial, self.natural = net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, LENGTH]
-        self.margin = net.line_data[:, SLACKNESS] if net.law.number == SMOOTH else 0.0
         self.outer = sum(system.force_of(f, t, x) for f in system.families if not f.internal)
         self.load = np.abs(self.outer).max()
         self.factor, self.nlu = Factor(system.pattern), 0
@@ -52,9 +50,7 @@ class InteriorPoint:
         self._blocked = False
 
     def _strain(self):
-        net, strain = self.system.net, np.empty(len(self.axial))
-        of(net)[4](self.t, self.x, net.cells, net.line_data, strain)
-        return strain - self.margin
+        return strains(self.system.net, self.x) - self.system.net.slackness
 
     def _resultant(self, g, direction):
         """Force on every row of the tensions EA g."""

@@ -73,6 +73,11 @@ class Net:
         """Natural length of each element [m], shape (cells,)."""
         return self.line_data[:, LENGTH]
 
+    @property
+    def slackness(self):
+        """Strain at or below which an element is slack, shape (cells,): ε0, which is 0 for laws without it."""
+        return self.line_data[:, SLACKNESS]
+
 
 def basis(points, lines, natural_length, element=None):
     """The `skfem.Basis` of lines whose metric is the natural length.

@@ -1,8 +1,8 @@
 """Compiled probes: what an explicit loop looks at in every step, one scalar each.
 
 A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``lines`` holds tension and strain of
-each element, ``rows`` and ``data`` the probe's own numbers; where ``where[1]`` is `PLACE`
-it writes the row or element it stands at to ``where[0]``.
+each element, ``rows`` and ``data`` the probe's own numbers; where ``where[1]`` is `PLACE` it writes the row or
+element it stands at to ``where[0]``.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ import math
 
 from numba import types
 
-from .compiled import _array, kernel
+from .compiled import MATRIX, kernel
 
-_f, _i = types.float64, types.int64
-PROBE = _f(_f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 1), _array(_f, 2), _array(_i, 1))
+INTEGERS = types.Array(types.int64, 1, "C")
+"""Type of a probe's rows."""
+PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
 MAGNITUDE = 3
 """Component number of a magnitude."""
-
-
 PLACE = 1
 """Value of ``where[1]`` that asks a probe for the place of its value as well."""
 
@@ -114,7 +113,3 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
         if lines[c, 1] <= data[c, 0]:
             count += 1
     return count / lines.shape[0]
-
-
-INTEGERS = _array(_i, 1)
-"""Type of a probe's rows."""

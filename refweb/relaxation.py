@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from . import certificate
 from .compiled import FORCE, INDICES, MATRIX, kernel, typed_list
-from .statics import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale
+from .statics import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
 
 SAFETY = 0.9
 
 
 @kernel()
 def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
-    """``count`` steps; returns the largest force on a free row and the number of times the motion was stopped."""
+    """``count`` steps of x, v and f."""
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    before, stops = 0.0, 0
+    before = 0.0
     for _ in range(count):
         kinetic = 0.0
         for q in range(flat_x.size):
@@ -26,8 +27,6 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
                 flat_v[q] += flat_inverse[q] * flat_f[q]
                 kinetic += flat_v[q] * flat_v[q] / flat_inverse[q]
         if kinetic < before:
-            stops += 1
-            flat_v[:] = 0.0
             for q in range(flat_x.size):  # a new start from rest: half a kick
                 flat_v[q] = 0.5 * flat_inverse[q] * flat_f[q]
             kinetic = 0.0
@@ -37,14 +36,6 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
             flat_f[q] = 0.0
         for i in range(len(kernels)):
             kernels[i](t, x, v, f, cells[i], data[i], outs[i])
-    worst = 0.0
-    for r in range(x.shape[0]):
-        square = 0.0
-        for k in range(3):
-            if inverse[r, k] > 0.0:
-                square += f[r, k] * f[r, k]
-        worst = max(worst, square)
-    return np.sqrt(worst), stops
 
 
 def solve(system, load_steps, progress=None, most=5_000_000):
@@ -70,8 +61,6 @@ def solve(system, load_steps, progress=None, most=5_000_000):
     SolverError
         Where there is no equilibrium, or none is found.
     """
-    from . import certificate
-
     families = system.families
     outs = [np.zeros((len(f.cells), f.observed)) for f in families]
     cells, data = typed_list(INDICES, [f.cells for f in families]), typed_list(MATRIX, [f.data for f in families])
@@ -87,15 +76,12 @@ def solve(system, load_steps, progress=None, most=5_000_000):
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
-        v, f = np.zeros_like(x), system.force(t, x)
-        done = 0
-        error = np.inf
+        v, done, error = np.zeros_like(x), 0, np.inf
         while True:
-            worst, _ = relax(0, t, x, v, f, inverse, *lists)
             f, out = system.forces(t, x)
             tension = out[0][:, 0]
             here = max(scale, force_scale(system, t, x, tension))
-            last, error = error, worst / here if here else 0.0
+            last, error = error, residual(system, f, here)
             if error <= TOLERANCE or (error <= LIMIT and done and error > 0.5 * last):
                 break
             if done >= most or not np.isfinite(error):

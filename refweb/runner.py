@@ -15,7 +15,7 @@ from .laws import LINEAR
 from .observables import Result
 from .scene import Scene, in_file
 from .solution import SOLVER, Solution, as_history
-from .state import State, floor_remark
+from .state import State, floor_remark, strength_remark
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):
@@ -149,7 +149,7 @@ class _LoadSteps:
                 solution.state = state
                 if (used := state.utilisation) is not None:
                     solution.utilisation = float(used.max()), int(used.argmax())
-                for kind, text in _remarks(state, stats):
+                for kind, text in _remarks(state, stats, solution.utilisation):
                     self._remarks.setdefault(kind, []).append((found.step, text))
                 self.rows.append(row)
                 if folder is not None:
@@ -191,12 +191,10 @@ def _notices(scene, system):
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
     if scene.solve.kind == "dynamic":
         yield from _started(system)
-    loose = statics.unsupported(system) if scene.solve.kind == "static" else []
-    if not loose:
-        return
-    axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
-    nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
-    yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
+    elif loose := system.loose:
+        axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
+        nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
+        yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
 
 
 def _started(system):
@@ -230,7 +228,7 @@ def _cost(system, solution, started):
     return {"cpu_s": cpu, "wall_s": wall, "by_effect": share}
 
 
-def _remarks(state, stats):
+def _remarks(state, stats, utilisation):
     """What a reader of a state has to know: pairs of a kind and a text."""
     net = state.system.net
     for text in floor_remark(net, float(state.stress.max())):
@@ -247,6 +245,5 @@ def _remarks(state, stats):
     if stats["slack_nodes"]:
         some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
         yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
-    if state.utilisation is not None and state.utilisation.max() > 1.0:
-        line = int(state.utilisation.argmax())
-        yield "strength", f"line {line} breaks: stress over strength is {state.utilisation[line]:.3g}"
+    for text in strength_remark(utilisation):
+        yield "strength", text

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from .laws import LINEAR, SMOOTH
-from .lines import SLACKNESS
 
 
 class State:
@@ -64,11 +63,9 @@ class State:
 
     @cached_property
     def _element_strain(self):
-        from .effects.elasticity import of
+        from .effects.elasticity import strains
 
-        net, strain = self.system.net, np.empty(len(self.system.net.cells))
-        of(net)[4](self.time, self.x, net.cells, net.line_data, strain)
-        return strain
+        return strains(self.system.net, self.x)
 
     @cached_property
     def strain(self):
@@ -78,9 +75,7 @@ class State:
     @cached_property
     def slack(self):
         """True for each line whose strain is ≤ ε0 (laws without slackness: ≤ 0), shape (lines,)."""
-        net = self.system.net
-        margin = net.line_data[:, SLACKNESS] if net.law.number == SMOOTH else 0.0
-        return self._by_line(self._element_strain - margin) <= 0.0
+        return self._by_line(self._element_strain - self.system.net.slackness) <= 0.0
 
     @cached_property
     def slack_nodes(self):
@@ -118,6 +113,12 @@ class State:
         work = -book.pop("work") if "work" in book else None
         book["total_energy"] = sum(book.values())
         return book if work is None else {**book, "work": work}
+
+
+def strength_remark(utilisation):
+    """A warning where the largest stress over strength, (value, line), exceeds 1."""
+    if utilisation is not None and utilisation[0] > 1.0:
+        yield f"line {utilisation[1]} breaks: stress over strength is {utilisation[0]:.3g}"
 
 
 def floor_remark(net, stress):

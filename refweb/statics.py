@@ -67,31 +67,10 @@ class Equilibrium:
     certificate: object = None
 
 
-def unsupported(system):
-    """Parts of the net that can be carried off in a direction.
-
-    Returns
-    -------
-    list of (ndarray of int, int)
-        Rows of a connected part, and the axis in which none of them is supported.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    cells = [f.cells for f in system.families if f.cells.shape[1] > 1]
-    pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
-    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
-    count, part = connected_components(graph, directed=False)
-    held = np.zeros((count, 3), dtype=bool)
-    np.logical_or.at(held, part, system.supported)
-    return [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
-
-
 def check_supported(system, t):
-    """Refuse a load that no support carries; return the loose parts, whose loads balance."""
+    """Refuse a load that no support carries."""
     outer = sum(system.force_of(f, t, np.zeros((system.rows, 3))) for f in system.families if not f.internal)
-    loose = unsupported(system)
-    for rows, axis in loose:
+    for rows, axis in system.loose:
         resultant = np.sum(outer[rows, axis]) if np.ndim(outer) else 0.0
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
@@ -99,7 +78,6 @@ def check_supported(system, t):
                 f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
                 f"{resultant:.4g} N at step {t:g}, with no support in that direction: support one of them"
             )
-    return loose
 
 
 def force_scale(system, t, x, tension):
@@ -134,15 +112,11 @@ class Newton:
         self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
         self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
         self.factor = Factor(system.pattern)
-        self.loose = np.zeros(0, dtype=int)
+        number = np.full(3 * system.rows, -1)
+        number[system.free] = np.arange(len(system.free))
+        held = np.concatenate([[], *(number[3 * rows + axis] for rows, axis in system.loose)]).astype(int)
+        self.loose = system.pattern.diagonal[held]  # places that hold what floats, whose loads balance
         self.scale = 0.0
-
-    def _ground(self, t):
-        """Places on the diagonal that hold the loose parts of the net, whose loads balance."""
-        number = np.full(3 * self.system.rows, -1)
-        number[self.system.free] = np.arange(len(self.system.free))
-        loose = [number[3 * rows + axis] for rows, axis in check_supported(self.system, t)]
-        self.loose = self.system.pattern.diagonal[np.concatenate(loose)] if loose else np.zeros(0, dtype=int)
 
     def _matrix(self, t, x, shift, definite):
         values = self.system.stiffness(t, x, definite=definite)
@@ -201,7 +175,7 @@ class Newton:
             Where there is no equilibrium, or none is found.
         """
         system = self.system
-        self._ground(t)
+        check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
         stats = dict(nsteps=0, nfev=1, njev=0, nlu=0)

@@ -74,6 +74,20 @@ class System:
         """The fixed `refweb.pattern.Pattern` of the tangent."""
         return Pattern(self.rows, self.free, [f.cells for f in self._stiff])
 
+    @cached_property
+    def loose(self):
+        """Parts of the net that can be carried off: (rows of a connected part, axis in which none is supported)."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        cells = [f.cells for f in self.families if f.cells.shape[1] > 1]
+        pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
+        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(self.rows, self.rows))
+        count, part = connected_components(graph, directed=False)
+        held = np.zeros((count, 3), dtype=bool)
+        np.logical_or.at(held, part, self.supported)
+        return [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
+
     def drive(self, t, x, v=None):
         """Write the prescribed displacements [m] and velocities [m/s] at time t into x and v."""
         v = np.zeros_like(x) if v is None else v

@@ -118,19 +118,26 @@ def kernels(law, gradients, weights):
                     rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * axial
 
     @kernel(ENERGY)
-    def strains(t, x, cells, data, out):
+    def largest_strain(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             largest = -math.inf
             for q in range(points):
                 largest = max(largest, strain(x, cells, data, c, q, nodes, flat)[4])
             out[c] = largest
 
-    return force, energy, stiffness, bound, strains
+    return force, energy, stiffness, bound, largest_strain
 
 
 def of(net):
     """The kernels of a net's law and element."""
     return kernels(net.law.number, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
+
+
+def strains(net, x):
+    """Strain of each element at displacement x, its largest over quadrature points, shape (cells,)."""
+    strain = np.empty(len(net.cells))
+    of(net)[4](0.0, x, net.cells, net.line_data, strain)
+    return strain
 
 
 @dataclass(frozen=True, kw_only=True)
