@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .inputs import LARGEST, InputError, Table, choice, field, nearest, real, short, shown
+from .inputs import LARGEST, InputError, Table, choice, field, integer, nearest, real, short, shown
 from .laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")
@@ -54,6 +54,10 @@ class Cable(Table):
         Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
     strength : float, optional
         Stress at which a line breaks [Pa]; utilisation is reported against it.
+    order : {1, 2, 3}
+        Order of the elements: straight, quadratic, cubic.
+    subdivide : int
+        Elements per line.
     groups : dict of str to Group
         Values that differ by group of lines.
     """
@@ -66,6 +70,8 @@ class Cable(Table):
     smoothing: float | None = real(None, at_least=0, unit="1")
     prestrain: float = real(0.0, above=-1, unit="1")
     strength: float | None = real(None, above=0, unit="Pa")
+    order: int = choice(1, 2, 3, default=1)
+    subdivide: int = integer(1, at_least=1, at_most=1000)
     groups: dict = field(_groups, factory=dict)
 
     def check(self):

@@ -88,7 +88,7 @@ class CentralDifference:
     Parameters
     ----------
     system : refweb.system.System
-        Straight elements, lumped mass.
+        Of order 1, with lumped mass.
     probes : sequence of (probe, rows, data, sign)
         What to look at, see `refweb.probes`: at every row, and with sign 1 (−1) the largest (smallest) value over all
         steps.
@@ -104,12 +104,23 @@ class CentralDifference:
     Raises
     ------
     InputError
-        For a free row without mass, or a step above the bound.
+        For curved elements, a consistent mass, a free row without mass, or a step above the bound.
     """
 
     def __init__(self, system, probes=(), watch=(), safety=0.5, step_size=None, finer=1.0):
         self.system, self.safety, self.step_size, self.finer = system, safety, step_size, finer
         net, free = system.net, ~system.supported
+        if net.order > 1:
+            raise InputError(
+                f"[cable] order = {net.order} must be 1 with central-difference: the error of its steps is of order 2, "
+                f"and curved elements ask for more of them; use subdivide = {net.order * net.subdivide}, which has the "
+                'same nodes, or method = "cvode"'
+            )
+        if net.spread is not None:
+            raise InputError(
+                '[solve] mass = "consistent" must be "lumped" with central-difference: an explicit step divides each '
+                'force by one mass, and a matrix would have to be solved; use method = "cvode"'
+            )
         bare = np.flatnonzero((net.mass <= 0.0) & free.any(axis=1))
         if len(bare):
             raise InputError(
@@ -243,7 +254,7 @@ class CentralDifference:
         raise SolverError(f"energy not finite at t = {run.time:.6g} s: use a smaller safety")
 
     def _row_name(self, row):
-        nodes = len(self.system.net.web.points)
+        nodes = self.system.net.nodes
         return f"node {row}" if row < nodes else f'body "{self.system.net.bodies[row - nodes].name}"'
 
     def _name_drift(self, run, before):

@@ -10,6 +10,8 @@ evaluated here without cancellation: with T = k (l − L)₊, (T − |s|)²/2k o
 ones, plus (|s| l − s·d) for the direction. The stress energy of the element forces is quadratic and its gradient
 Lipschitz with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds every tension: |T − T*| ≤ √(2 k gap).
 
+Of curved elements every quadrature point is such a line, a bar of natural length w L whose vector is w dx/dξ.
+
 The balancing correction of the computed forces runs over taut lines first. It is kept in extended precision, where the
 platform has it, since what it leaves unbalanced enters the gap multiplied by a displacement.
 """
@@ -19,8 +21,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csc_array
 
+from .effects.elasticity import strains
 from .factor import Factor
 from .laws import TENSION_ONLY
 from .lines import AXIAL_STIFFNESS
@@ -45,42 +47,39 @@ class Certificate:
     strain_energy: float
 
 
-def straight_and_dead(system):
-    """True where the only internal forces are the tensions of straight elements, and all others are dead loads."""
+def dead(system):
+    """True where the only internal forces are the tensions of the lines, and all others are dead loads."""
     outer = [f for f in system.families if not f.internal]
-    dead = all(f.stiffness is None and f.energy is not None for f in outer)
-    return system.net.cells.shape[1] == 2 and dead and len(system.families) == len(outer) + 1
+    return all(f.stiffness is None and f.energy is not None for f in outer) and len(system.families) == len(outer) + 1
 
 
 def applies(system):
     """True where the potential is convex and the loads are dead."""
-    return system.net.law.number == TENSION_ONLY and straight_and_dead(system)
-
-
-def _incidence(cells, rows):
-    """Matrix (rows, cells) of what a force along each element does to its ends: + at the first, − at the second."""
-    ends = np.arange(0, 2 * len(cells) + 1, 2)
-    signs = np.tile(np.array([1, -1], dtype=np.longdouble), len(cells))
-    return csc_array((signs, cells.ravel(), ends), shape=(rows, len(cells)))
+    return system.net.law.number == TENSION_ONLY and dead(system)
 
 
 def certify(system, equilibrium, factor=None):
     """The `Certificate` of an equilibrium of a system to which it `applies`; ``factor``, if given, is used again."""
-    net, x, cells = system.net, equilibrium.x, system.net.cells
-    stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
-    vector = (net.points[cells[:, 1]] - net.points[cells[:, 0]]) + (x[cells[:, 1]] - x[cells[:, 0]])
+    net, x, bars = system.net, equilibrium.x, system.net.bars
+    points = len(net.weights)
+    weights = np.tile(net.weights, len(net.cells))
+    axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
+    natural = weights * np.repeat(net.natural_length, points)
+    stiffness = axial / natural
+    vector = bars @ net.points + bars @ x
     length = np.linalg.norm(vector, axis=1)
-    tension = equilibrium.tension
+    tension = axial * np.maximum(strains(net, x).ravel(), 0.0)
     direction = vector / np.where(length > 0, length, 1.0)[:, None]
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
 
     weight = stiffness * np.where(tension > 0.0, 1.0, 1e-9)
-    blocks = weight[:, None, None] * np.kron([[1.0, -1.0], [-1.0, 1.0]], np.eye(3))
-    values = system.assemble_lines(blocks)
+    unit = np.einsum("q,qa,qb->qab", net.weights**2, net.gradients, net.gradients)
+    blocks = np.einsum("cq,qab->cab", weight.reshape(-1, points), unit)
+    values = system.assemble_lines(np.kron(blocks, np.eye(3)))
     values[system.pattern.diagonal] += 1e-14 * stiffness.max()
     factor = factor or Factor(system.pattern)
     factor.update(values)
-    resultant = _incidence(cells, system.rows)
+    resultant = -bars.T.tocsc().astype(np.longdouble)
 
     force = (tension[:, None] * direction).astype(np.longdouble)
     correction = np.zeros_like(force)
@@ -89,7 +88,7 @@ def certify(system, equilibrium, factor=None):
         unbalanced[system.supported] = 0.0
         y = np.zeros((system.rows, 3))
         y.ravel()[system.free] = factor.solve(unbalanced.ravel()[system.free].astype(float))
-        correction += weight[:, None] * (y[cells[:, 1]] - y[cells[:, 0]])
+        correction += weight[:, None] * (bars @ y)
     unbalanced = outer + resultant @ (force + correction)
     unbalanced[system.supported] = 0.0
     balanced = force + correction
@@ -99,7 +98,7 @@ def certify(system, equilibrium, factor=None):
     along = (balanced * direction).sum(axis=1)
     turned = (across**2).sum(axis=1) / np.where(size + along > 0, size + along, 1.0)
     turned = np.where(along > 0, turned, size - along) * length
-    slack = np.where(tension > 0.0, 0.0, net.natural_length - length)
+    slack = np.where(tension > 0.0, 0.0, natural - length)
     terms = (tension - size) ** 2 / (2 * stiffness) + size * np.maximum(slack, 0.0) + turned
 
     reach = 2.0 * np.linalg.norm(x, axis=1).max()
@@ -107,4 +106,5 @@ def certify(system, equilibrium, factor=None):
     rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum()) + np.abs(unbalanced).sum() * reach
     gap = float(terms.sum() + rounding)
     strain_energy = float(0.5 * (tension**2 / stiffness).sum())
-    return Certificate(gap, np.sqrt(2.0 * stiffness * gap), 2.0 * np.sqrt(strain_energy * gap) + gap)
+    bound = np.sqrt(2.0 * stiffness * gap).reshape(-1, points).max(axis=1)
+    return Certificate(gap, bound, 2.0 * np.sqrt(strain_energy * gap) + gap)

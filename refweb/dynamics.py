@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 
-from . import probes
+from . import probes, starts
 from .central_difference import CentralDifference, OpenBook
 from .laws import SMOOTH
 from .observables import LINE, NODAL, Result
@@ -53,6 +53,24 @@ def probe_of(observable, system):
     kernel = probes.velocity if quantity == "velocity" else probes.displacement
     data = net.points[rows] if quantity == "position" else np.zeros((len(rows), 3))
     return kernel, numbers, data
+
+
+def started(system, x=None):
+    """What a reader has to know of a start at displacement x: jumps of motion, and bodies inside of the web."""
+    before = np.zeros((system.rows, 3)) if x is None else x
+    now, energy = before.copy(), {}
+    system.drive(0.0, now)
+    for family in system.families:
+        if family.internal:
+            energy[family.name] = system.energy_of(family, 0.0, now)
+    moved = np.flatnonzero((now != before).any(axis=1))
+    if len(moved):
+        stored = sum(map(sum, energy.values()))
+        yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+    pushed = energy.get("contact", np.zeros(1))
+    if pushed.max() > 0.0:
+        line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
+        yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
 
 
 def row_times(scene):
@@ -124,7 +142,7 @@ class _Twin:
         motion = self._motion
         try:
             solver = motion.solver(self._safety, math.sqrt(2.0))
-            run = solver.start()
+            run = solver.start(*motion.begin)
             last = None
             for _, history in blocks(solver, run, *motion._times()):
                 last = history[-1:]
@@ -176,6 +194,11 @@ class Motion:
         self._own = self._hidden()
         self._solver = self.solver(scene.solve.safety)
         self._columns = self._places()
+        self.begin = None, None
+        if (folder := scene.start_folder) is not None:
+            self.begin = starts.stored(system, folder)
+        if scene.solve.start != "equilibrium":
+            solution.warnings += started(system, self.begin[0])
 
     @property
     def done(self):
@@ -252,6 +275,15 @@ class Motion:
     def follow(self, folder, tell):
         """Run; a run whose energy book is open is repeated with half the step, twice at most."""
         scene, solution, safety = self.scene, self.solution, self.scene.solve.safety
+        if scene.solve.start == "equilibrium":
+            found = starts.equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
+            self.begin = found.x, None
+            if found.stats.get("smallest_pivot") == -1:
+                solution.warnings.append(
+                    "the equilibrium it starts from is a saddle (a pivot of its tangent is negative): the motion "
+                    'leaves it by itself; law = "tension-only" has no such states'
+                )
+            solution.warnings += started(self.system, found.x)
         for attempt in range(3):
             with _Twin(self, safety, scene.accuracy.error == "twin") as twin:
                 try:
@@ -278,7 +310,7 @@ class Motion:
 
     def _run(self, solver, folder, tell):
         """One run from start to end, with rows and frames; returns its results."""
-        run, times, stops = solver.start(), *self._times()
+        run, times, stops = solver.start(*self.begin), *self._times()
         tell(0.0)
         try:
             for first, history in blocks(solver, run, times, stops):

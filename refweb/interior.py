@@ -22,7 +22,7 @@ from .lines import AXIAL_STIFFNESS, LENGTH
 
 
 class InteriorPoint:
-    """One load step of a net of straight elements, followed along the central path.
+    """One load step of a net, followed along the central path; the lines of it are the bars of `Net.bars`.
 
     Parameters
     ----------
@@ -38,8 +38,11 @@ class InteriorPoint:
 
     def __init__(self, system, t, x, loose):
         self.system, self.x, self.loose = system, x.copy(), loose
-        net = system.net
-        self.axial, self.natural = net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, LENGTH]
+        net, points = system.net, len(system.net.weights)
+        self.bars = net.bars
+        self.axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
+        self.natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.line_data[:, LENGTH], points)
+        self._ends = net.weights[:, None] * net.gradients
         self.outer = sum(system.force_of(f, t, x) for f in system.families if not f.internal)
         self.load = np.abs(self.outer).max()
         self.factor, self.nlu = Factor(system.pattern), 0
@@ -50,13 +53,12 @@ class InteriorPoint:
         self._blocked = False
 
     def _strain(self):
-        return strains(self.system.net, self.x) - self.system.net.slackness
+        net = self.system.net
+        return (strains(net, self.x) - net.slackness[:, None]).ravel()
 
     def _resultant(self, g, direction):
         """Force on every row of the tensions EA g."""
-        cells, pull = self.system.net.cells, (self.axial * g)[:, None] * direction
-        rows = self.system.rows
-        return np.column_stack([np.bincount(cells[:, 0], p, rows) - np.bincount(cells[:, 1], p, rows) for p in pull.T])
+        return -(self.bars.T @ ((self.axial * g)[:, None] * direction))
 
     def _factorize(self, direction, length):
         """Factorize the Newton matrix; the larger ``ridge``, the stiffer it is made."""
@@ -66,22 +68,28 @@ class InteriorPoint:
             across = self.axial * np.maximum(self.g, ridge) / length
             block = (along - across)[:, None, None] * direction[:, :, None] * direction[:, None, :]
             block += across[:, None, None] * np.eye(3)
-            values = self.system.assemble_lines(np.block([[block, -block], [-block, block]]))
+            values = self.system.assemble_lines(self._by_cell(block))
             values[self.loose] += 1e-10 * np.max(self.axial / self.natural)
             self.factor.update(values)
             self.nlu += 1
             yield
             ridge = max(10.0 * ridge, 1e-10 * self.g.max())
 
+    def _by_cell(self, blocks):
+        """Stiffness of each cell from one (3, 3) block per bar."""
+        nodes, points = self._ends.shape[1], self._ends.shape[0]
+        unit = np.einsum("qa,qb->qab", self._ends, self._ends)
+        whole = np.einsum("qab,cqij->caibj", unit, blocks.reshape(-1, points, 3, 3))
+        return whole.reshape(-1, 3 * nodes, 3 * nodes)
+
     def follow(self, tolerance, most=80):
         """Go on until residual, strain mismatch and complementarity are below ``tolerance``; return the displacement.
 
         ``most`` bounds the iterations of this call; where they run out the last displacement is returned.
         """
-        system, cells, free = self.system, self.system.net.cells, self.system.free
+        system, bars, free = self.system, self.bars, self.system.free
         for _ in range(most):
-            position = system.net.points + self.x
-            line = position[cells[:, 1]] - position[cells[:, 0]]
+            line = bars @ (system.net.points + self.x)
             length = np.maximum(np.linalg.norm(line, axis=1), 1e-3 * self.natural)
             direction = line / length[:, None]
             mismatch = self.w - self.g + self._strain()
@@ -105,7 +113,7 @@ class InteriorPoint:
                     return None
                 p = np.zeros((system.rows, 3))
                 p.ravel()[free] = y
-                turn = p[cells[:, 1]] - p[cells[:, 0]]
+                turn = bars @ p
                 stretch = np.einsum("ci,ci->c", direction, turn) / self.natural  # noqa: B023
                 dg = fixed + self.g / (self.g + self.w) * stretch
                 return p, dg, dg - stretch - mismatch, (np.linalg.norm(turn, axis=1) / self.natural).max()  # noqa: B023

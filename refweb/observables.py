@@ -126,12 +126,12 @@ class Observe(Table):
                 hint = nearest(self.body, names) if names else "the scene has no [[body]]"
                 raise InputError(f'body = "{self.body}" is no body, {hint}')
             return np.array([net.bodies[names.index(self.body)].row])
-        return np.arange(len(net.web.points)) if self.node is None else net.web.find(self.node)
+        return np.arange(net.nodes) if self.node is None else net.find(self.node)
 
     def value(self, state):
         """The observable at one instant, a `Value`."""
         if self.quantity == "slack_fraction":
-            return Value(float(state.slack.mean()), None)
+            return Value(float(state.element_slack.mean()), None)
         if self.quantity in TOTAL:
             return Value(state.energies[self.quantity], None)
         if self.quantity in LINE:

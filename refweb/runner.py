@@ -189,29 +189,10 @@ def _versions():
 def _notices(scene, system):
     if system.net.bodies and not any(f.name == "contact" for f in system.families):
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
-    if scene.solve.kind == "dynamic":
-        yield from _started(system)
-    elif loose := system.loose:
+    if scene.solve.kind == "static" and (loose := system.loose):
         axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
         nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
         yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
-
-
-def _started(system):
-    """What is not at rest in a dynamic scene before it begins."""
-    x, energy = np.zeros((system.rows, 3)), {}
-    system.drive(0.0, x)
-    for family in system.families:
-        if family.internal:
-            energy[family.name] = system.energy_of(family, 0.0, x)
-    moved = np.flatnonzero(x.any(axis=1))
-    if len(moved):
-        stored = sum(map(sum, energy.values()))
-        yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    pushed = energy.get("contact", np.zeros(1))
-    if pushed.max() > 0.0:
-        line = int(pushed.argmax()) % len(system.net.line)
-        yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
 
 
 def _cost(system, solution, started):

@@ -38,6 +38,8 @@ EFFECTS = {
 }
 LISTS = ("load", "motion", "point_mass", "velocity", "body")
 """Effects whose table may stand several times, ``[[load]]``."""
+STARTS = ("web", "equilibrium")
+"""What ``start`` may be besides a result folder."""
 SHIPPED = pathlib.Path(__file__).parent / "scenes"
 
 
@@ -199,6 +201,8 @@ class Scene:
             else:
                 given[key] = effect.to_dict()
         given["solve"] = self.solve.to_dict()
+        if (folder := self.start_folder) is not None:
+            given["solve"]["start"] = str(folder)
         given["output"] = self.output.to_dict()
         if self.accuracy is not None:
             given["accuracy"] = self.accuracy.to_dict()
@@ -211,6 +215,12 @@ class Scene:
         from .observables import DEFAULT
 
         return tuple(self.observe) or DEFAULT
+
+    @property
+    def start_folder(self):
+        """The result folder that a dynamic scene starts from, None where it starts from none."""
+        start = getattr(self.solve, "start", "web")
+        return None if start in STARTS else (self.folder or pathlib.Path()).joinpath(start).resolve()
 
     def replace(self, **changes):
         """A scene that differs in some fields."""
@@ -239,14 +249,15 @@ class Scene:
             except OSError as error:
                 path = shown(getattr(web, "path", ""))
                 raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
-        net = _in("", lines.build, web, self.cable, quasi_static=self.solve.kind == "static")
+        static, consistent = self.solve.kind == "static", self.solve.mass == "consistent"
+        net = _in("", lines.build, web, self.cable, quasi_static=static, consistent=consistent)
         supported = np.zeros((len(net.points), 3), dtype=bool)
         if self.supports is None:
             supported[web.rim] = True
         where = [("[supports]", self.supports)] if self.supports is not None else []
         where += [(f"[[support]] {i + 1}", s) for i, s in enumerate(self.support)]
         for name, table in where:
-            found = _in(name, web.find, table.nodes, "nodes")
+            found = _in(name, net.find, table.nodes, "nodes")
             supported[np.ix_(found, table.components)] = True
         acting, count = [Elasticity()], {}
         for effect in self.effects:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .inputs import InputError, Table, choice, components, integer, nodes, numbers_list, real
+from .inputs import InputError, Table, choice, components, integer, nodes, numbers_list, real, text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,11 +17,22 @@ class Supports(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Static(Table):
-    """Static solution at a list of load steps."""
+    """Static solution at a list of load steps.
+
+    Parameters
+    ----------
+    method : {"newton", "relaxation"}
+        Newton's method or, independent of any tangent, dynamic relaxation.
+    load_steps : sequence of float
+        Values of t.
+    mass : {"lumped", "consistent"}
+        The weight is the same with either; the modes at the equilibrium are not.
+    """
 
     kind: str = choice("static", default="static")
     method: str = choice("newton", "relaxation", default="newton")
     load_steps: tuple = numbers_list((1.0,))
+    mass: str = choice("lumped", "consistent", default="lumped")
 
     def check(self):
         if len(self.load_steps) > 100_000:
@@ -40,6 +51,11 @@ class Dynamic(Table):
         Share of the bound of stability that a step is, 0 < safety ≤ 1.
     step_size : float, optional
         Largest step instead [s]; the step used is the largest below it that divides a history row.
+    mass : {"lumped", "consistent"}
+        Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
+    start : {"web", "equilibrium"} or path
+        State at t = 0: the web as it is, its equilibrium under what acts at t = 0 (free bodies do not), or the last
+        state in a result folder.
     """
 
     kind: str = choice("dynamic", default="dynamic")
@@ -47,6 +63,8 @@ class Dynamic(Table):
     duration: float = real(above=0, unit="s")
     safety: float = real(0.5, above=0, at_most=1)
     step_size: float | None = real(None, above=0, unit="s")
+    mass: str = choice("lumped", "consistent", default="lumped")
+    start: str = text("web")
 
 
 @dataclass(frozen=True, kw_only=True)

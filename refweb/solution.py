@@ -90,13 +90,13 @@ class Solution:
 
     @property
     def positions(self):
-        """Positions of the web's nodes in the last state [m], shape (nodes, 3)."""
-        return self.state.position[: len(self.state.system.net.web.points)]
+        """Positions of the nodes in the last state [m], shape (nodes, 3); those of order and subdivision come last."""
+        return self.state.position[: self.state.system.net.nodes]
 
     @property
     def displacement(self):
-        """Displacement of the web's nodes in the last state [m], shape (nodes, 3)."""
-        return self.state.x[: len(self.state.system.net.web.points)]
+        """Displacement of the nodes in the last state [m], shape (nodes, 3)."""
+        return self.state.x[: self.state.system.net.nodes]
 
     @property
     def tension(self):
@@ -120,13 +120,13 @@ class Solution:
 
     @property
     def velocities(self):
-        """Velocities of the web's nodes in the last state [m/s], shape (nodes, 3)."""
-        return self.state.v[: len(self.state.system.net.web.points)]
+        """Velocities of the nodes in the last state [m/s], shape (nodes, 3)."""
+        return self.state.v[: self.state.system.net.nodes]
 
     @property
     def reaction(self):
         """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
-        return self.state.reaction[: len(self.state.system.net.web.points)]
+        return self.state.reaction[: self.state.system.net.nodes]
 
     def __repr__(self):
         found = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())

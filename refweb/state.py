@@ -62,29 +62,35 @@ class State:
         return self._by_line(self.element_tension / self.system.net.area)
 
     @cached_property
-    def _element_strain(self):
+    def element_strain(self):
+        """Strain of each element, its largest over quadrature points [1], shape (cells,)."""
         from .effects.elasticity import strains
 
-        return strains(self.system.net, self.x)
+        return strains(self.system.net, self.x).max(axis=1)
+
+    @cached_property
+    def element_slack(self):
+        """True for each element that is slack all along, as `slack`, shape (cells,)."""
+        return self.element_strain <= self.system.net.slackness
 
     @cached_property
     def strain(self):
         """Engineering strain [1], shape (lines,)."""
-        return self._by_line(self._element_strain)
+        return self._by_line(self.element_strain)
 
     @cached_property
     def slack(self):
         """True for each line whose strain is ≤ ε0 (laws without slackness: ≤ 0), shape (lines,)."""
-        return self._by_line(self._element_strain - self.system.net.slackness) <= 0.0
+        return np.bincount(self.system.net.line, ~self.element_slack) == 0.0
 
     @cached_property
     def slack_nodes(self):
         """Free nodes that no taut line holds, whose position is not unique; bars hold under compression as well."""
         net = self.system.net
         held = self.system.supported.all(axis=1)
-        holds = np.ones(len(net.web.lines), dtype=bool) if net.law.number == LINEAR else ~self.slack
-        held[net.web.lines[holds].ravel()] = True
-        return np.flatnonzero(~held[: len(net.web.points)])
+        holds = np.ones(len(net.cells), dtype=bool) if net.law.number == LINEAR else ~self.element_slack
+        held[net.cells[holds].ravel()] = True
+        return np.flatnonzero(~held[: net.nodes])
 
     @cached_property
     def reaction(self):

@@ -301,7 +301,7 @@ def solve(system, load_steps, progress=None):
     newton, x = Newton(system, progress), np.zeros((system.rows, 3))
     for k, t in enumerate(load_steps):
         spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-        path = system.net.law.number != LINEAR and certificate.straight_and_dead(system)
+        path = system.net.law.number != LINEAR and certificate.dead(system)
         try:
             state = newton.solve(t, x, warm=k > 0, most=25 if path else 400)
         except NotFound as error:

@@ -6,6 +6,8 @@ A `System` concatenates the families of its effects once and has the interface o
 
 from __future__ import annotations
 
+import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -50,10 +52,33 @@ class System:
             self.supported[body.row] = body.fixed
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
+        self._arrange()
+
+    def _arrange(self):
         self.free = np.flatnonzero(~self.supported)
         self._rest = np.zeros((self.rows, 3))
         self._out = [np.zeros((len(f.cells), f.observed)) for f in self.families]
         self._blocks = [np.empty((len(f.cells), 3 * f.cells.shape[1], 3 * f.cells.shape[1])) for f in self._stiff]
+
+    def at_rest(self):
+        """The system as statics sees it: free bodies are held where they are, and nothing feels them."""
+        waiting = [body.row for body in self.net.bodies if not body.fixed]
+        if not waiting:
+            return self
+        rest = copy.copy(self)
+        rest.__dict__.pop("pattern", None)
+        rest.__dict__.pop("loose", None)
+        rest.supported = self.supported.copy()
+        rest.supported[waiting] = True
+        rest.families = []
+        for family in self.families:
+            felt = ~np.isin(family.cells, waiting).any(axis=1)
+            if felt.all():
+                rest.families.append(family)
+            elif felt.any():
+                rest.families.append(replace(family, cells=family.cells[felt], data=family.data[felt]))
+        rest._arrange()
+        return rest
 
     def initial_velocity(self):
         """Velocities at the start [m/s], shape (rows, 3): those of the effects and bodies."""

@@ -19,6 +19,7 @@ LAYERS = [
     ["laws", "time_tables", "probes", "webs"],
     ["stepping"],
     ["lattices", "single_cable", "given_webs", "cables", "settings"],
+    ["elements"],
     ["lines"],
     ["pattern", "factor"],
     ["effects"],
@@ -32,7 +33,8 @@ LAYERS = [
     ["observables"],
     ["io"],
     ["solution"],
-    ["scene", "dynamics"],
+    ["scene", "starts"],
+    ["dynamics"],
     ["runner"],
     ["views", "shots", "drawing"],
     ["console", "pictures"],
@@ -132,7 +134,7 @@ def test_only_the_scene_names_the_effects():
         found |= {match for text in texts(name) for match in EFFECT.findall(text)}
         if found and not name.startswith("effects"):
             named[name] = found
-    assert set(named) - {"", "scene"} <= {"state", "interior"}
+    assert set(named) - {"", "scene"} <= {"state", "interior", "certificate"}
     assert all(found == {"elasticity"} for name, found in named.items() if name not in ("", "scene"))
     effects = {name.removeprefix("effects.") for name in MODULES if name.startswith("effects.")}
     assert named["scene"] == effects and named[""] <= effects - {"elasticity"}

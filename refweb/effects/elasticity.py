@@ -19,21 +19,20 @@ import numpy as np
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import Table
 from ..laws import energy_density, prepared_stress, stress, tangent
-from ..lines import AXIAL_STIFFNESS, G0, LENGTH, POINT, R0, SLACKNESS, SMOOTHING
+from ..lines import AXIAL_STIFFNESS, G0, LENGTH, R0, REFERENCE, SLACKNESS, SMOOTHING
 from . import Family
 
 
 @kernel()
 def strain(x, cells, data, c, q, nodes, gradients):
     """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
-    at = POINT + 4 * q
     u0 = u1 = u2 = 0.0
     for a in range(nodes):
         row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]  # unsigned: no row counts from the end
         u0 += d * x[row, 0]
         u1 += d * x[row, 1]
         u2 += d * x[row, 2]
-    r0, r1, r2, r = data[c, at], data[c, at + 1], data[c, at + 2], data[c, at + 3]
+    r0, r1, r2, r = data[c, REFERENCE], data[c, REFERENCE + 1], data[c, REFERENCE + 2], data[c, REFERENCE + 3]
     natural = data[c, LENGTH]
     p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
     length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
@@ -118,14 +117,12 @@ def kernels(law, gradients, weights):
                     rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * axial
 
     @kernel(ENERGY)
-    def largest_strain(t, x, cells, data, out):
+    def every_strain(t, x, cells, data, out):
         for c in range(cells.shape[0]):
-            largest = -math.inf
             for q in range(points):
-                largest = max(largest, strain(x, cells, data, c, q, nodes, flat)[4])
-            out[c] = largest
+                out[c * points + q] = strain(x, cells, data, c, q, nodes, flat)[4]
 
-    return force, energy, stiffness, bound, largest_strain
+    return force, energy, stiffness, bound, every_strain
 
 
 def of(net):
@@ -134,9 +131,9 @@ def of(net):
 
 
 def strains(net, x):
-    """Strain of each element at displacement x, its largest over quadrature points, shape (cells,)."""
-    strain = np.empty(len(net.cells))
-    of(net)[4](0.0, x, net.cells, net.line_data, strain)
+    """Strain at each quadrature point of each element at displacement x, shape (cells, points)."""
+    strain = np.empty((len(net.cells), len(net.weights)))
+    of(net)[4](0.0, x, net.cells, net.line_data, strain.ravel())
     return strain
 
 

@@ -36,6 +36,6 @@ class Motion(Table):
 
     def on(self, net):
         """The driven rows."""
-        driven = net.web.find(self.node)
+        driven = net.find(self.node)
         data = np.tile(flattened(self.displacement), (len(driven), 1))
         return Drive(cells=column(driven), data=data, kernel=drive)

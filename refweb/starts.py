@@ -1,0 +1,66 @@
+"""States that dynamics starts from: the web as it is, its equilibrium, or the last state of another run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import statics
+from .inputs import InputError, short
+
+
+def equilibrium(system, progress=None):
+    """The `refweb.statics.Equilibrium` at t = 0 under gravity, loads, motion and fixed bodies; free bodies wait.
+
+    Raises
+    ------
+    SolverError
+        Where there is no equilibrium, or none is found.
+    """
+    (found,) = statics.solve(system.at_rest(), [0.0], progress)
+    return found
+
+
+def stored(system, folder):
+    """Displacement and velocity of the rows from the checkpoint in a result folder.
+
+    Nodes are matched by number, bodies by name; a body that the folder does not have stays as its table says.
+
+    Returns
+    -------
+    x, v : ndarray, shape (rows, 3)
+        Displacement from the web's position [m], velocity [m/s].
+
+    Raises
+    ------
+    InputError
+        Where there is no checkpoint, or it is that of another net.
+    """
+    net, name = system.net, f'[solve] start = "{short(str(folder))}":'
+    try:
+        with np.load(folder / "checkpoint.npz") as checkpoint:
+            stored = {key: checkpoint[key] for key in ("positions", "displacements", "velocities", "bodies")}
+    except OSError as error:
+        reason = "is no folder" if not folder.is_dir() else f"checkpoint.npz cannot be read: {error.strerror or error}"
+        raise InputError(f'{name} {reason}; it must be "web", "equilibrium" or a result folder') from None
+    except (ValueError, KeyError, EOFError) as error:
+        raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes ({error})") from None
+    positions, displacements, velocities, bodies = stored.values()
+    nodes = len(positions) - len(bodies)
+    if nodes != net.nodes:
+        raise InputError(
+            f"{name} holds {nodes} nodes, must be those of this scene, {net.nodes}: same web, order and subdivide"
+        )
+    if not all(a.shape == positions.shape and np.isfinite(a).all() for a in (positions, displacements, velocities)):
+        raise InputError(f"{name} checkpoint.npz holds numbers that are not finite, or not one for each node")
+    x, v = np.zeros((system.rows, 3)), system.initial_velocity()
+    row = {str(body): nodes + i for i, body in enumerate(bodies)}
+    pairs = [(body.row, row[body.name]) for body in net.bodies if body.name in row and not body.fixed]
+    here, there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
+    reference = positions - displacements
+    same = np.isclose(reference[there], net.points[here], rtol=0, atol=1e-15 * np.abs(positions).max(initial=0.0))
+    x[here] = np.where(same, displacements[there], positions[there] - net.points[here])
+    given = v.copy()
+    v[here] = velocities[there]
+    told = given.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
+    v[told] = given[told]
+    return x, v
