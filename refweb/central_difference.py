@@ -247,15 +247,11 @@ class CentralDifference:
             wrong = ~np.isfinite(x + v + f).all(axis=1)
             if wrong.any():
                 row = int(np.flatnonzero(wrong)[0])
-                name = self._row_name(row)
+                name = self.system.row_name(row)
                 lines = net.line[(net.cells == row).any(axis=1)]
                 name += f", line {lines[0]}," if len(lines) else ""
                 raise SolverError(f"number not finite at {name} t = {before + step * h:.6g} s: use a smaller safety")
         raise SolverError(f"energy not finite at t = {run.time:.6g} s: use a smaller safety")
-
-    def _row_name(self, row):
-        nodes = self.system.net.nodes
-        return f"node {row}" if row < nodes else f'body "{self.system.net.bodies[row - nodes].name}"'
 
     def _name_drift(self, run, before):
         """Say where energy came in: the effect and cell whose energy grew most in the last row."""
@@ -268,7 +264,7 @@ class CentralDifference:
         if of.cells.shape[1] > 1:
             place = f"line {system.net.line[cell % len(system.net.line)]}"
         else:
-            place = self._row_name(of.cells[cell, 0])
+            place = self.system.row_name(of.cells[cell, 0])
         smaller = f"step_size than {self.step_size:g}" if self.step_size else f"safety than {self.safety:g}"
         raise OpenBook(
             f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, limit "

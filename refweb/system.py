@@ -138,6 +138,41 @@ class System:
         family.force(t, x, self._rest if v is None else v, f, family.cells, family.data, out)
         return f
 
+    def power(self, family, t, x, v):
+        """Power of a family that is booked as work [W]."""
+        f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), family.observed))
+        family.force(t, x, v, f, family.cells, family.data, out)
+        return out[:, 0].sum()
+
+    @cached_property
+    def _spread(self):
+        """Consistent less lumped mass of all rows, a sparse matrix [kg]; None where mass is lumped."""
+        from scipy.sparse import coo_array
+
+        net = self.net
+        if net.spread is None:
+            return None
+        i = np.repeat(net.cells[:, :, None], net.cells.shape[1], axis=2)
+        pairs = (i.ravel(), i.swapaxes(1, 2).ravel())
+        return coo_array((net.spread.ravel(), pairs), shape=(self.rows, self.rows)).tocsr()
+
+    def momentum(self, v):
+        """M v of every row [N s], shape (rows, 3)."""
+        lumped = self.net.mass[:, None] * v
+        return lumped if self._spread is None else lumped + self._spread @ v
+
+    def mass(self):
+        """Values of the mass matrix M [kg] in the fixed pattern."""
+        values = np.zeros(len(self.pattern.indices))
+        if self.net.spread is not None:
+            values += self.assemble_lines(np.kron(self.net.spread, np.eye(3)))
+        values[self.pattern.diagonal] += np.repeat(self.net.mass, 3)[self.free]
+        return values
+
+    def row_name(self, row):
+        """How a message calls a row: a node by its number, a body by its name."""
+        return f"node {row}" if row < self.net.nodes else f'body "{self.net.bodies[row - self.net.nodes].name}"'
+
     def energy_of(self, family, t, x):
         """Energy of each cell of one family [J]."""
         out = np.empty(len(family.cells))
@@ -154,6 +189,15 @@ class System:
         for family, blocks in zip(self._stiff, self._blocks, strict=True):
             family.stiffness(t, x, v, blocks, family.cells, family.data, definite)
         return self.pattern.assemble(self._blocks)
+
+    @property
+    def symmetric(self):
+        """Whether K and C are symmetric."""
+        return all(f.symmetric for f in self.families)
+
+    def damping(self, t, x, v):
+        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity."""
+        return None
 
     def assemble_lines(self, blocks):
         """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""

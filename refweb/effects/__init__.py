@@ -46,6 +46,10 @@ class Family:
         power [W].
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
+    symmetric : bool
+        Whether the stiffness is symmetric.
+    times : sequence of float
+        Times at which the force has a corner [s]; no step of an implicit method passes one.
     """
 
     name: str
@@ -58,6 +62,8 @@ class Family:
     book: str
     observed: int = 0
     internal: bool = False
+    symmetric: bool = True
+    times: tuple = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,11 +78,14 @@ class Drive:
         Numbers of each row.
     kernel : kernel
         Writes x and v.
+    times : sequence of float
+        Times at which the motion has a corner [s].
     """
 
     cells: np.ndarray
     data: np.ndarray
     kernel: Callable
+    times: tuple = ()
 
 
 def column(rows):

@@ -71,4 +71,5 @@ class Load(Table):
             bound=None,
             book="work",
             observed=1,
+            times=tuple(t for t, _ in self.factor or ()),
         )

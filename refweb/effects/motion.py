@@ -38,4 +38,4 @@ class Motion(Table):
         """The driven rows."""
         driven = net.find(self.node)
         data = np.tile(flattened(self.displacement), (len(driven), 1))
-        return Drive(cells=column(driven), data=data, kernel=drive)
+        return Drive(cells=column(driven), data=data, kernel=drive, times=tuple(row[0] for row in self.displacement))

@@ -1,0 +1,326 @@
+"""What CVODE and IDA have in common: history rows, peaks, books of energy and momentum around a solver's own steps.
+
+A solver takes steps of its own choice and knows its state anywhere within the last one. Each step, cut at the history
+rows, is looked at in its middle and at its end: for peaks, and for the integrals of power and of the supports' forces
+by Simpson's rule. A flag of success is not believed: the book of energies is checked at every row as in
+`refweb.central_difference`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .central_difference import DRIFT, OpenBook
+from .compiled import ENERGY, INDICES, MATRIX, VECTOR, typed_list
+from .errors import SolverError
+from .inputs import InputError
+from .probes import PLACE
+from .stepping import book_energies, no_energy
+
+TRAVEL = 0.2
+"""Largest share of a body's radius that anything may move in a step, so that nothing passes through."""
+
+
+@dataclass(eq=False)
+class Course:
+    """State of an implicit run.
+
+    Attributes
+    ----------
+    time : float
+        Time that has been looked at [s]; the solver's last step may end later.
+    x, v : ndarray, shape (rows, 3)
+        Displacement [m] and velocity [m/s] at that time.
+    peaks, times, places : ndarray, shape (probes,)
+        Extreme value of each probe, its time, and the row or element it stands at.
+    work : float
+        Work of loads and motion [J].
+    impulse : ndarray, shape (3,)
+        Impulse of the supports on the net [N s].
+    """
+
+    time: float
+    x: np.ndarray
+    v: np.ndarray
+    peaks: np.ndarray
+    times: np.ndarray
+    places: np.ndarray
+    work: float = 0.0
+    impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    reached: float = 0.0
+    step: float = 0.0
+    nsteps: int = 0
+    energy: float = 0.0
+    largest: float = 0.0
+    worst: float = 0.0
+    rates: tuple = ()
+
+    @property
+    def drift(self):
+        """Largest |ΔE − work| over the largest energy [1]."""
+        return self.worst / self.largest if self.largest > 0.0 else 0.0
+
+
+class Implicit:
+    """A solver of SUNDIALS on one system.
+
+    Parameters
+    ----------
+    system : refweb.system.System
+        Of any order, with either mass.
+    probes, watch : sequence
+        What to look at, see `refweb.central_difference.CentralDifference`.
+    rtol : float
+        Relative tolerance of displacements and velocities.
+    atol_position, atol_velocity : float, optional
+        Absolute tolerances [m], [m/s]; by default `scales` times rtol.
+    """
+
+    method = ""
+
+    def __init__(self, system, probes=(), watch=(), rtol=1e-6, atol_position=None, atol_velocity=None):
+        self.system, self.rtol = system, rtol
+        self.unknowns = len(system.free)
+        near, fast = scales(system)
+        self.atol_position = rtol * near if atol_position is None else atol_position
+        self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
+        self.stats = dict(nfev=0, njev=0, nlu=0)
+        families = system.families
+        self._probes, self._watch = list(probes), list(watch)
+        self._signs = np.array([float(p[-1]) for p in (*probes, *watch)])
+        self._arrays = [
+            (probe, np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float))
+            for probe, rows, data, _ in self._probes
+        ]
+        self._weights = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
+        self._book = (
+            typed_list(INDICES, [f.cells for f in families]),
+            typed_list(MATRIX, [f.data for f in families]),
+            typed_list(ENERGY, [f.energy or no_energy for f in families]),
+            typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
+        )
+        self._working = [i for i, f in enumerate(families) if f.book == "work"]
+        self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
+        self._held = system.supported
+        times = [t for part in (*families, *system.drives) for t in part.times]
+        self._breaks = np.unique(np.array(times, dtype=float))
+        self._radius = min((body.radius for body in system.net.bodies), default=np.inf)
+
+    # What a solver brings
+
+    def _begin(self, t, x, v):
+        """Initialise the solver."""
+        raise NotImplementedError
+
+    def _advance(self, stop, last):
+        """Take one step, not beyond ``stop``, on the way to ``last``; return the time reached."""
+        raise NotImplementedError
+
+    def _interpolated(self, t):
+        """Unknown displacements and velocities at a time within the last step."""
+        raise NotImplementedError
+
+    # What it makes of them
+
+    def start(self, x=None, v=None):
+        """The `Course` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
+        system = self.system
+        x = np.zeros((system.rows, 3)) if x is None else x.copy()
+        v = system.initial_velocity() if v is None else v.copy()
+        v[system.supported] = 0.0
+        system.drive(0.0, x, v)
+        self._reference = np.where(self._held, x, 0.0)  # motion is written over it
+        signs, count = self._signs, len(self._probes)
+        run = Course(0.0, x, v, np.zeros(len(signs)), np.zeros(len(signs)), np.full(len(signs), -1))
+        force, out = system.forces(0.0, x, v)
+        where = np.full(2, PLACE)
+        for i, (probe, rows, data) in enumerate(self._arrays):
+            run.peaks[i] = probe(0.0, x, v, force, out[0], rows, data, where)
+            run.places[i] = where[0]
+        self._kinetic = self._driven_energy(v)
+        total = self._energies(run)
+        run.peaks[count:] = self._weights @ total
+        stepping = count + np.flatnonzero(self._weights[:, -1])
+        run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        own = np.delete(total[:-2], self._working)
+        run.energy, run.largest = own.sum(), np.abs(own).sum()
+        run.rates = self._rates(0.0, x, v, force)
+        with self._reported(run):
+            self._begin(0.0, x.ravel()[system.free], v.ravel()[system.free])
+        return run
+
+    def rows(self, run, ends):
+        """Advance a run to each time of ``ends`` in turn.
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+            As `refweb.central_difference.CentralDifference.rows`.
+
+        Raises
+        ------
+        OpenBook
+            Where the energy drift exceeds `refweb.central_difference.DRIFT`.
+        SolverError
+            Where the solver gives up, or a number is not finite.
+        """
+        ends = np.atleast_1d(np.asarray(ends, dtype=float))
+        history = np.zeros((len(ends), 1 + len(self._probes) + len(self.system.families) + 9))
+        for row, end in zip(history, ends, strict=True):
+            before = run.time
+            while run.time < end:
+                if run.reached <= run.time:
+                    self._take_step(run, ends[-1])
+                self._cover(run, min(run.reached, end))
+            self._fill(row, run, before)
+        return history
+
+    def _take_step(self, run, last):
+        """One step of the solver, not beyond a corner of a table, nor further than a body can be passed."""
+        stop, ahead = np.inf, self._breaks[self._breaks > run.time * (1.0 + 1e-12)]
+        if len(ahead):
+            stop = ahead[0]
+        if np.isfinite(self._radius):
+            speed = 2.0 * np.sqrt((run.v**2).sum(axis=1).max())
+            stop = min(stop, run.time + TRAVEL * self._radius / speed) if speed > 0.0 else stop
+        if stop - run.time < 1e-12 * last:
+            stop = run.time + 1e-12 * last
+        with self._reported(run):
+            reached = self._advance(stop, last)
+        if not reached > run.reached:
+            raise SolverError(f"{self.method} makes no step at t = {run.time:.6g} s: raise rtol = {self.rtol:g}")
+        run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
+
+    def _at(self, t):
+        """Displacement and velocity of all rows at a time within the last step."""
+        system = self.system
+        x, v = self._reference.copy(), np.zeros((system.rows, 3))
+        x.ravel()[system.free], v.ravel()[system.free] = self._interpolated(t)
+        system.drive(t, x, v)
+        return x, v
+
+    def _cover(self, run, end):
+        """Look at the run in the middle between its time and ``end``, and at the end; leave it there."""
+        width = end - run.time
+        for place, weight in ((0.5, 4.0), (1.0, 1.0)):
+            t = end if place == 1.0 else run.time + 0.5 * width
+            x, v = self._at(t)
+            force, out = self.system.forces(t, x, v)
+            if not np.isfinite(force).all():
+                row = int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0])
+                raise SolverError(f"number not finite at {self.system.row_name(row)}, t = {t:.6g} s: use a smaller rtol")
+            self._peaks(run, t, x, v, force, out[0])
+            power, reaction = self._rates(t, x, v, force)
+            if place == 0.5:
+                middle = power, reaction
+        run.work += width / 6.0 * (run.rates[0] + 4.0 * middle[0] + power)
+        run.impulse = run.impulse + width / 6.0 * (run.rates[1] + 4.0 * middle[1] + reaction)
+        run.rates = power, reaction
+        run.time, run.x, run.v = t, x, v
+        if len(self._weights):
+            total, count = self._energies(run), len(self._probes)
+            for j, value in enumerate(self._weights @ total):
+                if self._signs[count + j] * value > self._signs[count + j] * run.peaks[count + j]:
+                    run.peaks[count + j], run.times[count + j] = value, run.time
+
+    def _peaks(self, run, t, x, v, force, lines):
+        where = np.zeros(2, dtype=np.int64)
+        for i in np.flatnonzero(self._signs[: len(self._probes)]):
+            probe, rows, data = self._arrays[i]
+            value = probe(t, x, v, force, lines, rows, data, where)
+            if self._signs[i] * value > self._signs[i] * run.peaks[i]:
+                where[1] = PLACE
+                probe(t, x, v, force, lines, rows, data, where)
+                run.peaks[i], run.times[i], run.places[i], where[1] = value, t, where[0], 0
+
+    def _rates(self, t, x, v, force):
+        """Power of loads and, less its change of kinetic energy, of motion [W], and force of the supports [N]."""
+        power = sum(self.system.power(self.system.families[i], t, x, v) for i in self._working)
+        driven = self._driven
+        power -= (force[driven] * v[driven]).sum() if len(driven) else 0.0
+        return power, -np.where(self._held, force, 0.0).sum(axis=0)
+
+    def _driven_energy(self, v):
+        mass, driven = self.system.net.mass, self._driven
+        return 0.5 * (mass[driven, None] * v[driven] ** 2).sum() if len(driven) else 0.0
+
+    def _energies(self, run):
+        """Energy of each family, kinetic energy, work [J] and step size [s]."""
+        system, total = self.system, np.zeros(len(self.system.families) + 3)
+        work = run.work + self._driven_energy(run.v) - self._kinetic
+        cells, data, energies, outs = self._book
+        book_energies(run.time, run.x, run.v, system.net.mass, cells, data, energies, outs, np.array([work]), total)
+        total[-3] = 0.5 * (run.v * system.momentum(run.v)).sum()
+        total[-1] = run.step
+        return total
+
+    def _fill(self, row, run, before):
+        system, where = self.system, np.zeros(2, dtype=np.int64)
+        force, out = system.forces(run.time, run.x, run.v)
+        total = self._energies(run)
+        values = [p(run.time, run.x, run.v, force, out[0], r, d, where) for p, r, d in self._arrays]
+        momentum = np.where(self._held, 0.0, system.momentum(run.v)).sum(axis=0)
+        row[:] = [run.time, *values, *total, *momentum, *run.impulse]
+        own = np.delete(total[:-2], self._working)
+        run.largest = max(run.largest, np.abs(own).sum())
+        drift = abs(own.sum() - total[-2] - run.energy)
+        run.worst = max(run.worst, drift)
+        if drift > DRIFT * run.largest:
+            raise OpenBook(
+                f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, "
+                f"limit {DRIFT:g}: use a smaller rtol than {self.rtol:g}"
+            )
+
+    @contextlib.contextmanager
+    def _reported(self, run):
+        """Keep what SUNDIALS prints for the message of its failure."""
+        said = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(said):
+                yield
+        except _Stopped as stop:
+            reason = re.sub(r"\[\w+, Error: (-?\d+)\]", "", said.getvalue())
+            reason = " ".join(reason.split()) or str(stop)
+            x, v = run.x, run.v
+            force = np.where(self._held, 0.0, self.system.force(run.time, x, v))
+            row = int(np.argmax(np.linalg.norm(force, axis=1)))
+            raise SolverError(
+                f"{self.method} stopped at t = {run.reached:.6g} s with steps of {run.step:.3g} s: {reason.rstrip('.')}; "
+                f"the largest force that moves anything is at {self.system.row_name(row)}: raise rtol = {self.rtol:g}, "
+                "or lower the stiffness that asks for such steps"
+            ) from None
+
+
+class _Stopped(Exception):
+    """A solver of SUNDIALS gave up."""
+
+
+def scales(system):
+    """Displacement [m] and velocity [m/s] that tolerances are relative to where the state is near zero.
+
+    A strain of 1e-3 in the shortest element, and the velocity at which its ends take that up: 1e-3 of the speed of
+    sound in the fastest element.
+    """
+    net = system.net
+    length = net.natural_length
+    mass = np.maximum(np.bincount(net.cells.ravel(), minlength=system.rows), 1)
+    light = np.where(net.mass > 0.0, net.mass, np.inf) / mass
+    least = light[net.cells].min(axis=1)
+    rate = np.sqrt(net.line_data[:, 1] / length / np.where(np.isfinite(least), least, np.inf)).max(initial=0.0)
+    near = 1e-3 * length.min()
+    return near, near * rate if rate > 0.0 else near
+
+
+def refuse_massless(system, method):
+    """Refuse free nodes without mass, for a method that divides by it."""
+    bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
+    if len(bare):
+        raise InputError(
+            f"node {bare[0]} has no mass, which {method} needs: give density > 0 or a [[point_mass]], or use "
+            'method = "ida"'
+        )
