@@ -31,7 +31,9 @@ _HOME = {
     "Velocity": "effects.velocity",
     "Body": "effects.body",
     "Contact": "effects.contact",
+    "Link": "effects.link",
     "Accuracy": "settings",
+    "Event": "settings",
     "InputError": "inputs",
     "SolverError": "errors",
 }

@@ -20,7 +20,7 @@ from .compiled import BOUND, ENERGY, FORCE, INDICES, MATRIX, VECTOR, typed_list
 from .errors import SolverError
 from .inputs import InputError
 from .probes import INTEGERS, PLACE, PROBE
-from .stepping import MOST, advance, book_energies, no_bound, no_energy, rows_ahead, step_bound
+from .stepping import MOST, advance, book_energies, ended_by, no_bound, no_energy, passes, rows_ahead, step_bound
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
@@ -46,6 +46,8 @@ class Run:
         Work of loads and motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
+    events : ndarray, shape (events, 6)
+        What each event has come to, see `refweb.stepping`.
     """
 
     state: np.ndarray
@@ -55,6 +57,12 @@ class Run:
     places: np.ndarray
     work: np.ndarray
     impulse: np.ndarray
+    events: np.ndarray
+
+    @property
+    def stopped(self):
+        """Whether an event has ended the run."""
+        return bool(ended_by(self.events))
 
     @property
     def time(self):
@@ -82,6 +90,12 @@ class Run:
         return float(self.state[5] / self.state[4]) if self.state[4] > 0.0 else 0.0
 
 
+def event_table(events):
+    """Events as rows of numbers, see `refweb.stepping`."""
+    rows = [(slot, level, 0.0, float(rising), float(stop), np.inf) for slot, level, rising, stop in events]
+    return np.array(rows, dtype=float).reshape(len(rows), 6)
+
+
 class CentralDifference:
     """Central differences on one system.
 
@@ -98,6 +112,9 @@ class CentralDifference:
         Share of the step bound, 0 < safety ≤ 1.
     step_size : float, optional
         A fixed step instead [s], at most the bound.
+    events : sequence of (slot, level, rising, stop)
+        What to report the time of, to the step: the value of a probe, or behind those of a sum, passes a level, upwards
+        if ``rising`` is true; with ``stop`` the run ends there.
     finer : float
         Number of steps of each row over what the other arguments make of it, ≥ 1.
 
@@ -107,7 +124,7 @@ class CentralDifference:
         For curved elements, a consistent mass, a free row without mass, or a step above the bound.
     """
 
-    def __init__(self, system, probes=(), watch=(), safety=0.5, step_size=None, finer=1.0):
+    def __init__(self, system, probes=(), watch=(), events=(), safety=0.5, step_size=None, finer=1.0):
         self.system, self.safety, self.step_size, self.finer = system, safety, step_size, finer
         net, free = system.net, ~system.supported
         if net.order > 1:
@@ -151,7 +168,7 @@ class CentralDifference:
         )
         signs = np.array([float(p[-1]) for p in (*probes, *watch)])
         self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
-        self._seeing = list(probes)
+        self._seeing, self._events = list(probes), event_table(events)
         self._probes = (
             typed_list(PROBE, [p[0] for p in probes]),
             typed_list(INTEGERS, [np.array(p[1], dtype=np.int64) for p in probes]),
@@ -167,6 +184,10 @@ class CentralDifference:
         x = np.zeros((self.system.rows, 3)) if x is None else x
         rates = np.empty(self.system.rows)
         return step_bound(reach, 0.0, x, self._masses[0], self._moving, rates, self._bounds, self._cells, self._data)
+
+    def figures(self, run):
+        """What a run has spent, for ``run.json``."""
+        return dict(nfev=run.nsteps + 1, njev=0, nlu=0)
 
     def start(self, x=None, v=None):
         """The `Run` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
@@ -190,9 +211,12 @@ class CentralDifference:
         values[len(probes) :] = self._watch @ total
         stepping = len(probes) + np.flatnonzero(self._watch[:, -1])
         values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        events = self._events.copy()
+        for event in events:
+            passes(event, values[int(event[0])])
         own = np.delete(total[:-2], self._ends[2])
         state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
-        return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3))
+        return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3), events)
 
     def _peaks(self, run):
         return (*self._probes, run.peaks, run.times, run.places, run.work, run.impulse)
@@ -204,7 +228,7 @@ class CentralDifference:
         -------
         ndarray, shape (rows, columns)
             Time, value of each probe, energy of each family, kinetic energy, work, step size, momentum of all that is
-            free and impulse of the supports (3 columns each).
+            free and impulse of the supports (3 columns each). Fewer rows than times where an event ends the run.
 
         Raises
         ------
@@ -219,13 +243,15 @@ class CentralDifference:
         done = rows_ahead(
             ends, self.safety, step, self.finer, DRIFT, run.state, run.saved, *self._masses, self._moving, *self._ends,
             *self._forces, self._seen, *self._energies, self._bounds, *self._drives, *self._peaks(run),
-            self._watch, history,
+            self._watch, run.events, history,
         )  # fmt: skip
         if done < 0:
             raise SolverError(
                 f"the step at t = {run.time:.6g} s is {run.state[2]:.3g} s, more than {MOST:g} steps to the next row: "
                 "ask for shorter rows, or lower the stiffness that asks for the step"
             )
+        if done and run.stopped and history[done - 1, 0] == run.time:
+            return history[:done]
         if done < len(ends):
             before = ends[done - 1] if done else start
             if not np.isfinite(history[done]).all():
@@ -242,7 +268,7 @@ class CentralDifference:
         for step in range(1, count + 1):
             advance(
                 1, h, before + (step - 1) * h, x, v, f, *self._masses, *self._ends, *self._forces, self._seen,
-                *self._drives, *self._peaks(run), *self._energies, self._watch, total,
+                *self._drives, *self._peaks(run), *self._energies, self._watch, total, self._events[:0],
             )  # fmt: skip
             wrong = ~np.isfinite(x + v + f).all(axis=1)
             if wrong.any():

@@ -208,7 +208,11 @@ class Cvode(Implicit):
         for block, values in ((J[n:, :n], K), (J[n:, n:], C)):
             if values is not None:
                 full = matrix(values).toarray()
-                block[:] = -(np.linalg.solve(self._mass_matrix.toarray(), full) if self._consistent else full / self._mass[:, None])
+                block[:] = -(
+                    np.linalg.solve(self._mass_matrix.toarray(), full)
+                    if self._consistent
+                    else full / self._mass[:, None]
+                )
 
     def _options(self):
         from sksundae.cvode import CVODEJacTimes, CVODEPrecond

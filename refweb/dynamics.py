@@ -1,4 +1,4 @@
-"""Explicit runs of a scene: what is looked at in every step, history rows, peaks and their errors."""
+"""Dynamic runs of a scene: what is looked at in every step, history rows, peaks and their errors."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 from . import probes, starts
 from .central_difference import CentralDifference, OpenBook
 from .laws import SMOOTH
-from .observables import LINE, NODAL, Result
+from .observables import LINE, NODAL, Observe, Result
 from .solution import SOLVER
 from .state import State, floor_remark, strength_remark
+from .stepping import TIME
 
 ENERGIES = ("kinetic_energy", "strain_energy", "potential_energy", "contact_energy", "work", "total_energy")
 _VECTORS = ("momentum", "support_impulse")
@@ -25,6 +26,13 @@ def _weights(system, quantity):
     weights = [book != "work" and (total or book == quantity) for book in energies]
     weights += [total or quantity == "kinetic_energy", quantity == "work", quantity == "step_size"]
     return np.array(weights, dtype=float)
+
+
+def _weight(system):
+    """Force of gravity on every row [N]."""
+    still = np.zeros((system.rows, 3))
+    heavy = [f for f in system.families if f.book == "potential_energy"]
+    return sum((system.force_of(family, 0.0, still) for family in heavy), start=still)
 
 
 def probe_of(observable, system):
@@ -45,10 +53,7 @@ def probe_of(observable, system):
         rest = np.zeros((len(rows), 3))
         if observable.body is not None:
             weight[:] = -1.0
-            still = np.zeros((system.rows, 3))
-            for family in system.families:
-                if family.book == "potential_energy":
-                    rest += system.force_of(family, 0.0, still)[rows]
+            rest = _weight(system)[rows]
         return probes.reaction, numbers, np.hstack([weight, rest])
     kernel = probes.velocity if quantity == "velocity" else probes.displacement
     data = net.points[rows] if quantity == "position" else np.zeros((len(rows), 3))
@@ -104,31 +109,36 @@ def blocks(solver, run, times, stops):
 
 SPREAD = 3.0
 """± of a result over its error if the method has its order."""
+FINER = 4.0
+"""How much smaller the tolerance of the twin of an implicit run is."""
 
 
 def with_errors(results, twin, order=2.0):
-    """Results with ± from their difference to a run of half the error, times ``order`` and `SPREAD`.
+    """Results with ± from their difference to a run of a smaller error, times ``order`` and `SPREAD`.
 
     Central differences are of order 2: a run of √2 times the steps has half the error, so that the error is twice the
     difference where that order holds (``order`` is that factor for the steps really taken). Peaks, contact and slack
     lines have none; three times as much then covers most: of the 17 observables of the four impacts shipped, 16 have
     their value at 1/8 of the step within ±. The other is a peak of stress, 93.4 ± 3.04 kPa and off by 3.05 kPa; where
-    both runs happen to agree on a peak, ± says too little.
+    both runs happen to agree on a peak, ± says too little. The error of CVODE and IDA goes with the tolerance to the
+    power 2/3 at order 2, and faster at higher ones.
     """
     errors = {n: SPREAD * order * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
     return {n: r._replace(error=errors[n]) for n, r in results.items()}
 
 
 class _Twin:
-    """A run of half the error beside the run itself, in a thread of its own: the compiled loop needs no interpreter."""
+    """A run of a smaller error: beside an explicit run, whose compiled loop needs no interpreter, in a thread of its
+    own; after an implicit one."""
 
-    def __init__(self, motion, safety, wanted):
-        self._motion, self._safety, self._wanted = motion, safety, wanted
+    def __init__(self, motion, accuracy, wanted):
+        self._motion, self._accuracy, self._wanted = motion, accuracy, wanted
+        self._beside = wanted and motion.explicit
         self._stop = threading.Event()
 
     def __enter__(self):
         self._thread, self._ended, self._failure = None, None, None
-        if self._wanted:
+        if self._beside:
             self._thread = threading.Thread(target=self._run, daemon=True)
             self._thread.start()
         return self
@@ -141,11 +151,13 @@ class _Twin:
     def _run(self):
         motion = self._motion
         try:
-            solver = motion.solver(self._safety, math.sqrt(2.0))
+            solver = motion.solver(self._accuracy, twin=True)
             run = solver.start(*motion.begin)
             last = None
             for _, history in blocks(solver, run, *motion._times()):
                 last = history[-1:]
+                if run.stopped:
+                    break
                 if self._stop.is_set():
                     return
             self._ended = run, motion.table(last)[0]
@@ -153,13 +165,15 @@ class _Twin:
             self._failure = error
 
     def results(self):
-        """Wait for it; its results, its number of steps and why it failed, None where there are none."""
+        """Wait for it; its results, its end and why it failed, None where there are none."""
         if self._thread is not None:
             self._thread.join()
+        elif self._wanted:
+            self._run()
         if self._ended is None:
             return None, None, self._failure
         run, last = self._ended
-        return self._motion.results(run, last), run.nsteps, None
+        return self._motion.results(run, last), run, None
 
 
 class Motion:
@@ -184,15 +198,20 @@ class Motion:
         self.scene, self.system, self.solution = scene, system, solution
         self.rows = []
         self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
-        self.watched = [o for o in scene.observables if o.quantity in (*ENERGIES, "step_size") and o.reduce != "final"]
+        awaited = {event.observe for event in scene.event}
+        sums = [o for o in scene.observables if o.quantity in (*ENERGIES, "step_size")]
+        self.watched = [o for o in sums if o.reduce != "final" or o.name in awaited]
         books = {f.book for f in system.families}
         books |= {"kinetic_energy", "total_energy"} | ({"work"} if system.drives else set())
         self.energies = [name for name in ENERGIES if name in books]
         self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in self.energies]
         self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
+        self.explicit = scene.solve.method == "central-difference"
         self._own = self._hidden()
-        self._solver = self.solver(scene.solve.safety)
+        self._events = [self._event(event) for event in scene.event]
+        self._accuracy = scene.solve.safety if self.explicit else scene.solve.rtol
+        self._solver = self.solver(self._accuracy)
         self._columns = self._places()
         self.begin = None, None
         if (folder := scene.start_folder) is not None:
@@ -214,18 +233,48 @@ class Motion:
             own["utilisation"] = 1.0 / (net.area * net.strength)
         return own
 
-    def solver(self, safety, finer=1.0):
-        """The `CentralDifference` of the scene at a share of the step bound, or a step_size, ``finer`` times finer."""
-        signs, step = {"max": 1, "min": -1, "final": 0}, self.scene.solve.step_size
-        return CentralDifference(
-            self.system,
-            probes=[(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed]
-            + [(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()],
-            watch=[(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched],
-            safety=safety,
-            step_size=step,
-            finer=finer,
-        )
+    def _event(self, event):
+        """An event as (probe, level, rising), the probe None where it is an observable's."""
+        system = self.system
+        if event.kind == "contact":
+            rows = [body.row for body in system.net.bodies if event.body in (None, body.name)]
+            return (probes.push, rows, _weight(system)[rows]), 0.0, True
+        if event.kind == "taut":
+            probe = probe_of(Observe(name="_", quantity="strain", line=event.line), system)
+            return probe, float(system.net.slackness[probe[1][1]]), True
+        return None, event.value, False
+
+    def solver(self, accuracy, twin=False):
+        """The solver of the scene at a safety, or rtol; the twin's error is smaller."""
+        signs, solve = {"max": 1, "min": -1, "final": 0}, self.scene.solve
+        probed = [(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed]
+        probed += [(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()]
+        slots = {o.name: i for i, o in enumerate(self.probed)}
+        for event, (probe, _, _) in zip(self.scene.event, self._events, strict=True):
+            if probe is not None:
+                slots[event] = len(probed)
+                probed.append((*probe, 0))
+        slots |= {o.name: len(probed) + i for i, o in enumerate(self.watched)}
+        table = [
+            (slots[event if probe is not None else event.observe], level, rising, event.stop)
+            for event, (probe, level, rising) in zip(self.scene.event, self._events, strict=True)
+        ]
+        watch = [(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched]
+        if self.explicit:
+            finer = math.sqrt(2.0) if twin else 1.0
+            return CentralDifference(
+                self.system, probed, watch, table, safety=accuracy, step_size=solve.step_size, finer=finer
+            )
+        keys = {"max_order": solve.max_order, "linear_solver": solve.linear_solver}
+        share = 1.0 / FINER if twin else 1.0
+        keys |= {key: share * getattr(solve, key) for key in ("atol_position", "atol_velocity") if getattr(solve, key)}
+        if solve.method == "ida":
+            from .ida import Ida
+
+            return Ida(self.system, probed, watch, table, rtol=share * accuracy, **keys)
+        from .cvode import Cvode
+
+        return Cvode(self.system, probed, watch, table, rtol=share * accuracy, family=solve.family, **keys)
 
     def table(self, history):
         """Rows of the solver as rows of ``history.csv``."""
@@ -233,7 +282,7 @@ class Motion:
 
     def _places(self):
         """What each column of ``history.csv`` is of the solver's columns, shape (solver columns, columns)."""
-        first = 1 + len(self.probed) + len(self._own)
+        first = 1 + len(self.probed) + len(self._own) + sum(probe is not None for probe, *_ in self._events)
         sums = len(self.system.families) + 3
         count = first + sums + 6
         columns = [np.eye(count)[0]]
@@ -266,15 +315,15 @@ class Motion:
                 summed = o.quantity == "slack_fraction" or (o.quantity == "reaction" and o.node is None)
                 if summed or o.body is not None:
                     where = None
-            elif o in self.watched:
-                at = len(self.probed) + len(self._own) + self.watched.index(o)
+            elif o in self.watched and o.reduce != "final":
+                at = len(run.peaks) - len(self.watched) + self.watched.index(o)
                 value, when = float(run.peaks[at]), float(run.times[at])
             results[o.name] = Result(value, None, o.unit, when, where)
         return results
 
     def follow(self, folder, tell):
-        """Run; a run whose energy book is open is repeated with half the step, twice at most."""
-        scene, solution, safety = self.scene, self.solution, self.scene.solve.safety
+        """Run; a run whose energy book is open is repeated with half the step, or a tenth of rtol, twice at most."""
+        scene, solution, accuracy = self.scene, self.solution, self._accuracy
         if scene.solve.start == "equilibrium":
             found = starts.equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
             self.begin = found.x, None
@@ -285,26 +334,31 @@ class Motion:
                 )
             solution.warnings += started(self.system, found.x)
         for attempt in range(3):
-            with _Twin(self, safety, scene.accuracy.error == "twin") as twin:
+            with _Twin(self, accuracy, scene.accuracy.error == "twin") as twin:
                 try:
                     results = self._run(self._solver, folder, lambda share: tell("running", share))
                 except OpenBook as error:
                     if attempt == 2 or scene.solve.step_size is not None:
                         raise
-                    safety *= 0.5
-                    solution.warnings.append(f"{error}; repeated with safety = {safety:g}")
-                    self._solver, self.rows = self.solver(safety), []
+                    accuracy *= 0.5 if self.explicit else 0.1
+                    key = "safety" if self.explicit else "rtol"
+                    solution.warnings.append(f"{error}; repeated with {key} = {accuracy:g}")
+                    self._solver, self.rows = self.solver(accuracy), []
                     solution.frames.clear()
                     if folder is not None:
                         folder.restart(solution.summary())
                     continue
                 tell("finding errors by a twin run", 1.0)
-                other, steps, failure = twin.results()
+                other, ended, failure = twin.results()
             break
         solution.reduced = results
         if other:
-            ratio = solution.solver["nsteps"] / steps
-            solution.reduced = with_errors(results, other, 1.0 / (1.0 - ratio**2))
+            less = (solution.solver["nsteps"] / ended.nsteps) ** 2 if self.explicit else FINER ** (-2.0 / 3.0)
+            factor = 1.0 / (1.0 - less)
+            solution.reduced = with_errors(results, other, factor)
+            for found, time in zip(solution.events, ended.events[:, TIME], strict=True):
+                if found["time"] is not None and np.isfinite(time):
+                    found["error"] = SPREAD * factor * abs(found["time"] - float(time))
         if failure:
             solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
 
@@ -322,9 +376,11 @@ class Motion:
                     self.rows = [table[-1].tolist()]
                     for row in table:
                         folder.row(row)
-                if last in stops:
+                if last in stops or run.stopped:
                     self._frame(last, folder, run)
                 tell((last + 1) / len(times))
+                if run.stopped:
+                    break
         finally:
             self._note(run)
         return self.results(run, table[-1])
@@ -342,7 +398,11 @@ class Motion:
             self.solution.utilisation = float(self._peaks["utilisation"]), int(self.system.net.line[at])
         if np.isfinite(run.x).all():
             self.solution.state = State(self.system, run.time, run.x.copy(), run.v.copy())
-        figures = dict(nsteps=run.nsteps, nfev=run.nsteps + 1, njev=0, nlu=0, energy_drift=run.drift)
+        self.solution.events = [
+            {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
+            for event, time in zip(self.scene.event, run.events[:, TIME], strict=True)
+        ]
+        figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.figures(run))
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None
 

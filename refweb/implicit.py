@@ -11,16 +11,16 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .central_difference import DRIFT, OpenBook
+from .central_difference import DRIFT, OpenBook, event_table
 from .compiled import ENERGY, INDICES, MATRIX, VECTOR, typed_list
 from .errors import SolverError
 from .inputs import InputError
 from .probes import PLACE
-from .stepping import book_energies, no_energy
+from .stepping import LEVEL, SIDE, SLOT, STOP, TIME, book_energies, ended_by, no_energy, passes
 
 TRAVEL = 0.2
 """Largest share of a body's radius that anything may move in a step, so that nothing passes through."""
@@ -42,6 +42,8 @@ class Course:
         Work of loads and motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
+    events : ndarray, shape (events, 6)
+        What each event has come to, see `refweb.stepping`.
     """
 
     time: float
@@ -50,6 +52,7 @@ class Course:
     peaks: np.ndarray
     times: np.ndarray
     places: np.ndarray
+    events: np.ndarray
     work: float = 0.0
     impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
     reached: float = 0.0
@@ -61,9 +64,14 @@ class Course:
     rates: tuple = ()
 
     @property
+    def stopped(self):
+        """Whether an event has ended the run."""
+        return bool(ended_by(self.events))
+
+    @property
     def drift(self):
         """Largest |ΔE − work| over the largest energy [1]."""
-        return self.worst / self.largest if self.largest > 0.0 else 0.0
+        return float(self.worst / self.largest) if self.largest > 0.0 else 0.0
 
 
 class Implicit:
@@ -73,7 +81,7 @@ class Implicit:
     ----------
     system : refweb.system.System
         Of any order, with either mass.
-    probes, watch : sequence
+    probes, watch, events : sequence
         What to look at, see `refweb.central_difference.CentralDifference`.
     rtol : float
         Relative tolerance of displacements and velocities.
@@ -83,7 +91,7 @@ class Implicit:
 
     method = ""
 
-    def __init__(self, system, probes=(), watch=(), rtol=1e-6, atol_position=None, atol_velocity=None):
+    def __init__(self, system, probes=(), watch=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
         self.system, self.rtol = system, rtol
         self.unknowns = len(system.free)
         near, fast = scales(system)
@@ -97,6 +105,7 @@ class Implicit:
             (probe, np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float))
             for probe, rows, data, _ in self._probes
         ]
+        self._events = event_table(events)
         self._weights = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
         self._book = (
             typed_list(INDICES, [f.cells for f in families]),
@@ -127,6 +136,10 @@ class Implicit:
 
     # What it makes of them
 
+    def figures(self, run):
+        """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""
+        return {**self.stats, "linear_solver": self.choice}
+
     def start(self, x=None, v=None):
         """The `Course` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
         system = self.system
@@ -136,7 +149,8 @@ class Implicit:
         system.drive(0.0, x, v)
         self._reference = np.where(self._held, x, 0.0)  # motion is written over it
         signs, count = self._signs, len(self._probes)
-        run = Course(0.0, x, v, np.zeros(len(signs)), np.zeros(len(signs)), np.full(len(signs), -1))
+        none = np.zeros(len(signs))
+        run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy())
         force, out = system.forces(0.0, x, v)
         where = np.full(2, PLACE)
         for i, (probe, rows, data) in enumerate(self._arrays):
@@ -145,6 +159,8 @@ class Implicit:
         self._kinetic = self._driven_energy(v)
         total = self._energies(run)
         run.peaks[count:] = self._weights @ total
+        for event in run.events:
+            passes(event, run.peaks[int(event[SLOT])])
         stepping = count + np.flatnonzero(self._weights[:, -1])
         run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
         own = np.delete(total[:-2], self._working)
@@ -160,7 +176,7 @@ class Implicit:
         Returns
         -------
         ndarray, shape (rows, columns)
-            As `refweb.central_difference.CentralDifference.rows`.
+            Fewer rows than times where an event ends the run; as `refweb.central_difference.CentralDifference.rows`.
 
         Raises
         ------
@@ -171,13 +187,15 @@ class Implicit:
         """
         ends = np.atleast_1d(np.asarray(ends, dtype=float))
         history = np.zeros((len(ends), 1 + len(self._probes) + len(self.system.families) + 9))
-        for row, end in zip(history, ends, strict=True):
+        for n, end in enumerate(ends):
             before = run.time
-            while run.time < end:
+            while run.time < end and not run.stopped:
                 if run.reached <= run.time:
                     self._take_step(run, ends[-1])
                 self._cover(run, min(run.reached, end))
-            self._fill(row, run, before)
+            self._fill(history[n], run, before)
+            if run.stopped:
+                return history[: n + 1]
         return history
 
     def _take_step(self, run, last):
@@ -192,6 +210,8 @@ class Implicit:
             stop = run.time + 1e-12 * last
         with self._reported(run):
             reached = self._advance(stop, last)
+            if reached == run.reached:  # SUNDIALS first returns the end of the step that it was last asked inside of
+                reached = self._advance(stop, last)
         if not reached > run.reached:
             raise SolverError(f"{self.method} makes no step at t = {run.time:.6g} s: raise rtol = {self.rtol:g}")
         run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
@@ -206,27 +226,69 @@ class Implicit:
 
     def _cover(self, run, end):
         """Look at the run in the middle between its time and ``end``, and at the end; leave it there."""
-        width = end - run.time
-        for place, weight in ((0.5, 4.0), (1.0, 1.0)):
-            t = end if place == 1.0 else run.time + 0.5 * width
-            x, v = self._at(t)
-            force, out = self.system.forces(t, x, v)
-            if not np.isfinite(force).all():
-                row = int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0])
-                raise SolverError(f"number not finite at {self.system.row_name(row)}, t = {t:.6g} s: use a smaller rtol")
-            self._peaks(run, t, x, v, force, out[0])
-            power, reaction = self._rates(t, x, v, force)
-            if place == 0.5:
-                middle = power, reaction
-        run.work += width / 6.0 * (run.rates[0] + 4.0 * middle[0] + power)
-        run.impulse = run.impulse + width / 6.0 * (run.rates[1] + 4.0 * middle[1] + reaction)
-        run.rates = power, reaction
-        run.time, run.x, run.v = t, x, v
+        samples = [self._sample(t) for t in (0.5 * (run.time + end), end)]
+        if len(run.events):
+            stop = self._happened(run, samples)
+            if stop < end:
+                samples = [self._sample(t) for t in (0.5 * (run.time + stop), stop)]
+        for sample in samples:
+            self._peaks(run, *sample)
+        width = samples[1][0] - run.time
+        (power, reaction), (last, held) = (self._rates(*sample[:4]) for sample in samples)
+        run.work += width / 6.0 * (run.rates[0] + 4.0 * power + last)
+        run.impulse = run.impulse + width / 6.0 * (run.rates[1] + 4.0 * reaction + held)
+        run.rates = last, held
+        run.time, run.x, run.v = float(samples[1][0]), *samples[1][1:3]
         if len(self._weights):
             total, count = self._energies(run), len(self._probes)
             for j, value in enumerate(self._weights @ total):
                 if self._signs[count + j] * value > self._signs[count + j] * run.peaks[count + j]:
                     run.peaks[count + j], run.times[count + j] = value, run.time
+
+    def _sample(self, t):
+        """Time, displacement, velocity, force and what the lines show, at a time within the last step."""
+        x, v = self._at(t)
+        force, out = self.system.forces(t, x, v)
+        if not np.isfinite(force).all():
+            row = int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0])
+            raise SolverError(f"number not finite at {self.system.row_name(row)}, t = {t:.6g} s: use a smaller rtol")
+        return t, x, v, force, out[0].copy()
+
+    def _happened(self, run, samples):
+        """Note the events between the run's time and the samples; return the time of the first that ends the run."""
+        stop, before = np.inf, run.time
+        for sample in samples:
+            for event in run.events:
+                if event[TIME] < np.inf:
+                    continue
+                was = event[SIDE]
+                if passes(event, self._value(event, run, *sample)):
+                    event[TIME] = self._moment(event, run, was, before, sample[0])
+                    if event[STOP]:
+                        stop = min(stop, event[TIME])
+            before = sample[0]
+        late = (run.events[:, TIME] > stop) & (run.events[:, TIME] < np.inf)
+        run.events[late, TIME] = np.inf
+        return stop
+
+    def _moment(self, event, run, was, low, high):
+        """Time at which an event happens, by bisection on the solver's own interpolation."""
+        while True:
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                return high
+            if (1.0 if self._value(event, run, *self._sample(middle)) > event[LEVEL] else -1.0) == was:
+                low = middle
+            else:
+                high = middle
+
+    def _value(self, event, run, t, x, v, force, lines):
+        slot = int(event[SLOT])
+        if slot < len(self._probes):
+            probe, rows, data = self._arrays[slot]
+            return probe(t, x, v, force, lines, rows, data, np.zeros(2, dtype=np.int64))
+        total = self._energies(replace(run, time=t, x=x, v=v))
+        return self._weights[slot - len(self._probes)] @ total
 
     def _peaks(self, run, t, x, v, force, lines):
         where = np.zeros(2, dtype=np.int64)
@@ -290,7 +352,8 @@ class Implicit:
             force = np.where(self._held, 0.0, self.system.force(run.time, x, v))
             row = int(np.argmax(np.linalg.norm(force, axis=1)))
             raise SolverError(
-                f"{self.method} stopped at t = {run.reached:.6g} s with steps of {run.step:.3g} s: {reason.rstrip('.')}; "
+                f"{self.method} stopped at t = {run.reached:.6g} s with steps of {run.step:.3g} s: "
+                f"{reason.rstrip('.')}; "
                 f"the largest force that moves anything is at {self.system.row_name(row)}: raise rtol = {self.rtol:g}, "
                 "or lower the stiffness that asks for such steps"
             ) from None

@@ -91,6 +91,16 @@ def reaction(t, x, v, f, lines, rows, data, where):
 
 
 @kernel(PROBE)
+def push(t, x, v, f, lines, rows, data, where):
+    """Largest magnitude of g − f over rows, the force of contact on bodies; data holds g, shape (rows, 3)."""
+    best = 0.0
+    for n in range(rows.size):
+        x, y, z = data[n, 0] - f[rows[n], 0], data[n, 1] - f[rows[n], 1], data[n, 2] - f[rows[n], 2]
+        best = max(best, x * x + y * y + z * z)
+    return math.sqrt(best)
+
+
+@kernel(PROBE)
 def line(t, x, v, f, lines, rows, data, where):
     """Largest of data × column over elements; ``rows`` is (column, first, last + 1)."""
     column, first, last = rows[0], rows[1], rows[2]

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .inputs import InputError, Table, choice, integer, nearest, short, shown, text
-from .settings import Accuracy, Dynamic, Output, Static, Supports
+from .settings import Accuracy, Dynamic, Event, Output, Static, Supports
 
 WEBS = {
     "paper": "refweb.lattices:Paper",
@@ -35,8 +35,9 @@ EFFECTS = {
     "velocity": "refweb.effects.velocity:Velocity",
     "body": "refweb.effects.body:Body",
     "contact": "refweb.effects.contact:Contact",
+    "link": "refweb.effects.link:Link",
 }
-LISTS = ("load", "motion", "point_mass", "velocity", "body")
+LISTS = ("load", "motion", "point_mass", "velocity", "body", "link")
 """Effects whose table may stand several times, ``[[load]]``."""
 STARTS = ("web", "equilibrium")
 """What ``start`` may be besides a result folder."""
@@ -76,6 +77,8 @@ class Scene:
         How errors are found, in dynamics.
     observe : sequence of refweb.Observe
         Numbers to follow; `refweb.observables.DEFAULT` without any.
+    event : sequence of Event
+        Moments to find, in dynamics.
     title : str
         Title; for a file without one the file's name.
     seed : int
@@ -91,6 +94,7 @@ class Scene:
     output: Output = field(default_factory=Output)
     accuracy: Accuracy | None = None
     observe: tuple = ()
+    event: tuple = ()
     title: str = "scene"
     seed: int = 0
     folder: pathlib.Path | None = field(default=None, compare=False)
@@ -99,7 +103,7 @@ class Scene:
     def __post_init__(self):
         for key, value in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
             object.__setattr__(self, key, value.metadata["read"](key, getattr(self, key)))
-        for key in ("effects", "support", "observe"):
+        for key in ("effects", "support", "observe", "event"):
             if not isinstance(getattr(self, key), (list, tuple)):
                 raise InputError(f"{key} = {shown(getattr(self, key))} must be a list")
             object.__setattr__(self, key, tuple(getattr(self, key)))
@@ -114,6 +118,8 @@ class Scene:
             raise InputError(f"[output] interval = {output.interval:g} has no meaning in statics: leave it out")
         if not dynamic and self.accuracy is not None:
             raise InputError("[accuracy] has no meaning in statics, whose results bring their bounds: leave it out")
+        if not dynamic and self.event:
+            raise InputError(f"[[event]] {shown(self.event[0].name)} has no meaning in statics: leave it out")
         interval = (output.interval or min(1e-3, self.solve.duration)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
@@ -156,7 +162,7 @@ class Scene:
         ``file`` is the name that begins the messages of `build`.
         """
         single = {"cable": "refweb.cables:Cable", "supports": Supports, "output": Output, "accuracy": Accuracy}
-        several = {"support": Supports, "observe": "refweb.observables:Observe"}
+        several = {"support": Supports, "observe": "refweb.observables:Observe", "event": Event}
         known = ["schema", "title", "seed", "web", "solve", *single, *several, *EFFECTS]
         for key in given:
             if key not in known:
@@ -207,6 +213,8 @@ class Scene:
         if self.accuracy is not None:
             given["accuracy"] = self.accuracy.to_dict()
         given["observe"] = [o.to_dict() for o in self.observables]
+        if self.event:
+            given["event"] = [event.to_dict() for event in self.event]
         return given
 
     @property
@@ -277,7 +285,23 @@ class Scene:
                 name = shown(observable.name)
                 raise InputError(f"[[observe]] {i + 1} name = {name} is {stands} of history.csv: names are unique")
             columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
+        for i, event in enumerate(self.event):
+            _in(f"[[event]] {i + 1}", self._check_event, event, i, system)
         return system
+
+    def _check_event(self, event, number, system):
+        if event.name in (names := [e.name for e in self.event])[:number]:
+            raise InputError(f"name = {shown(event.name)} is that of [[event]] {names.index(event.name) + 1}")
+        if event.kind == "contact":
+            if not any(family.name == "contact" for family in system.families):
+                raise InputError('kind = "contact" needs a [contact] in the scene')
+            bodies = [body.name for body in system.net.bodies]
+            if event.body is not None and event.body not in bodies:
+                raise InputError(f"body = {shown(event.body)} is no body, {nearest(event.body, bodies)}")
+        if event.kind == "taut" and event.line >= len(system.net.web.lines):
+            raise InputError(f"line = {event.line} must be 0 … {len(system.net.web.lines) - 1}")
+        if event.kind == "threshold" and event.observe not in (names := [o.name for o in self.observables]):
+            raise InputError(f"observe = {shown(event.observe)} is no observable, {nearest(event.observe, names)}")
 
 
 class _Named:

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .inputs import InputError, Table, choice, components, integer, nodes, numbers_list, real, text
+from .inputs import (
+    InputError,
+    Table,
+    boolean,
+    choice,
+    components,
+    field,
+    integer,
+    node_number,
+    nodes,
+    numbers_list,
+    real,
+    shown,
+    text,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,18 +53,40 @@ class Static(Table):
             raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
 
 
+_TOLERANCES = ("rtol", "atol_position", "atol_velocity")
+OWN = {
+    "central-difference": ("safety", "step_size"),
+    "cvode": (*_TOLERANCES, "family", "max_order", "linear_solver"),
+    "ida": (*_TOLERANCES, "max_order", "linear_solver"),
+}
+"""Keys of `Dynamic` that have a meaning with one method or another."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Dynamic(Table):
-    """Motion over a time, by explicit central differences.
+    """Motion over a time.
 
     Parameters
     ----------
+    method : {"central-difference", "cvode", "ida"}
+        Explicit central differences, or CVODE or IDA of SUNDIALS with steps that follow from the error.
     duration : float
         Time to simulate [s].
     safety : float
-        Share of the bound of stability that a step is, 0 < safety ≤ 1.
+        Of central differences: share of the bound of stability that a step is, 0 < safety ≤ 1; 0.5 by default.
     step_size : float, optional
-        Largest step instead [s]; the step used is the largest below it that divides a history row.
+        Instead: largest step [s]; the step used is the largest below it that divides a history row.
+    rtol : float
+        Of CVODE and IDA: relative tolerance of displacements and velocities, 1e-6 by default.
+    atol_position, atol_velocity : float, optional
+        Absolute tolerances [m], [m/s]; by default rtol × 1e-3 of the shortest element, and rtol × 1e-3 of the speed of
+        sound in the fastest.
+    family : {"bdf", "adams"}
+        Of CVODE: kind of multistep method, BDF by default.
+    max_order : int, optional
+        Highest order: 2 by default, of Adams methods 12.
+    linear_solver : {"auto", "block", "sparse", "dense", "fixed-point"}
+        How linear systems are solved, see `refweb.cvode`.
     mass : {"lumped", "consistent"}
         Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
     start : {"web", "equilibrium"} or path
@@ -59,12 +95,76 @@ class Dynamic(Table):
     """
 
     kind: str = choice("dynamic", default="dynamic")
-    method: str = choice("central-difference", default="central-difference")
+    method: str = choice("central-difference", "cvode", "ida", default="central-difference")
     duration: float = real(above=0, unit="s")
-    safety: float = real(0.5, above=0, at_most=1)
+    safety: float | None = real(None, above=0, at_most=1)
     step_size: float | None = real(None, above=0, unit="s")
+    rtol: float | None = real(None, at_least=1e-13, at_most=0.1)
+    atol_position: float | None = real(None, above=0, unit="m")
+    atol_velocity: float | None = real(None, above=0, unit="m/s")
+    family: str | None = choice("bdf", "adams", default=None)
+    max_order: int | None = integer(None, at_least=1, at_most=12)
+    linear_solver: str | None = choice("auto", "block", "sparse", "dense", "fixed-point", default=None)
     mass: str = choice("lumped", "consistent", default="lumped")
     start: str = text("web")
+
+    def check(self):
+        """Refuse keys of another method, and fill in the defaults of this one."""
+        for key in {key for keys in OWN.values() for key in keys}:
+            if getattr(self, key) is not None and key not in OWN[self.method]:
+                methods = " or ".join(f'"{name}"' for name, keys in OWN.items() if key in keys)
+                value = shown(getattr(self, key))
+                raise InputError(f'{key} = {value} has no meaning with method = "{self.method}", only with {methods}')
+        defaults = {"safety": 0.5, "rtol": 1e-6, "family": "bdf", "linear_solver": "auto"}
+        defaults["max_order"] = 12 if self.family == "adams" else 2
+        for key, value in defaults.items():
+            if getattr(self, key) is None and key in OWN[self.method]:
+                object.__setattr__(self, key, value)
+        if self.family != "adams" and (self.max_order or 0) > 5:
+            raise InputError(f"max_order = {self.max_order} must be ≤ 5 for BDF")
+        if self.method == "ida" and self.linear_solver == "fixed-point":
+            raise InputError('linear_solver = "fixed-point" must be one of "auto", "block", "sparse", "dense" with ida')
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event(Table):
+    """A moment of a dynamic scene that is looked for: the time at which something first happens.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    kind : {"contact", "taut", "threshold"}
+        A body first touches the web; a line that is slack snaps taut; an observable passes a value, either way.
+    body : str, optional
+        Body of a contact, by default any.
+    line : int, optional
+        Line that snaps taut.
+    observe : str, optional
+        Name of the observable of a threshold.
+    value : float, optional
+        Its threshold, in the observable's unit.
+    stop : bool
+        Whether the run ends there.
+    """
+
+    name: str = text(most=80)
+    kind: str = choice("contact", "taut", "threshold")
+    body: str | None = text(None)
+    line: int | None = field(node_number, None)
+    observe: str | None = text(None)
+    value: float | None = real(None)
+    stop: bool = boolean(False)
+
+    def check(self):
+        """Refuse keys of another kind, and what a kind lacks."""
+        needs = {"contact": (), "taut": ("line",), "threshold": ("observe", "value")}[self.kind]
+        for key in ("body", "line", "observe", "value"):
+            value = getattr(self, key)
+            if value is None and key in needs:
+                raise InputError(f'{key} is missing: kind = "{self.kind}" needs {key} = ...')
+            if value is not None and key not in needs and not (key == "body" and self.kind == "contact"):
+                raise InputError(f'{key} = {shown(value)} has no meaning for kind = "{self.kind}": leave it out')
 
 
 @dataclass(frozen=True, kw_only=True)

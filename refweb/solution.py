@@ -9,7 +9,7 @@ import numpy as np
 from .inputs import nearest
 
 SOLVER = dict.fromkeys(
-    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift".split()
+    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift linear_solver".split()
 )
 """What a solver reports; None for what it does not know."""
 
@@ -49,6 +49,8 @@ class Solution:
         Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
+    events : list of dict
+        Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
     frames : list of (int, refweb.state.State)
         Row numbers and states that stand as VTU in a result folder.
     """
@@ -66,6 +68,7 @@ class Solution:
     status: str = "running"
     message: str = ""
     warnings: list = field(default_factory=list)
+    events: list = field(default_factory=list)
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
     utilisation: tuple | None = None
@@ -145,7 +148,7 @@ class Solution:
             "web": self.web,
             "results": plain(self.results),
             "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
-            "events": [],
+            "events": self.events,
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,

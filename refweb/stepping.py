@@ -11,6 +11,9 @@ from .probes import PLACE
 
 MOST = 1e8
 """Largest number of steps of a history row."""
+SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
+"""Columns of events: the probe, or behind the probes the sum, whose value passes a level; the side it is on, 1 above
+and −1 not; whether only passing upwards counts; whether the run ends there; time of the event, infinite before."""
 
 
 @kernel()
@@ -26,13 +29,24 @@ def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, total
 
 
 @kernel()
+def passes(event, value):
+    """Whether an event happens with this value; notes the side it is on."""
+    side = 1.0 if value > event[LEVEL] else -1.0
+    before, event[SIDE] = event[SIDE], side
+    return side != before and (side > 0.0 or event[RISING] == 0.0)
+
+
+@kernel()
 def advance(
     count, h, t, x, v, f, mass, inverse, held, driven, working,
     kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-    energies, energy_outs, watch, total,
+    energies, energy_outs, watch, total, events,
 ):  # fmt: skip
-    """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse."""
+    """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse.
+
+    Returns the steps taken: fewer than asked for where an event ends the run.
+    """
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
     first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
@@ -93,6 +107,21 @@ def advance(
                 value, i = np.dot(watch[j], total), len(probes) + j
                 if signs[i] * value > signs[i] * peaks[i]:
                     peaks[i], times[i] = value, now
+        ended = False
+        for e in range(events.shape[0]):
+            event = events[e]
+            if event[TIME] == math.inf:
+                i = int(event[SLOT])
+                if i < len(probes):
+                    value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
+                else:
+                    value = np.dot(watch[i - len(probes)], total)
+                if passes(event, value):
+                    event[TIME] = now
+                    ended = ended or event[STOP] > 0.0
+        if ended:
+            return step
+    return count
 
 
 @kernel()
@@ -108,22 +137,32 @@ def step_bound(reach, speed, x, mass, free, rates, bounds, cells, data):
 
 
 @kernel()
+def ended_by(events):
+    """Whether an event has ended the run."""
+    for e in range(events.shape[0]):
+        if events[e, STOP] > 0.0 and events[e, TIME] < math.inf:
+            return True
+    return False
+
+
+@kernel()
 def rows_ahead(
     ends, safety, step_size, finer, limit, state, saved, mass, inverse, free, held, driven, working,
     kernels, cells, data, outs, energies, energy_outs, bounds, drives, drive_cells, drive_data, drive_outs,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-    watch, history,
+    watch, events, history,
 ):  # fmt: skip
     """Advance to each time of ``ends`` and write a row of ``history`` there.
 
     ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
     done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
-    x, v and f at the row before; −1 where a row takes more than `MOST` steps.
+    x, v and f at the row before; −1 where a row takes more than `MOST` steps. Where an event ends the run, that row is
+    the last, and its time that of the event.
     """
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
     rows, where, rates = x.shape[0], np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
-    total = np.zeros(len(energies) + 3)
+    total, stopped = np.zeros(len(energies) + 3), False
     for n in range(ends.size):
         interval = ends[n] - state[0]
         if interval > 0.0:
@@ -146,13 +185,15 @@ def rows_ahead(
             if finer > 1.0:
                 count = int(math.ceil(finer * count))
             h = total[-1] = interval / count
-            advance(
+            taken = advance(
                 count, h, state[0], x, v, f, mass, inverse, held, driven, working,
                 kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
                 probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-                energies, energy_outs, watch, total,
+                energies, energy_outs, watch, total, events,
             )  # fmt: skip
-            state[0], state[1], state[2] = ends[n], state[1] + count, h
+            stopped = taken < count or (events.shape[0] > 0 and ended_by(events))
+            state[0] = state[0] + taken * h if taken < count else ends[n]
+            state[1], state[2] = state[1] + taken, h
         row, at = history[n], 1
         row[0] = state[0]
         for i in range(len(probes)):
@@ -177,6 +218,8 @@ def rows_ahead(
         state[5] = max(state[5], drift)
         if not math.isfinite(drift) or (drift > limit * state[4]):
             return n
+        if stopped:
+            return n + 1
     return ends.size
 
 

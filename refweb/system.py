@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .effects import Drive
+from .effects import Constraint, Drive
 from .pattern import Pattern
 
 
@@ -34,6 +34,8 @@ class System:
         One per effect that adds forces.
     drives : list of refweb.effects.Drive
         One per effect that prescribes motion; its rows are supported as well.
+    constraints : list of refweb.effects.Constraint
+        One per effect that keeps distances; no force of the system holds them.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     """
@@ -45,8 +47,9 @@ class System:
         self.net, self.effects = net, effects
         self.rows = len(net.points)
         acting = [effect.on(net) for effect in effects if hasattr(effect, "on")]
-        self.families = [a for a in acting if not isinstance(a, Drive)]
+        self.families = [a for a in acting if not isinstance(a, Drive | Constraint)]
         self.drives = [a for a in acting if isinstance(a, Drive)]
+        self.constraints = [a for a in acting if isinstance(a, Constraint)]
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
         for body in net.bodies:
             self.supported[body.row] = body.fixed

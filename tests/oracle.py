@@ -5,8 +5,10 @@ Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, T = A σ(
     internal force   ∫ T t·δx' ds
     tangent          ∫ [A σ' (t·δx')(t·dx') + T/λ (δx'·dx' − (t·δx')(t·dx'))] ds
 
-scikit-fem sees natural arc length through the mapping of `refweb.lines.basis`. An ``ElementVector`` numbers the three
-components of one node after another, so that its dofs are those of a nodal array ``(n, 3)`` raveled.
+scikit-fem sees natural arc length through the mapping of `refweb.lines.basis` and numbers the components of nodes in its
+own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs from the
+numbering that scenes promise: the web's nodes, then those that order and subdivision add, line by line and along each
+line.
 """
 
 import numpy as np
@@ -14,6 +16,7 @@ import skfem
 from skfem.helpers import dot
 
 from refweb import lines
+from refweb.elements import line_element
 
 
 def along(u):
@@ -60,10 +63,19 @@ def structure(u, v, w):
     return along(u).sum(axis=0) * along(v).sum(axis=0)
 
 
-@skfem.LinearForm
-def lumped_mass(v, w):
-    """Row sums of the consistent mass ∫ ρA δx·dx ds."""
-    return w.density * w.A * v.sum(axis=0)
+@skfem.BilinearForm
+def mass(u, v, w):
+    """Consistent mass ∫ ρA δx·dx ds."""
+    return w.density * w.A * dot(u, v)
+
+
+def rows_of_lines(web, cable):
+    """Rows of the nodes of each line from its first end to its second, shape (lines, nodes of a line)."""
+    added, rows = cable.order * cable.subdivide - 1, []
+    for number, (first, last) in enumerate(web.lines.tolist()):
+        begin = len(web.points) + number * added
+        rows.append([first, *range(begin, begin + added), last])
+    return np.array(rows)
 
 
 class Oracle:
@@ -74,37 +86,67 @@ class Oracle:
     web : refweb.webs.Web
         The web.
     cable : refweb.cables.Cable
-        Its material.
+        Its material, order and subdivision.
+
+    Attributes
+    ----------
+    points : ndarray, shape (rows, 3)
+        Positions of all nodes in the straight web [m].
+    cells : ndarray, shape (elements, order + 1)
+        Rows of each element's nodes from its first end to its second.
     """
 
     def __init__(self, web, cable):
-        values = cable.properties(web)
-        vector = skfem.ElementVector(skfem.ElementLineP1(), 3)
-        self.points = web.points
-        self.basis = lines.basis(web.points, web.lines, values["natural_length"], vector)
+        order, pieces, element = cable.order, cable.subdivide, line_element(cable.order)
+        rows = rows_of_lines(web, cable)
+        self.cells = np.vstack([line[k * order : (k + 1) * order + 1] for line in rows for k in range(pieces)])
+        along = np.sort(element.doflocs[:, 0])
+        place = np.append(np.ravel([(k + along[:-1]) / pieces for k in range(pieces)]), 1.0)[:, None]
+        self.points = np.empty((rows.max() + 1, 3))
+        for line, (first, last) in zip(rows, web.points[web.lines], strict=True):
+            self.points[line] = (1.0 - place) * first + place * last
+
+        of_line = np.repeat(np.arange(len(web.lines)), pieces)
+        values = {name: value[of_line] for name, value in cable.properties(web).items()}
+        ends, vertex = np.unique(self.cells[:, [0, -1]], return_inverse=True)
+        vertex = vertex.reshape(-1, 2)
+        vector = skfem.ElementVector(element, 3)
+        self.basis = lines.basis(self.points[ends], vertex, values["natural_length"] / pieces, vector)
+        # Dofs of an element: first its two ends, then what lies inside along it; of each node x, y, z.
+        own = np.hstack([self.cells[:, [0, -1]], self.cells[:, 1:-1]])
+        self.row = np.empty(self.basis.N, dtype=int)
+        self.row[self.basis.element_dofs.T] = (3 * own[:, :, None] + np.arange(3)).reshape(len(own), -1)
         self.forms = forms(cable.tension_law)
         names = dict(E="modulus", A="area", density="density", slackness="slackness", smoothing="smoothing")
         self.numbers = {key: values[name][:, None] for key, name in names.items()}
 
     def _at(self, x):
-        return dict(self.numbers, x=self.basis.interpolate((self.points + x).ravel()))
+        return dict(self.numbers, x=self.basis.interpolate((self.points + x).ravel()[self.row]))
+
+    def _by_row(self, matrix):
+        """A matrix of scikit-fem's dofs as one of components 3 row + axis."""
+        matrix = matrix.tocoo()
+        return type(matrix)((matrix.data, (self.row[matrix.row], self.row[matrix.col])), matrix.shape).tocsr()
 
     def force(self, x):
-        """Force of the lines on every node at the displacement x [N], shape (nodes, 3)."""
-        return -self.forms[0].assemble(self.basis, **self._at(x)).reshape(-1, 3)
+        """Force of the lines on every node at the displacement x [N], shape (rows, 3)."""
+        force = np.empty(self.basis.N)
+        force[self.row] = -self.forms[0].assemble(self.basis, **self._at(x))
+        return force.reshape(-1, 3)
 
     def stiffness(self, x):
         """Tangent of all components [N/m]."""
-        return self.forms[1].assemble(self.basis, **self._at(x))
+        return self._by_row(self.forms[1].assemble(self.basis, **self._at(x)))
 
     def energy(self, x):
-        """Strain energy of each line [J]."""
+        """Strain energy of each element [J]."""
         return self.forms[2].elemental(self.basis, **self._at(x))
 
     def structure(self):
-        """Matrix whose entries are the pairs of components that some line couples."""
-        return structure.assemble(self.basis)
+        """Matrix whose entries are the pairs of components that some element couples."""
+        return self._by_row(structure.assemble(self.basis))
 
     def mass(self):
-        """Lumped mass of each node, once per component [kg], shape (nodes, 3)."""
-        return lumped_mass.assemble(self.basis, **self.numbers).reshape(-1, 3)
+        """Consistent mass of all components [kg], by quadrature that is exact for it."""
+        exact = skfem.Basis(self.basis.mesh, self.basis.elem, mapping=self.basis.mapping, intorder=8)
+        return self._by_row(mass.assemble(exact, **self.numbers))

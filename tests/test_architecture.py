@@ -28,6 +28,8 @@ LAYERS = [
     ["system"],
     ["certificate", "interior"],
     ["statics", "central_difference"],
+    ["implicit"],
+    ["cvode"],
     ["relaxation"],
     ["state"],
     ["observables"],

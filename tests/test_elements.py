@@ -1,5 +1,7 @@
 """The compiled elements against the weak form on the page, and the digits of their strain."""
 
+from dataclasses import replace
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,32 +9,41 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
-from refweb import lines
+from refweb import elements, lines
 from refweb.cables import Cable
 from refweb.state import State
 from refweb.webs import Web
 
-# Both ways sum a dozen products of numbers with a relative rounding of 1e-16 each, and the oracle's strain λ − 1 is
+# Both ways sum some dozen products of numbers with a relative rounding of 1e-16 each, and the oracle's strain λ − 1 is
 # rounded to 1e-16 of a largest strain near 0.1: 1e-15 of the largest entry, and a factor of 100 to be safe.
 TIGHT = 1e-13
+FINER = [(1, 1), (2, 1), (3, 1), (1, 3), (2, 3), (3, 2)]
+"""Orders and subdivisions."""
 
 
-def displacement(seed, size=0.05):
-    return size * np.random.default_rng(seed).standard_normal((6, 3))
+def finer_cable(law, order, subdivide):
+    return replace(skew_cable(law), order=order, subdivide=subdivide)
 
 
-def skew_system(law):
+def displacement(seed, rows=6, size=0.05):
+    return size * np.random.default_rng(seed).standard_normal((rows, 3))
+
+
+def skew_system(law, order=1, subdivide=1):
     """The skew net with two nodes held and a third in one direction only."""
-    supported = np.zeros((6, 3), dtype=bool)
+    cable = finer_cable(law, order, subdivide)
+    supported = np.zeros((len(lines.build(skew_web(), cable).points), 3), dtype=bool)
     supported[[0, 2]] = True
     supported[4, 1] = True
-    return system(skew_web(), skew_cable(law), supported=supported)
+    return system(skew_web(), cable, supported=supported)
 
 
+@pytest.mark.parametrize("order, subdivide", FINER)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("seed", range(5))
-def test_kernels_equal_the_weak_form(law, seed):
-    oracle, net_system, x = Oracle(skew_web(), skew_cable(law)), skew_system(law), displacement(seed)
+def test_kernels_equal_the_weak_form(law, seed, order, subdivide):
+    oracle, net_system = Oracle(skew_web(), finer_cable(law, order, subdivide)), skew_system(law, order, subdivide)
+    x = displacement(seed, net_system.rows)
     expected = oracle.force(x)
     np.testing.assert_allclose(net_system.force(1.0, x), expected, rtol=0, atol=TIGHT * np.abs(expected).max())
     free = net_system.free
@@ -42,6 +53,40 @@ def test_kernels_equal_the_weak_form(law, seed):
     expected = oracle.energy(x)
     got = net_system.energy_of(net_system.families[0], 1.0, x)
     np.testing.assert_allclose(got, expected, rtol=0, atol=TIGHT * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("order, subdivide", FINER)
+def test_added_nodes_follow_the_webs_own_along_each_line(order, subdivide):
+    """And divide it straight, at its Gauss–Lobatto points; the elements of a line are rows that follow each other."""
+    web, cable = skew_web(), finer_cable("linear", order, subdivide)
+    net, oracle = lines.build(web, cable), Oracle(web, cable)
+    assert net.order == order and net.nodes == len(net.points) == 6 + 9 * (order * subdivide - 1)
+    np.testing.assert_array_equal(net.points[:6], web.points)
+    # Two roundings of coordinates of at most 1.1 m.
+    np.testing.assert_allclose(net.points, oracle.points, rtol=0, atol=4e-16)
+    np.testing.assert_array_equal(net.cells[:, net.along], oracle.cells)
+    np.testing.assert_array_equal(net.line, np.repeat(np.arange(9), subdivide))
+    natural = np.add.reduceat(net.natural_length, subdivide * np.arange(9))
+    np.testing.assert_allclose(natural, web.natural_length, rtol=1e-15)
+    if order == 3:
+        inner = np.sort(net.places)[1:3]
+        np.testing.assert_allclose(inner, 0.5 * (1.0 + np.array([-1.0, 1.0]) / np.sqrt(5.0)), rtol=1e-15)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_functions_of_an_element(order):
+    """1 at their own node and 0 at the others, of sum 1 everywhere; all polynomials of the order, with their slopes."""
+    element = elements.line_element(order)
+    nodes = element.doflocs[:, 0]
+    assert nodes.tolist()[:2] == [0.0, 1.0] and element.maxdeg == order
+    at, own = elements.values(element, nodes)
+    np.testing.assert_allclose(at, np.eye(order + 1), rtol=0, atol=1e-14)
+    places = np.linspace(0.0, 1.0, 11)
+    at, slopes = elements.values(element, places)
+    for power in range(order + 1):
+        np.testing.assert_allclose(at @ nodes**power, places**power, rtol=0, atol=1e-14)
+        right = power * places ** max(power - 1, 0)
+        np.testing.assert_allclose(slopes @ nodes**power, right, rtol=0, atol=1e-13)
 
 
 def test_basis_is_scikit_fems():
@@ -69,10 +114,30 @@ def test_mass_follows_natural_length():
     assert mass.sum() == per_line.sum()
 
 
-def test_lumped_mass_is_the_row_sum_of_the_consistent_one():
-    expected = Oracle(skew_web(), skew_cable()).mass()
-    mass = lines.build(skew_web(), skew_cable()).mass
-    np.testing.assert_allclose(np.repeat(mass[:, None], 3, axis=1), expected, rtol=1e-15)
+@pytest.mark.parametrize("order, subdivide", FINER)
+def test_mass_is_scikit_fems(order, subdivide):
+    """Lumped: the row sums of the consistent mass, none of them negative. Lumped and its spread: the matrix itself."""
+    web, cable = skew_web(), finer_cable("linear", order, subdivide)
+    expected = Oracle(web, cable).mass().toarray()
+    net = lines.build(web, cable, consistent=True)
+    assert lines.build(web, cable).spread is None and net.mass.min() > 0.0
+    np.testing.assert_allclose(np.repeat(net.mass, 3), expected.sum(axis=1), rtol=1e-13)
+    np.testing.assert_array_equal(net.mass, lines.build(web, cable).mass)
+    properties = cable.properties(web)
+    whole = sum(properties["density"] * properties["area"] * properties["natural_length"])
+    np.testing.assert_allclose([net.mass.sum(), net.cable_mass], whole, rtol=1e-14)
+    matrix = np.diag(np.repeat(net.mass, 3))
+    for cell, spread in zip(net.cells, net.spread, strict=True):
+        np.testing.assert_allclose(spread.sum(axis=1), 0.0, atol=1e-15 * net.mass.max())
+        for k in range(3):
+            matrix[np.ix_(3 * cell + k, 3 * cell + k)] += spread
+    np.testing.assert_allclose(matrix, expected, rtol=0, atol=TIGHT * expected.max())
+    # The same through the pattern of the tangent, as a solver assembles it.
+    net_system = skew_system("linear", order, subdivide)
+    free = net_system.free
+    got = net_system.pattern.matrix(net_system.assemble_lines(np.kron(net.spread, np.eye(3)))).toarray()
+    got += np.diag(np.repeat(net.mass, 3)[free])
+    np.testing.assert_allclose(got, expected[np.ix_(free, free)], rtol=0, atol=TIGHT * expected.max())
 
 
 def one_line(end, natural_length=None):
@@ -120,11 +185,12 @@ def test_strain_of_a_prestressed_line(size, factor):
     assert abs(got - exact) <= 1e-14 * max(abs(exact), abs(1 / factor - 1))
 
 
+@pytest.mark.parametrize("order, subdivide", FINER)
 @pytest.mark.parametrize("law", LAWS)
-def test_pattern_is_the_adjacency_and_stays(law):
-    net_system = skew_system(law)
+def test_pattern_is_the_adjacency_and_stays(law, order, subdivide):
+    net_system = skew_system(law, order, subdivide)
     free, pattern = net_system.free, net_system.pattern
-    adjacency = Oracle(skew_web(), skew_cable(law)).structure().tocsc()[:, free][free]
+    adjacency = Oracle(skew_web(), finer_cable(law, order, subdivide)).structure().tocsc()[:, free][free]
     adjacency.sort_indices()
     np.testing.assert_array_equal(pattern.indptr, adjacency.indptr)
     np.testing.assert_array_equal(pattern.indices, adjacency.indices)

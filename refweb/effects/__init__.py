@@ -4,7 +4,8 @@ An effect is a frozen value that holds physical numbers only. It has one or more
 matrix and knows no other effect.
 
 ``on(net)``
-    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; or a `Drive`.
+    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; or a `Drive`; or a
+    `Constraint`.
 ``extend(net)``
     The `refweb.lines.Net` with more rows or mass; comes before any ``on``.
 ``start(net, supported, v)``
@@ -86,6 +87,54 @@ class Drive:
     data: np.ndarray
     kernel: Callable
     times: tuple = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """Pairs of rows whose distance is kept: g(x) = (|d|² − L²)/(2L) = 0 with d from the first to the second.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (cells, 2)
+        The rows.
+    data : ndarray, shape (cells, 4)
+        d at x = 0, and its magnitude L [m].
+    """
+
+    cells: np.ndarray
+    data: np.ndarray
+
+    def _between(self, x):
+        return x[self.cells[:, 1]] - x[self.cells[:, 0]]
+
+    @property
+    def length(self):
+        """L [m], shape (cells,)."""
+        return self.data[:, 3]
+
+    def excess(self, x):
+        """g [m] at displacement x, shape (cells,); the difference of the two lengths where that is small."""
+        u = self._between(x)
+        return ((2.0 * self.data[:, :3] + u) * u).sum(axis=1) / (2.0 * self.length)
+
+    def direction(self, x):
+        """∂g/∂x of the second row, d/L, shape (cells, 3); that of the first is its negative."""
+        return (self.data[:, :3] + self._between(x)) / self.length[:, None]
+
+    def speed(self, x, v):
+        """dg/dt [m/s] at displacement x and velocity v, shape (cells,)."""
+        return (self.direction(x) * self._between(v)).sum(axis=1)
+
+    def turning(self, v):
+        """What d²g/dt² has besides the accelerations, |v₂ − v₁|²/L [m/s²], shape (cells,)."""
+        return (self._between(v) ** 2).sum(axis=1) / self.length
+
+    def pull(self, x, multipliers):
+        """Gᵀλ on every row [N], G = ∂g/∂x, shape (rows, 3); the links act with its negative."""
+        along, total = multipliers[:, None] * self.direction(x), np.zeros_like(x)
+        np.subtract.at(total, self.cells[:, 0], along)
+        np.add.at(total, self.cells[:, 1], along)
+        return total
 
 
 def column(rows):

@@ -1,0 +1,43 @@
+"""Rigid links: pairs of nodes that keep their distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..inputs import InputError, Table, nodes, shown
+from . import Constraint
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link(Table):
+    """Massless bars that do not stretch, from each of some nodes to the next; they pull and push.
+
+    Parameters
+    ----------
+    nodes : list
+        Two nodes or more, by number or name; the length of each link is their distance in the web's position.
+    """
+
+    nodes: tuple = nodes()
+
+    def check(self):
+        if not isinstance(self.nodes, tuple) or len(self.nodes) < 2:
+            raise InputError(f"nodes = {shown(self.nodes)} must be a list of two nodes or more")
+
+    def on(self, net):
+        """The pairs of rows, and their distances."""
+        ends = [self._one(net, i, node) for i, node in enumerate(self.nodes)]
+        cells = np.column_stack([ends[:-1], ends[1:]]).astype(np.int32)
+        apart = net.points[cells[:, 1]] - net.points[cells[:, 0]]
+        length = np.linalg.norm(apart, axis=1)
+        for i in np.flatnonzero(length == 0.0)[:1]:
+            raise InputError(f"nodes[{i}] = {ends[i]} and nodes[{i + 1}] = {ends[i + 1]} must not be at one place")
+        return Constraint(cells=cells, data=np.column_stack([apart, length]))
+
+    def _one(self, net, i, node):
+        found = net.web.find([node], f"nodes[{i}]")
+        if len(found) != 1:
+            raise InputError(f"nodes[{i}] = {shown(node)} is {len(found)} nodes, must be one")
+        return int(found[0])
