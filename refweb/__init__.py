@@ -7,6 +7,8 @@ __version__ = "0.1.0"
 
 _HOME = {
     "run": "runner",
+    "modes": "vibration",
+    "Modes": "vibration",
     "Scene": "scene",
     "Static": "settings",
     "Dynamic": "settings",

@@ -1,4 +1,4 @@
-"""The command line: ``refweb run | check | info | picture``.
+"""The command line: ``refweb run | check | info | picture | modes``.
 
 Exit status: 0 solved, 1 the solver failed, 2 wrong input, 130 interrupted. Nothing heavy is imported before a command
 needs it.
@@ -44,6 +44,12 @@ def parser():
     command.add_argument("--field", metavar="NAME", help="what the colours show (default: stress)")
     command.add_argument("--out", metavar="FILE", help="picture to write (default: DIR/web.png)")
     command.add_argument("--animate", action="store_true", help="all frames as a GIF (default: DIR/web.gif)")
+
+    command = commands.add_parser("modes", help="natural frequencies and mode shapes about the equilibrium of a scene")
+    command.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
+    command.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
+    command.add_argument("--out", metavar="DIR", help="result folder (default: the title and -modes)")
+    command.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
     return top
 
 
@@ -74,7 +80,7 @@ def _check(arguments):
 def _info(arguments):
     import json
 
-    from .console import before, stored
+    from .console import before, modal, stored
     from .runner import web_of
     from .scene import Scene
 
@@ -85,7 +91,7 @@ def _info(arguments):
             if arguments.json:
                 print(json.dumps(summary, indent=1, ensure_ascii=False))
             else:
-                stored(summary)
+                (modal if summary.get("kind") == "modes" else stored)(summary)
         except FileNotFoundError:
             raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
         except BrokenPipeError:
@@ -118,6 +124,19 @@ def _picture(arguments):
     print(path)
 
 
+def _modes(arguments):
+    from .console import before, modal, progress
+    from .scene import Scene, slug
+    from .vibration import modes
+
+    scene = Scene.load(arguments.scene)
+    out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
+    with progress() as tell:
+        found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=before)
+    modal(found.summary())
+    print(f"modes in {out}")
+
+
 def main(arguments=None):
     """Run the command line; return the exit status."""
     for stream in (sys.stdout, sys.stderr):
@@ -133,7 +152,7 @@ def main(arguments=None):
     if arguments.command is None:
         top.print_help()
         return 2
-    command = {"run": _run, "check": _check, "info": _info, "picture": _picture}[arguments.command]
+    command = {"run": _run, "check": _check, "info": _info, "picture": _picture, "modes": _modes}[arguments.command]
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch queue's end is an interruption too
     try:

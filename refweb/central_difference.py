@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .compiled import BOUND, ENERGY, FORCE, INDICES, MATRIX, VECTOR, typed_list
+from .compiled import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
 from .errors import SolverError
 from .inputs import InputError
+from .lines import LENGTH
 from .probes import INTEGERS, PLACE, PROBE
 from .stepping import MOST, advance, book_energies, ended_by, no_bound, no_energy, passes, rows_ahead, step_bound
 
@@ -42,8 +43,8 @@ class Run:
         Displacement [m], velocity [m/s] and force [N], and the same at the row before.
     peaks, times, places : ndarray, shape (probes,)
         Extreme value of each probe, its time, and the row or element it stands at.
-    work : ndarray, shape (1,)
-        Work of loads and motion [J].
+    work : ndarray, shape (families + 1,)
+        Work of each family that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
     events : ndarray, shape (events, 6)
@@ -144,15 +145,29 @@ class CentralDifference:
                 f"node {bare[0]} has no mass, which central-difference needs: give density > 0 or a [[point_mass]]"
             )
         families, drives = system.families, system.drives
-        self._outs = [np.zeros((len(f.cells), f.observed)) for f in families]
+        self._outs = system.outs()
+        numbers = [f.data for f in families]
+        if system.line_drives:  # lengths change in a copy of this run's own
+            lines = net.line_data.copy()
+            numbers = [lines if data is net.line_data else data for data in numbers]
         inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
         driven = np.concatenate([[], *(d.cells[:, 0] for d in drives)]).astype(np.int64)
-        working = np.array([i for i, f in enumerate(families) if f.book == "work"], dtype=np.int64)
+        viscous = [i for i, f in enumerate(families) if f.damping is not None]
+        still = [i for i in range(1, len(families)) if i not in viscous]
+        powered = [(i, f.power, i in viscous) for i, f in enumerate(families) if f.power is not None]
+        self._working = system.working
         self._masses = (net.mass, inverse)
         self._moving = np.flatnonzero(free.any(axis=1))
-        self._ends = (np.flatnonzero(system.supported), driven, working)
+        self._ends = (
+            np.flatnonzero(system.supported),
+            driven,
+            self._working,
+            np.array(powered, dtype=np.int64).reshape(len(powered), 3),
+            np.array(still, dtype=np.int64),
+            np.array(viscous, dtype=np.int64),
+        )
         self._cells = typed_list(INDICES, [f.cells for f in families])
-        self._data = typed_list(MATRIX, [f.data for f in families])
+        self._data = typed_list(MATRIX, numbers)
         self._forces = (typed_list(FORCE, [f.force for f in families]), self._cells, self._data)
         self._seen = typed_list(MATRIX, self._outs)
         self._energies = (
@@ -160,11 +175,17 @@ class CentralDifference:
             typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
         )
         self._bounds = typed_list(BOUND, [f.bound or no_bound for f in families])
+        self._dampings = typed_list(BOUND, [families[i].damping_bound or no_bound for i in viscous])
         self._drives = (
             typed_list(FORCE, [d.kernel for d in drives]),
             typed_list(INDICES, [d.cells for d in drives]),
             typed_list(MATRIX, [d.data for d in drives]),
             typed_list(MATRIX, [np.zeros((len(d.cells), 0)) for d in drives]),
+            net.natural_length.copy() if system.line_drives else np.zeros(0),
+            typed_list(LINES, [d.kernel for d in system.line_drives]),
+            typed_list(INDICES, [d.cells for d in system.line_drives]),
+            typed_list(MATRIX, [d.data for d in system.line_drives]),
+            typed_list(ENERGY, [system.by_length] if system.line_drives else []),
         )
         signs = np.array([float(p[-1]) for p in (*probes, *watch)])
         self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
@@ -182,8 +203,8 @@ class CentralDifference:
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m]."""
         x = np.zeros((self.system.rows, 3)) if x is None else x
-        rates = np.empty(self.system.rows)
-        return step_bound(reach, 0.0, x, self._masses[0], self._moving, rates, self._bounds, self._cells, self._data)
+        rest = np.empty(self.system.rows), self._bounds, self._ends[5], self._dampings, self._cells, self._data
+        return step_bound(reach, 0.0, x, self._masses[0], self._moving, *rest)
 
     def figures(self, run):
         """What a run has spent, for ``run.json``."""
@@ -197,26 +218,31 @@ class CentralDifference:
         saved[1] = system.initial_velocity() if v is None else v
         saved[1][system.supported] = 0.0
         system.drive(0.0, saved[0], saved[1])
-        for family, out in zip(system.families, self._outs, strict=True):
-            family.force(0.0, saved[0], saved[1], saved[2], family.cells, family.data, out)
+        if system.line_drives:
+            base, kernels, *lists = self._drives[4:8]
+            lines = self._data[0]
+            lines[:, LENGTH] = base
+            for line_kernel, cells, data in zip(kernels, *lists, strict=True):
+                line_kernel(0.0, lines, cells, data)
+        for family, data, out in zip(system.families, self._data, self._outs, strict=True):
+            family.force(0.0, saved[0], saved[1], saved[2], family.cells, data, out)
         signs, probes = self._probes[3], self._seeing
         values, where = np.zeros(len(signs)), np.full((len(signs), 2), PLACE)
         for i, (probe, rows, data, _) in enumerate(probes):
             rows, data = np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float)
             values[i] = probe(0.0, saved[0], saved[1], saved[2], self._outs[0], rows, data, where[i])
-        total = np.zeros(len(system.families) + 3)
-        book_energies(
-            0.0, saved[0], saved[1], self._masses[0], self._cells, self._data, *self._energies, np.zeros(1), total
-        )
+        total, book = np.zeros(len(system.families) + 3), np.zeros(len(system.families) + 1)
+        numbers = (self._masses[0], self._cells, self._data, *self._energies, book, self._working)
+        book_energies(0.0, saved[0], saved[1], *numbers, total)
         values[len(probes) :] = self._watch @ total
         stepping = len(probes) + np.flatnonzero(self._watch[:, -1])
         values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         events = self._events.copy()
         for event in events:
             passes(event, values[int(event[0])])
-        own = np.delete(total[:-2], self._ends[2])
+        own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
-        return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), np.zeros(1), np.zeros(3), events)
+        return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), book, np.zeros(3), events)
 
     def _peaks(self, run):
         return (*self._probes, run.peaks, run.times, run.places, run.work, run.impulse)
@@ -239,11 +265,11 @@ class CentralDifference:
         """
         ends = np.atleast_1d(np.asarray(ends, dtype=float))
         history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
-        step, start = self.step_size or 0.0, run.time
+        step, start, linear = self.step_size or 0.0, run.time, self.system.rows - self.system.net.spins
         done = rows_ahead(
-            ends, self.safety, step, self.finer, DRIFT, run.state, run.saved, *self._masses, self._moving, *self._ends,
-            *self._forces, self._seen, *self._energies, self._bounds, *self._drives, *self._peaks(run),
-            self._watch, run.events, history,
+            ends, self.safety, step, self.finer, DRIFT, run.state, run.saved, linear, *self._masses, self._moving,
+            *self._ends, *self._forces, self._seen, *self._energies, self._bounds, self._dampings, *self._drives,
+            *self._peaks(run), self._watch, run.events, history,
         )  # fmt: skip
         if done < 0:
             raise SolverError(

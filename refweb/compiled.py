@@ -12,7 +12,10 @@ all its digits, which it loses when positions are the unknowns.
                a positive semidefinite part
 `BOUND`        ``(reach, speed, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of |K|
                [N/m], for all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most
+`LINES`        ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
 =============  ==========================================================================================
+
+`STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
 
 Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at
 the file a function stands in, and would go on using a kernel whose law, in another file, has changed.
@@ -47,6 +50,7 @@ _common = (_f, _array(_f, 2), _array(_f, 2))
 FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2))
 ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
 BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_i, 2), _array(_f, 2))
+LINES = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
 
 

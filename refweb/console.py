@@ -143,6 +143,40 @@ def after(solution, folder):
     print(f"results in {folder}")
 
 
+def modal(summary):
+    """Print the box of modes from the content of their ``run.json``."""
+    steps, rows = summary["steps"], []
+    if steps:
+        rows.append(("modes", _modes(steps[-1])))
+    if len(steps) > 1:
+        first = [{**step, "results": dict(list(step["results"].items())[:3])} for step in steps]
+        rows.append(("steps", _results(first)))
+    stored({**summary, "scene": f"{summary['scene']}, modes", "steps": [], "results": {}}, rows)
+
+
+def _modes(step):
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    for name in ("mode", "frequency", "along", "moving mass", "most at node", ""):
+        grid.add_column(Text(name), justify="left" if not name else "right")
+    results, squared = list(step["results"].values()), step["squared"]
+    for k, result in enumerate(results):
+        value, error = abs(result["value"]), result["error"]
+        text = shown(value, error, "Hz" if squared[k] >= 0.0 else "i Hz")
+        axes = " ".join(axis for axis, share in zip("xyz", step["shares"][k], strict=True) if share >= 0.1)
+        remarks = [f"unstable, grows e-fold in {0.15915 / value:.3g} s"] if squared[k] < 0.0 < value else []
+        remarks += ["zero within ±"] if error >= value else []
+        equal = [j + 1 for j in (k - 1, k + 1) if 0 <= j < len(results) and _equal(result, results[j])]
+        remarks += [f"as mode {' and '.join(map(str, equal))}"] if equal else []
+        remarks += ["local"] if step["moving"][k] < 0.1 else []
+        moving = f"{100.0 * step['moving'][k]:.2g} %"
+        grid.add_row(str(k + 1), Text(text), axes, moving, str(result["where"]), ", ".join(remarks))
+    return grid
+
+
+def _equal(one, other):
+    return abs(one["value"] - other["value"]) <= max(one["error"] + other["error"], 1e-9 * abs(one["value"]))
+
+
 @contextlib.contextmanager
 def progress(text="loading and, the first time, compiling kernels", delay=2.0):
     """A progress bar for whatever lasts over ``delay`` seconds; silent where nobody looks.

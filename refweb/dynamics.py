@@ -11,19 +11,21 @@ import numpy as np
 from . import probes, starts
 from .central_difference import CentralDifference, OpenBook
 from .laws import SMOOTH
-from .observables import LINE, NODAL, Observe, Result
+from .observables import LINE, NODAL, TOTAL, Observe, Result
 from .solution import SOLVER
 from .state import State, floor_remark, strength_remark
 from .stepping import TIME
 
-ENERGIES = ("kinetic_energy", "strain_energy", "potential_energy", "contact_energy", "work", "total_energy")
 _VECTORS = ("momentum", "support_impulse")
 
 
 def _weights(system, quantity):
     """Weights of (energy of each family, kinetic energy, work, step size) that make a quantity of the whole net."""
     total, energies = quantity == "total_energy", [f.book for f in system.families]
-    weights = [book != "work" and (total or book == quantity) for book in energies]
+    stored = [book not in ("work", "dissipated_energy") for book in energies]
+    weights = [
+        (total and own) or (book != "work" and book == quantity) for own, book in zip(stored, energies, strict=True)
+    ]
     weights += [total or quantity == "kinetic_energy", quantity == "work", quantity == "step_size"]
     return np.array(weights, dtype=float)
 
@@ -199,11 +201,11 @@ class Motion:
         self.rows = []
         self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
         awaited = {event.observe for event in scene.event}
-        sums = [o for o in scene.observables if o.quantity in (*ENERGIES, "step_size")]
+        sums = [o for o in scene.observables if o.quantity in TOTAL and o.quantity != "slack_fraction"]
         self.watched = [o for o in sums if o.reduce != "final" or o.name in awaited]
-        books = {f.book for f in system.families}
-        books |= {"kinetic_energy", "total_energy"} | ({"work"} if system.drives else set())
-        self.energies = [name for name in ENERGIES if name in books]
+        own = dict.fromkeys(f.book for f in system.families if f.book != "work")
+        work = ["work"] if "work" in [f.book for f in system.families] or system.drives or system.line_drives else []
+        self.energies = ["kinetic_energy", *own, *work, "total_energy"]
         self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in self.energies]
         self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]

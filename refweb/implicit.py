@@ -38,8 +38,8 @@ class Course:
         Displacement [m] and velocity [m/s] at that time.
     peaks, times, places : ndarray, shape (probes,)
         Extreme value of each probe, its time, and the row or element it stands at.
-    work : float
-        Work of loads and motion [J].
+    book : ndarray, shape (families + 1,)
+        Work of each family that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
     events : ndarray, shape (events, 6)
@@ -53,7 +53,7 @@ class Course:
     times: np.ndarray
     places: np.ndarray
     events: np.ndarray
-    work: float = 0.0
+    book: np.ndarray
     impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
     reached: float = 0.0
     step: float = 0.0
@@ -113,10 +113,11 @@ class Implicit:
             typed_list(ENERGY, [f.energy or no_energy for f in families]),
             typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
         )
-        self._working = [i for i, f in enumerate(families) if f.book == "work"]
+        self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
+        self._working = system.working
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
         self._held = system.supported
-        times = [t for part in (*families, *system.drives) for t in part.times]
+        times = [t for part in (*families, *system.drives, *system.line_drives) for t in part.times]
         self._breaks = np.unique(np.array(times, dtype=float))
         self._radius = min((body.radius for body in system.net.bodies), default=np.inf)
 
@@ -149,8 +150,8 @@ class Implicit:
         system.drive(0.0, x, v)
         self._reference = np.where(self._held, x, 0.0)  # motion is written over it
         signs, count = self._signs, len(self._probes)
-        none = np.zeros(len(signs))
-        run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy())
+        none, book = np.zeros(len(signs)), np.zeros(len(system.families) + 1)
+        run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy(), book)
         force, out = system.forces(0.0, x, v)
         where = np.full(2, PLACE)
         for i, (probe, rows, data) in enumerate(self._arrays):
@@ -163,9 +164,9 @@ class Implicit:
             passes(event, run.peaks[int(event[SLOT])])
         stepping = count + np.flatnonzero(self._weights[:, -1])
         run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
-        own = np.delete(total[:-2], self._working)
+        own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.energy, run.largest = own.sum(), np.abs(own).sum()
-        run.rates = self._rates(0.0, x, v, force)
+        run.rates = self._rates(*self._sample_of(0.0, x, v))
         with self._reported(run):
             self._begin(0.0, x.ravel()[system.free], v.ravel()[system.free])
         return run
@@ -232,12 +233,13 @@ class Implicit:
             if stop < end:
                 samples = [self._sample(t) for t in (0.5 * (run.time + stop), stop)]
         for sample in samples:
-            self._peaks(run, *sample)
-        width = samples[1][0] - run.time
-        (power, reaction), (last, held) = (self._rates(*sample[:4]) for sample in samples)
-        run.work += width / 6.0 * (run.rates[0] + 4.0 * power + last)
-        run.impulse = run.impulse + width / 6.0 * (run.rates[1] + 4.0 * reaction + held)
-        run.rates = last, held
+            self._peaks(run, *sample[:5])
+        width, rates = samples[1][0] - run.time, [run.rates, *(self._rates(*sample) for sample in samples)]
+        power, reaction, _, pull = ((a + 4.0 * b + c) / 6.0 for a, b, c in zip(*rates, strict=True))
+        run.book = run.book + width * power
+        run.impulse = run.impulse + width * reaction
+        run.book[-1] += pull @ (rates[2][2] - rates[0][2])
+        run.rates = rates[2]
         run.time, run.x, run.v = float(samples[1][0]), *samples[1][1:3]
         if len(self._weights):
             total, count = self._energies(run), len(self._probes)
@@ -246,13 +248,19 @@ class Implicit:
                     run.peaks[count + j], run.times[count + j] = value, run.time
 
     def _sample(self, t):
-        """Time, displacement, velocity, force and what the lines show, at a time within the last step."""
-        x, v = self._at(t)
+        return self._sample_of(t, *self._at(t))
+
+    def _sample_of(self, t, x, v):
+        """Time, displacement, velocity, force, what the lines show, and the power of each family, last of motion."""
         force, out = self.system.forces(t, x, v)
         if not np.isfinite(force).all():
             row = int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0])
             raise SolverError(f"number not finite at {self.system.row_name(row)}, t = {t:.6g} s: use a smaller rtol")
-        return t, x, v, force, out[0].copy()
+        power, driven = np.zeros(len(out) + 1), self._driven
+        for i, column in self._powered:
+            power[i] = out[i][:, column].sum()
+        power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
+        return t, x, v, force, out[0].copy(), power
 
     def _happened(self, run, samples):
         """Note the events between the run's time and the samples; return the time of the first that ends the run."""
@@ -262,7 +270,7 @@ class Implicit:
                 if event[TIME] < np.inf:
                     continue
                 was = event[SIDE]
-                if passes(event, self._value(event, run, *sample)):
+                if passes(event, self._value(event, run, *sample[:5])):
                     event[TIME] = self._moment(event, run, was, before, sample[0])
                     if event[STOP]:
                         stop = min(stop, event[TIME])
@@ -277,7 +285,7 @@ class Implicit:
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 return high
-            if (1.0 if self._value(event, run, *self._sample(middle)) > event[LEVEL] else -1.0) == was:
+            if (1.0 if self._value(event, run, *self._sample(middle)[:5]) > event[LEVEL] else -1.0) == was:
                 low = middle
             else:
                 high = middle
@@ -300,12 +308,10 @@ class Implicit:
                 probe(t, x, v, force, lines, rows, data, where)
                 run.peaks[i], run.times[i], run.places[i], where[1] = value, t, where[0], 0
 
-    def _rates(self, t, x, v, force):
-        """Power of loads and, less its change of kinetic energy, of motion [W], and force of the supports [N]."""
-        power = sum(self.system.power(self.system.families[i], t, x, v) for i in self._working)
-        driven = self._driven
-        power -= (force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return power, -np.where(self._held, force, 0.0).sum(axis=0)
+    def _rates(self, t, x, v, force, lines, power):
+        """Powers [W], force of the supports [N], natural lengths [m] and what pulls on them [N]."""
+        lengths = self.system.lengths(t, x) if self.system.line_drives else (np.zeros(0), np.zeros(0))
+        return power, -np.where(self._held, force, 0.0).sum(axis=0), *lengths
 
     def _driven_energy(self, v):
         mass, driven = self.system.net.mass, self._driven
@@ -314,9 +320,11 @@ class Implicit:
     def _energies(self, run):
         """Energy of each family, kinetic energy, work [J] and step size [s]."""
         system, total = self.system, np.zeros(len(self.system.families) + 3)
-        work = run.work + self._driven_energy(run.v) - self._kinetic
-        cells, data, energies, outs = self._book
-        book_energies(run.time, run.x, run.v, system.net.mass, cells, data, energies, outs, np.array([work]), total)
+        book = run.book.copy()
+        book[-1] += self._driven_energy(run.v) - self._kinetic
+        system.prepare(run.time)
+        numbers = (system.net.mass, *self._book, book, self._working)
+        book_energies(run.time, run.x, run.v, *numbers, total)
         total[-3] = 0.5 * (run.v * system.momentum(run.v)).sum()
         total[-1] = run.step
         return total
@@ -326,9 +334,10 @@ class Implicit:
         force, out = system.forces(run.time, run.x, run.v)
         total = self._energies(run)
         values = [p(run.time, run.x, run.v, force, out[0], r, d, where) for p, r, d in self._arrays]
-        momentum = np.where(self._held, 0.0, system.momentum(run.v)).sum(axis=0)
+        moving = np.where(self._held, 0.0, system.momentum(run.v))
+        momentum = moving[: system.rows - system.net.spins].sum(axis=0)
         row[:] = [run.time, *values, *total, *momentum, *run.impulse]
-        own = np.delete(total[:-2], self._working)
+        own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.largest = max(run.largest, np.abs(own).sum())
         drift = abs(own.sum() - total[-2] - run.energy)
         run.worst = max(run.worst, drift)

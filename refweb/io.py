@@ -19,11 +19,13 @@ from .bodies import sphere
 from .inputs import InputError, short
 
 OWN = re.compile(
-    r"scene\.toml|checkpoint\.npz|history\.csv|run\.json|web\.pvd|web\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
+    r"scene\.toml|checkpoint\.npz|(history|modes)\.csv|run\.json|web\.pvd|web\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
     r"|(frames/)?\.refweb-[^/]+"
 )
 """Files that a run writes, and that ``--force`` removes."""
 POINT_DATA = ("displacement", "velocity", "reaction", "mass")
+SHAPE_SIZE = 0.05
+"""Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
 CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
 
 
@@ -57,31 +59,43 @@ def _drawn(net):
     return places[:, None] ** powers @ np.linalg.inv(net.places[:, None] ** powers)
 
 
-def frame_data(state):
-    """Points, and point and cell data by name, of a state's web, as VTU has them; one cell per element."""
+def frame_data(state, shape=None):
+    """Points, and point and cell data by name, of a state's web, as VTU has them; one cell per element.
+
+    The ``shape`` of a mode, of shape (nodes, 3), is point data as well, and is added to points and displacement.
+    """
     net = state.system.net
+    state.system.prepare(state.time)
     fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
     points, *point_data = (values[: net.nodes].copy() for values in fields)
+    curved = [points, *point_data[:2]]
+    if shape is not None:
+        large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
+        for values in curved[:2]:
+            values += large * shape
+        point_data.append(shape.copy())
+        curved.append(point_data[-1])
     if net.order > 2:
         inner, weights = net.cells[:, 2:], _drawn(net)[2:]
-        for values in (points, *point_data[:2]):
+        for values in curved:
             values[inner] = np.einsum("ia,cax->cix", weights, values[net.cells])
     cells = (state.element_tension, state.element_tension / net.area, state.element_strain)
     cell_data = dict(zip(CELL_DATA, (*cells, net.natural_length, state.element_slack), strict=True))
     if net.subdivide > 1:
         cell_data["line"] = net.line
     cell_data = {key: np.asarray(values, dtype=float) for key, values in cell_data.items()}
-    return points, dict(zip(POINT_DATA, point_data, strict=True)), cell_data
+    return points, dict(zip((*POINT_DATA, "shape"), point_data, strict=False)), cell_data
 
 
-def write_frame(path, state):
+def write_frame(path, state, shape=None):
     """Write the web of a state as VTU: current positions, its lines in the web's own numbering, float64.
 
-    Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other.
+    Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other. A
+    ``shape`` is drawn on it.
     """
     import meshio
 
-    points, point_data, cell_data = frame_data(state)
+    points, point_data, cell_data = frame_data(state, shape)
     net = state.system.net
     mesh = meshio.Mesh(
         points,
@@ -178,9 +192,11 @@ class Folder:
         Header of ``history.csv``.
     run : dict
         First content of ``run.json``.
+    table : str
+        Name of the history's file.
     """
 
-    def __init__(self, path, scene, columns, run):
+    def __init__(self, path, scene, columns, run, table="history.csv"):
         import tomli_w
 
         text = tomli_w.dumps(scene.to_dict())
@@ -189,14 +205,14 @@ class Folder:
             (self.path / "frames").mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"result folder {short(str(path))}: cannot be made: {error.strerror}") from None
-        self._columns = columns
+        self._columns, self._table = columns, table
         self.summary(run)
         clear(self.path)
         write_text(self.path / "scene.toml", text)
         self._start()
 
     def _start(self):
-        self._history = open(self.path / "history.csv", "w", encoding="utf-8", newline="\n")
+        self._history = open(self.path / self._table, "w", encoding="utf-8", newline="\n")
         self.row(self._columns)
         self._listed = []
         self._list_frames()
@@ -209,20 +225,20 @@ class Folder:
         self._start()
 
     def row(self, values):
-        """Append a row to ``history.csv``."""
+        """Append a row to the history."""
         text = ",".join(v if isinstance(v, str) else number(v) for v in values)
         self._history.write(text + "\n")
         self._history.flush()
 
-    def frame(self, number, state):
-        """Write frame and checkpoint of a state and list the frame in ``web.pvd``."""
-        name = f"frames/web_{number:06d}.vtu"
-        write_frame(self.path / name, state)
-        self._listed.append((state.time, 0, name))
+    def frame(self, number, state, shape=None):
+        """Write frame and checkpoint of a state and list the frame in ``web.pvd``, with a ``shape`` as its mode."""
+        name, time = f"frames/web_{number:06d}.vtu", state.time if shape is None else number
+        write_frame(self.path / name, state, shape)
+        self._listed.append((time, 0, name))
         for part, body in enumerate(state.system.net.bodies, start=1):
             surface = f"frames/{body.name}_{number:06d}.vtu"
             write_body(self.path / surface, body, state)
-            self._listed.append((state.time, part, surface))
+            self._listed.append((time, part, surface))
         net = state.system.net
         arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
         arrays |= {"supported": state.system.supported, "bodies": np.array([b.name for b in net.bodies], dtype=str)}

@@ -68,6 +68,9 @@ class Net:
         Consistent mass less the lumped one of each element [kg], its rows of sum 0; None where mass is lumped.
     bodies : tuple of refweb.bodies.RigidBody
         Bodies, whose rows follow those of the nodes.
+    spins : int
+        Number of rows at the end that are rotations of bodies: rotation vector [rad], angular velocity [rad/s], and
+        moment of inertia [kg m²] in place of mass.
     """
 
     web: object
@@ -88,6 +91,12 @@ class Net:
     cable_mass: float = 0.0
     spread: np.ndarray | None = None
     bodies: tuple = ()
+    spins: int = 0
+
+    @property
+    def heavy(self):
+        """Rows with a mass, which a moment of inertia is not."""
+        return np.flatnonzero(self.mass[: len(self.mass) - self.spins])
 
     @property
     def order(self):

@@ -22,14 +22,19 @@ TOTAL = {
     "strain_energy": "J",
     "potential_energy": "J",
     "contact_energy": "J",
+    "bending_energy": "J",
+    "frame_energy": "J",
+    "dissipated_energy": "J",
     "total_energy": "J",
     "work": "J",
     "slack_fraction": "1",
     "step_size": "s",
 }
 QUANTITIES = (*NODAL, *LINE, *TOTAL)
-_DYNAMIC = ("velocity", "kinetic_energy", "step_size")
-_NEEDS = {"potential_energy": "gravity", "contact_energy": "contact", "work": "load"}
+_DYNAMIC = ("velocity", "kinetic_energy", "dissipated_energy", "step_size")
+_NEEDS = {"potential_energy": "[gravity]", "contact_energy": "[contact]", "bending_energy": "[bending]"}
+_NEEDS |= {"frame_energy": "[frame]", "dissipated_energy": "[damping], or damping or friction in [contact],"}
+_NEEDS["work"] = "[[load]], [[motion]] or another effect that does work"
 
 
 class Value(NamedTuple):
@@ -47,6 +52,12 @@ class Result(NamedTuple):
     unit: str
     time: float
     where: int | None
+
+
+def _quantity(name, value):
+    if value not in QUANTITIES:
+        raise InputError(f"{name} = {shown(value)} must be one of the quantities, {nearest(value, QUANTITIES)}")
+    return value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +84,7 @@ class Observe(Table):
     """
 
     name: str = text(most=80)
-    quantity: str = choice(*QUANTITIES)
+    quantity: str = field(_quantity)
     node: object = nodes(None)
     body: str | None = text(None)
     line: int | None = field(node_number, None)
@@ -107,9 +118,9 @@ class Observe(Table):
         need = _NEEDS.get(self.quantity)
         if net.quasi_static and self.quantity in _DYNAMIC:
             raise InputError(f'quantity = "{self.quantity}" has no meaning in statics')
-        moved = self.quantity == "work" and system.drives
-        if need and need not in [f.name for f in system.families] and not moved:
-            raise InputError(f'quantity = "{self.quantity}" needs a [{need}] in the scene')
+        moved = self.quantity == "work" and (system.drives or system.line_drives)
+        if need and self.quantity not in [f.book for f in system.families] and not moved:
+            raise InputError(f'quantity = "{self.quantity}" needs {need} in the scene')
         if moved and net.quasi_static:
             raise InputError('quantity = "work" is not known in statics with [[motion]]: it depends on the path')
         if self.line is not None and self.line >= len(net.web.lines):

@@ -61,8 +61,8 @@ def solve(system, load_steps, progress=None, most=5_000_000):
     SolverError
         Where there is no equilibrium, or none is found.
     """
-    families = system.families
-    outs = [np.zeros((len(f.cells), f.observed)) for f in families]
+    system = system.at_rest()
+    families, outs = system.families, system.outs()
     cells, data = typed_list(INDICES, [f.cells for f in families]), typed_list(MATRIX, [f.data for f in families])
     lists = (typed_list(FORCE, [f.force for f in families]), cells, data, typed_list(MATRIX, outs))
     rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))

@@ -9,7 +9,7 @@ import numpy as np
 from .inputs import nearest
 
 SOLVER = dict.fromkeys(
-    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift linear_solver".split()
+    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift".split()
 )
 """What a solver reports; None for what it does not know."""
 

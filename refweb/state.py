@@ -66,6 +66,7 @@ class State:
         """Strain of each element, its largest over quadrature points [1], shape (cells,)."""
         from .effects.elasticity import strains
 
+        self.system.prepare(self.time)
         return strains(self.system.net, self.x).max(axis=1)
 
     @cached_property
@@ -113,7 +114,7 @@ class State:
     def energies(self):
         """Energies by column of the book [J]: those of the effects that are present, and their total."""
         book = {}
-        for family in self.system.families:
+        for family in (f for f in self.system.families if f.energy is not None):
             energy = float(self.system.energy_of(family, self.time, self.x).sum())
             book[family.book] = book.get(family.book, 0.0) + energy
         work = -book.pop("work") if "work" in book else None

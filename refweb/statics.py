@@ -298,6 +298,7 @@ def solve(system, load_steps, progress=None):
     SolverError
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
+    system = system.at_rest()
     newton, x = Newton(system, progress), np.zeros((system.rows, 3))
     for k, t in enumerate(load_steps):
         spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .compiled import BOUND, ENERGY, kernel
+from .lines import LENGTH
 from .probes import PLACE
 
 MOST = 1e8
@@ -17,13 +18,21 @@ and −1 not; whether only passing upwards counts; whether the run ends there; t
 
 
 @kernel()
-def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, total):
-    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays."""
+def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, working, total):
+    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
+
+    ``book`` holds the work of each family and, last, that of all motion; ``working`` says of each family whether that
+    counts as work (1), or as its energy, which is lost (−1), or neither (0).
+    """
     count = len(energies)
+    total[count], total[count + 1] = 0.0, book[count]
     for i in range(count):
         energies[i](t, x, cells[i], data[i], energy_outs[i])
         total[i] = energy_outs[i].sum()
-    total[count], total[count + 1] = 0.0, book[0]
+        if working[i] > 0:
+            total[count + 1] += book[i]
+        elif working[i] < 0:
+            total[i] = -book[i]
     for r in range(x.shape[0]):
         total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
 
@@ -38,23 +47,33 @@ def passes(event, value):
 
 @kernel()
 def advance(
-    count, h, t, x, v, f, mass, inverse, held, driven, working,
-    kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
+    count, h, t, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
+    kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths,
+    line_drives, line_cells, line_data, by_length,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
     energies, energy_outs, watch, total, events,
 ):  # fmt: skip
-    """``count`` steps of size h from time t; writes x, v, f, peaks, work (book[0]) and the supports' impulse.
+    """``count`` steps of size h from time t; writes x, v, f, peaks, the book of work and the supports' impulse.
+
+    Forces that depend on velocity see that at the end of the step, which the second kick, thereby implicit, is iterated
+    for: kick and kick stay adjoint to each other, and the method of order 2. The iteration contracts with ½ h C/m.
 
     Returns the steps taken: fewer than asked for where an event ends the run.
     """
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
     first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
-    before, power, reaction = np.empty((driven.size, 7)), 0.0, np.zeros(3)
-    unused = np.zeros((rows if working.size else 0, 3))
-    for i in working:
+    before, reaction, motion = np.empty((driven.size, 7)), np.zeros(3), len(kernels)
+    power, half = np.zeros(len(kernels)), np.empty((rows if viscous.size else 0, 3))
+    unused = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
+    flat_half, flat_unused = half.reshape(-1), unused.reshape(-1)
+    for n in range(powers.shape[0]):
+        i, column = powers[n, 0], powers[n, 1]
         kernels[i](t, x, v, unused, cells[i], data[i], outs[i])
-        power += outs[i][:, 0].sum()
+        power[i] = outs[i][:, column].sum()
+    pull, was = np.empty((2, lengths.size)), np.empty(lengths.size)
+    if lengths.size:
+        by_length[0](t, x, first_cells, first_data, pull[0])
     for s in range(held.size):
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
@@ -71,23 +90,48 @@ def advance(
             flat_f[q] = 0.0
         for i in range(len(drives)):
             drives[i](now, x, v, f, drive_cells[i], drive_data[i], drive_outs[i])
+        if lengths.size:
+            was[:] = first_data[:, LENGTH]
+            first_data[:, LENGTH] = lengths
+            for i in range(len(line_drives)):
+                line_drives[i](now, first_data, line_cells[i], line_data[i])
+            by_length[0](now, x, first_cells, first_data, pull[1])
+            for c in range(lengths.size):
+                book[motion] += 0.5 * (pull[0, c] + pull[1, c]) * (first_data[c, LENGTH] - was[c])
+            pull[0] = pull[1]
         first(now, x, v, f, first_cells, first_data, lines)
-        for i in range(1, len(kernels)):
+        for i in still:
             kernels[i](now, x, v, f, cells[i], data[i], outs[i])
-        for q in range(3 * rows):
-            flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
-        if working.size:
-            gained = 0.0
-            for i in working:  # the power at the full step: the forces above see the velocity at its middle
+        if viscous.size:
+            half[:] = v
+            for _ in range(100):
+                unused[:] = 0.0
+                for i in viscous:
+                    kernels[i](now, x, v, unused, cells[i], data[i], outs[i])
+                change = fastest = 0.0
+                for q in range(3 * rows):
+                    speed = flat_half[q] + 0.5 * h * flat_inverse[q] * (flat_f[q] + flat_unused[q])
+                    change, fastest = max(change, abs(speed - flat_v[q])), max(fastest, abs(speed))
+                    flat_v[q] = speed
+                if not change > 1e-14 * fastest:
+                    break
+            for q in range(3 * rows):
+                flat_f[q] += flat_unused[q]
+        else:
+            for q in range(3 * rows):
+                flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
+        for n in range(powers.shape[0]):
+            i, column = powers[n, 0], powers[n, 1]
+            if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
                 kernels[i](now, x, v, unused, cells[i], data[i], outs[i])
-                gained += outs[i][:, 0].sum()
-            book[0] += 0.5 * h * (power + gained)
-            power = gained
+            gained = outs[i][:, column].sum()
+            book[i] += 0.5 * h * (power[i] + gained)
+            power[i] = gained
         for d in range(driven.size):
             r = driven[d]
-            book[0] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
+            book[motion] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
             for k in range(3):
-                book[0] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
+                book[motion] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
         for k in range(3):
             impulse[k] += 0.5 * h * reaction[k]
             reaction[k] = 0.0
@@ -102,7 +146,7 @@ def advance(
                 probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
                 peaks[i], times[i], places[i], where[1] = value, now, where[0], 0
         if watch.shape[0]:
-            book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, total)
+            book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, working, total)
             for j in range(watch.shape[0]):
                 value, i = np.dot(watch[j], total), len(probes) + j
                 if signs[i] * value > signs[i] * peaks[i]:
@@ -125,15 +169,24 @@ def advance(
 
 
 @kernel()
-def step_bound(reach, speed, x, mass, free, rates, bounds, cells, data):
-    """Largest stable step [s]; infinite where nothing vibrates."""
+def step_bound(reach, speed, x, mass, free, rates, bounds, viscous, dampings, cells, data):
+    """Largest stable step [s], 2/ω (√(1 + ζ²) − ζ); infinite where nothing vibrates."""
     rates[:] = 0.0
     for i in range(len(bounds)):
         bounds[i](reach, speed, x, mass, rates, cells[i], data[i])
-    rate = 0.0
+    if not viscous.size:
+        rate = 0.0
+        for r in free:
+            rate = max(rate, rates[r] / mass[r])
+        return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
+    losses, step = np.zeros(rates.size), math.inf
+    for n in range(viscous.size):
+        dampings[n](reach, speed, x, mass, losses, cells[viscous[n]], data[viscous[n]])
     for r in free:
-        rate = max(rate, rates[r] / mass[r])
-    return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
+        rate, loss = rates[r] / mass[r], losses[r] / mass[r]
+        if rate + loss > 0.0:  # (√(γ² + 4κ) − γ)/κ of κ = ω², γ = 2ζω
+            step = min(step, 4.0 / (math.sqrt(loss * loss + 4.0 * rate) + loss))
+    return step
 
 
 @kernel()
@@ -147,8 +200,9 @@ def ended_by(events):
 
 @kernel()
 def rows_ahead(
-    ends, safety, step_size, finer, limit, state, saved, mass, inverse, free, held, driven, working,
-    kernels, cells, data, outs, energies, energy_outs, bounds, drives, drive_cells, drive_data, drive_outs,
+    ends, safety, step_size, finer, limit, state, saved, linear, mass, inverse, free, held, driven, working, powers,
+    still, viscous, kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives, drive_cells,
+    drive_data, drive_outs, lengths, line_drives, line_cells, line_data, by_length,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
     watch, events, history,
 ):  # fmt: skip
@@ -161,14 +215,14 @@ def rows_ahead(
     """
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
-    rows, where, rates = x.shape[0], np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
+    where, rates = np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
     total, stopped = np.zeros(len(energies) + 3), False
     for n in range(ends.size):
         interval = ends[n] - state[0]
         if interval > 0.0:
             back[0], back[1], back[2] = x, v, f
             speed = push = 0.0
-            for r in range(rows):
+            for r in range(linear):
                 speed = max(speed, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
                 a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
                 push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
@@ -176,7 +230,10 @@ def rows_ahead(
                 steps = interval / step_size
             else:
                 fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
-                limit_now = step_bound(2.0 * interval * fastest, fastest, x, mass, free, rates, bounds, cells, data)
+                reach = 2.0 * interval * fastest
+                limit_now = step_bound(
+                    reach, fastest, x, mass, free, rates, bounds, viscous, dampings, cells, data
+                )  # fmt: skip
                 steps = interval / (safety * limit_now)
             if steps > MOST:
                 state[2] = interval / steps
@@ -186,8 +243,9 @@ def rows_ahead(
                 count = int(math.ceil(finer * count))
             h = total[-1] = interval / count
             taken = advance(
-                count, h, state[0], x, v, f, mass, inverse, held, driven, working,
-                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs,
+                count, h, state[0], x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
+                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths,
+                line_drives, line_cells, line_data, by_length,
                 probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
                 energies, energy_outs, watch, total, events,
             )  # fmt: skip
@@ -199,22 +257,23 @@ def rows_ahead(
         for i in range(len(probes)):
             row[at] = probes[i](state[0], x, v, f, outs[0], probe_rows[i], probe_data[i], where)
             at += 1
-        book_energies(state[0], x, v, mass, cells, data, energies, energy_outs, book, total)
+        book_energies(state[0], x, v, mass, cells, data, energies, energy_outs, book, working, total)
         total[-1] = state[2]
         stored = np.abs(total[:-2]).sum()
         energy = total[:-2].sum()
-        for i in working:
-            stored -= abs(total[i])
-            energy -= total[i]
+        for i in range(working.size):
+            if working[i] > 0:
+                stored -= abs(total[i])
+                energy -= total[i]
         row[at : at + total.size] = total
         at += total.size
         for k in range(3):
             row[at + k], row[at + 3 + k] = 0.0, impulse[k]
-            for r in range(rows):
+            for r in range(linear):
                 if inverse[r, k] > 0.0:
                     row[at + k] += mass[r] * v[r, k]
         state[4] = max(state[4], stored)
-        drift = abs(energy - book[0] - state[3])
+        drift = abs(energy - total[total.size - 2] - state[3])
         state[5] = max(state[5], drift)
         if not math.isfinite(drift) or (drift > limit * state[4]):
             return n

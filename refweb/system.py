@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from .effects import Constraint, Drive
+from .effects import Constraint, Drive, Family, LineDrive
+from .lines import LENGTH
 from .pattern import Pattern
 
 
@@ -34,6 +35,8 @@ class System:
         One per effect that adds forces.
     drives : list of refweb.effects.Drive
         One per effect that prescribes motion; its rows are supported as well.
+    line_drives : list of refweb.effects.LineDrive
+        One per effect that prescribes natural lengths.
     constraints : list of refweb.effects.Constraint
         One per effect that keeps distances; no force of the system holds them.
     free : ndarray of int
@@ -46,8 +49,13 @@ class System:
                 net = effect.extend(net)
         self.net, self.effects = net, effects
         self.rows = len(net.points)
-        acting = [effect.on(net) for effect in effects if hasattr(effect, "on")]
-        self.families = [a for a in acting if not isinstance(a, Drive | Constraint)]
+        acting = []
+        for effect in effects:
+            if hasattr(effect, "on"):
+                part = effect.on(net)
+                acting += part if isinstance(part, list) else [part]
+        self.families = [a for a in acting if isinstance(a, Family)]
+        self.line_drives = [a for a in acting if isinstance(a, LineDrive)]
         self.drives = [a for a in acting if isinstance(a, Drive)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
@@ -60,21 +68,24 @@ class System:
     def _arrange(self):
         self.free = np.flatnonzero(~self.supported)
         self._rest = np.zeros((self.rows, 3))
-        self._out = [np.zeros((len(f.cells), f.observed)) for f in self.families]
+        self._out = self.outs()
         self._blocks = [np.empty((len(f.cells), 3 * f.cells.shape[1], 3 * f.cells.shape[1])) for f in self._stiff]
 
     def at_rest(self):
-        """The system as statics sees it: free bodies are held where they are, and nothing feels them."""
+        """The system as statics sees it: free bodies are held and felt by nothing, what needs velocity is left out."""
         waiting = [body.row for body in self.net.bodies if not body.fixed]
-        if not waiting:
+        if not waiting and all(family.at_rest for family in self.families):
             return self
         rest = copy.copy(self)
         rest.__dict__.pop("pattern", None)
         rest.__dict__.pop("loose", None)
         rest.supported = self.supported.copy()
         rest.supported[waiting] = True
+        rest.supported[self.rows - self.net.spins :] = True
         rest.families = []
         for family in self.families:
+            if not family.at_rest:
+                continue
             felt = ~np.isin(family.cells, waiting).any(axis=1)
             if felt.all():
                 rest.families.append(family)
@@ -95,7 +106,7 @@ class System:
 
     @property
     def _stiff(self):
-        return [f for f in self.families if f.stiffness is not None]
+        return [f for f in self.families if f.stiffness is not None or f.damping is not None]
 
     @cached_property
     def pattern(self):
@@ -116,6 +127,37 @@ class System:
         np.logical_or.at(held, part, self.supported)
         return [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
 
+    def outs(self):
+        """Arrays for what each family observes per cell; those of families that share it are that of the lines."""
+        lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.shared)])))
+        return [
+            lines if f.shared or f.name == "elasticity" else np.zeros((len(f.cells), f.observed)) for f in self.families
+        ]
+
+    @property
+    def working(self):
+        """Of each family 1 if its power counts as work, −1 if its power is energy lost, else 0."""
+        signs = {"work": 1, "dissipated_energy": -1}
+        return np.array([signs[f.book] if f.power is not None else 0 for f in self.families], dtype=np.int64)
+
+    @cached_property
+    def by_length(self):
+        """Kernel of ∂E/∂L of each element, E the energy of the lines."""
+        from .effects.elasticity import by_length
+
+        return by_length(self.net)
+
+    @cached_property
+    def _length(self):
+        return self.net.natural_length.copy()
+
+    def prepare(self, t):
+        """Give the lines their natural lengths at time t, where an effect prescribes them."""
+        if self.line_drives:
+            self.net.line_data[:, LENGTH] = self._length
+            for d in self.line_drives:
+                d.kernel(t, self.net.line_data, d.cells, d.data)
+
     def drive(self, t, x, v=None):
         """Write the prescribed displacements [m] and velocities [m/s] at time t into x and v."""
         v = np.zeros_like(x) if v is None else v
@@ -128,6 +170,7 @@ class System:
 
     def forces(self, t, x, v=None):
         """Force on every row [N], and what each family observes per cell (a list beside ``families``)."""
+        self.prepare(t)
         f = np.zeros((self.rows, 3))
         v = self._rest if v is None else v
         for family, out in zip(self.families, self._out, strict=True):
@@ -136,16 +179,17 @@ class System:
 
     def force_of(self, family, t, x, v=None):
         """Force on every row of one family [N]."""
-        f = np.zeros((self.rows, 3))
-        out = np.zeros((len(family.cells), family.observed))
+        self.prepare(t)
+        f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), max(family.observed, 2)))
         family.force(t, x, self._rest if v is None else v, f, family.cells, family.data, out)
         return f
 
-    def power(self, family, t, x, v):
-        """Power of a family that is booked as work [W]."""
-        f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), family.observed))
-        family.force(t, x, v, f, family.cells, family.data, out)
-        return out[:, 0].sum()
+    def lengths(self, t, x):
+        """Natural length of each element [m], and ∂E/∂L [N]; the work of their change is the integral of both."""
+        self.prepare(t)
+        pull = np.empty(len(self.net.cells))
+        self.by_length(t, x, self.net.cells, self.net.line_data, pull)
+        return self.net.natural_length.copy(), pull
 
     @cached_property
     def _spread(self):
@@ -178,7 +222,10 @@ class System:
 
     def energy_of(self, family, t, x):
         """Energy of each cell of one family [J]."""
-        out = np.empty(len(family.cells))
+        out = np.zeros(len(family.cells))
+        if family.energy is None:
+            return out
+        self.prepare(t)
         family.energy(t, x, family.cells, family.data, out)
         return out
 
@@ -188,9 +235,13 @@ class System:
 
     def stiffness(self, t, x, v=None, definite=False):
         """Values of K = −∂f/∂x [N/m] in the fixed pattern; ``definite`` leaves out what is negative."""
+        self.prepare(t)
         v = self._rest if v is None else v
         for family, blocks in zip(self._stiff, self._blocks, strict=True):
-            family.stiffness(t, x, v, blocks, family.cells, family.data, definite)
+            if family.stiffness is None:
+                blocks[:] = 0.0
+            else:
+                family.stiffness(t, x, v, blocks, family.cells, family.data, definite)
         return self.pattern.assemble(self._blocks)
 
     @property
@@ -200,7 +251,14 @@ class System:
 
     def damping(self, t, x, v):
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity."""
-        return None
+        if not any(f.damping is not None for f in self.families):
+            return None
+        self.prepare(t)
+        for family, blocks in zip(self._stiff, self._blocks, strict=True):
+            blocks[:] = 0.0
+            if family.damping is not None:
+                family.damping(t, x, v, blocks, family.cells, family.data, False)
+        return self.pattern.assemble(self._blocks)
 
     def assemble_lines(self, blocks):
         """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""

@@ -492,7 +492,7 @@ WRONG = [
     ("motion", [{"node": 0, "displacement": [[0, 1.0, 0]]}], "[[motion]] 1 displacement[0] = [0, 1.0, 0]", "row of 4"),
 ]
 OBSERVE = [
-    ({"quantity": "deflection"}, '[[observe]] 1 quantity = "deflection" must be one of'),
+    ({"quantity": "deflection"}, '[[observe]] 1 quantity = "deflection" must be one of the quantities, did you mean'),
     ({"quantity": "velocity"}, '[[observe]] 1 quantity = "velocity"'),
     ({"quantity": "tension", "line": 3}, "[[observe]] 1 line = 3 must be 0 … 2"),
     ({"quantity": "tension", "line": -1}, "[[observe]] 1 line = -1 must be ≥ 0"),
@@ -503,7 +503,7 @@ OBSERVE = [
     ({"quantity": "displacement", "node": "nix"}, '[[observe]] 1 node = "nix" names no node'),
     ({"quantity": "displacement", "body": "ball"}, '[[observe]] 1 body = "ball"'),
     ({"quantity": "displacement", "reduce": "mean"}, '[[observe]] 1 reduce = "mean" must be one of "max", "min"'),
-    ({"quantity": "potential_energy"}, '[[observe]] 1 quantity = "potential_energy" needs a [gravity]'),
+    ({"quantity": "potential_energy"}, '[[observe]] 1 quantity = "potential_energy" needs [gravity]'),
     ({"quantity": "stress", "name": "a,b"}, '[[observe]] 1 name = "a,b" must be free of commas'),
     ({"quantity": "stress", "name": "a\nb"}, '[[observe]] 1 name = "a b" must be a printable text'),
     ({"quantity": "stress", "name": "step"}, '[[observe]] 1 name = "step" is a column of its own'),

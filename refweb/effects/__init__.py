@@ -4,8 +4,8 @@ An effect is a frozen value that holds physical numbers only. It has one or more
 matrix and knows no other effect.
 
 ``on(net)``
-    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; or a `Drive`; or a
-    `Constraint`.
+    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
+    `Drive`, a `LineDrive` or a `Constraint`.
 ``extend(net)``
     The `refweb.lines.Net` with more rows or mass; comes before any ``on``.
 ``start(net, supported, v)``
@@ -43,12 +43,22 @@ class Family:
     book : str
         Column of the energy book that its energy or power belongs to.
     observed : int
-        Number of values per cell that ``force`` writes to its ``out``; the first of a family booked as "work" is its
-        power [W].
+        Number of values per cell that ``force`` writes to its ``out``.
+    power : int, optional
+        Column of ``out`` with the power of the force [W], for a family booked as "work" or "dissipated_energy".
+    shared : bool
+        Whether ``out`` is that of the lines, tension and strain, over whose elements the cells run as well; ``force``
+        then writes the whole tension, and its own values behind.
+    damping : kernel, optional
+        −∂f/∂v by cell; None where the force does not depend on velocity.
+    damping_bound : kernel, optional
+        Bound on the row sums of |−∂f/∂v|.
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
     symmetric : bool
-        Whether the stiffness is symmetric.
+        Whether stiffness and damping are symmetric.
+    at_rest : bool
+        Whether it acts on what does not move; statics leaves out what does not.
     times : sequence of float
         Times at which the force has a corner [s]; no step of an implicit method passes one.
     """
@@ -62,8 +72,13 @@ class Family:
     bound: Callable | None
     book: str
     observed: int = 0
+    power: int | None = None
+    shared: bool = False
+    damping: Callable | None = None
+    damping_bound: Callable | None = None
     internal: bool = False
     symmetric: bool = True
+    at_rest: bool = True
     times: tuple = ()
 
 
@@ -104,7 +119,8 @@ class Constraint:
     cells: np.ndarray
     data: np.ndarray
 
-    def _between(self, x):
+    def between(self, x):
+        """Second less first of each pair, shape (cells, 3)."""
         return x[self.cells[:, 1]] - x[self.cells[:, 0]]
 
     @property
@@ -114,20 +130,20 @@ class Constraint:
 
     def excess(self, x):
         """g [m] at displacement x, shape (cells,); the difference of the two lengths where that is small."""
-        u = self._between(x)
+        u = self.between(x)
         return ((2.0 * self.data[:, :3] + u) * u).sum(axis=1) / (2.0 * self.length)
 
     def direction(self, x):
         """∂g/∂x of the second row, d/L, shape (cells, 3); that of the first is its negative."""
-        return (self.data[:, :3] + self._between(x)) / self.length[:, None]
+        return (self.data[:, :3] + self.between(x)) / self.length[:, None]
 
     def speed(self, x, v):
         """dg/dt [m/s] at displacement x and velocity v, shape (cells,)."""
-        return (self.direction(x) * self._between(v)).sum(axis=1)
+        return (self.direction(x) * self.between(v)).sum(axis=1)
 
     def turning(self, v):
         """What d²g/dt² has besides the accelerations, |v₂ − v₁|²/L [m/s²], shape (cells,)."""
-        return (self._between(v) ** 2).sum(axis=1) / self.length
+        return (self.between(v) ** 2).sum(axis=1) / self.length
 
     def pull(self, x, multipliers):
         """Gᵀλ on every row [N], G = ∂g/∂x, shape (rows, 3); the links act with its negative."""
@@ -135,6 +151,28 @@ class Constraint:
         np.subtract.at(total, self.cells[:, 0], along)
         np.add.at(total, self.cells[:, 1], along)
         return total
+
+
+@dataclass(frozen=True, eq=False)
+class LineDrive:
+    """Natural lengths that are prescribed over time; ``kernel`` (signature `LINES`) multiplies them.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (elements, 1)
+        The elements it changes.
+    data : ndarray, shape (elements, columns)
+        Numbers of each.
+    kernel : kernel
+        Multiplies the natural lengths at time t; what multiplies them before or after does not matter.
+    times : sequence of float
+        Times at which the factor has a corner [s].
+    """
+
+    cells: np.ndarray
+    data: np.ndarray
+    kernel: Callable
+    times: tuple = ()
 
 
 def column(rows):

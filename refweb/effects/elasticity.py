@@ -43,7 +43,9 @@ def strain(x, cells, data, c, q, nodes, gradients):
 
 @functools.cache
 def kernels(law, gradients, weights):
-    """Force, energy, stiffness, bound and strain kernels of one law and reference element.
+    """Force, energy, stiffness, bound, strain and length kernels of one law and reference element.
+
+    The length kernel writes ∂E/∂L of each element [N].
 
     Parameters
     ----------
@@ -122,7 +124,18 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 out[c * points + q] = strain(x, cells, data, c, q, nodes, flat)[4]
 
-    return force, energy, stiffness, bound, every_strain
+    @kernel(ENERGY)
+    def by_length(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            total = 0.0
+            for q in range(points):
+                e = strain(x, cells, data, c, q, nodes, flat)[4]
+                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
+                pulled = (1.0 + e) * stress(law, e, axial, slack, smooth)
+                total += weights[q] * (energy_density(law, e, axial, slack, smooth) - pulled)
+            out[c] = total
+
+    return force, energy, stiffness, bound, every_strain, by_length
 
 
 def of(net):
@@ -137,13 +150,18 @@ def strains(net, x):
     return strain
 
 
+def by_length(net):
+    """The kernel (signature `refweb.compiled.ENERGY`) of ∂E/∂L of each element [N]."""
+    return of(net)[5]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Elasticity(Table):
     """Tension of every line by the law of its cable; see `refweb.laws` and, for the numbers, `refweb.cables.Cable`."""
 
     def on(self, net):
         """The family of all lines; ``out`` is tension [N] and strain."""
-        force, energy, stiffness, bound, _ = of(net)
+        force, energy, stiffness, bound, *_ = of(net)
         return Family(
             name="elasticity",
             cells=net.cells,

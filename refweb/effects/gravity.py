@@ -39,7 +39,7 @@ class Gravity(Table):
 
     def on(self, net):
         """The family of all rows with mass; its energy is zero in the web's position."""
-        heavy = np.flatnonzero(net.mass)
+        heavy = net.heavy
         return Family(
             name="gravity",
             cells=column(heavy),

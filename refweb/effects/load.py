@@ -71,5 +71,6 @@ class Load(Table):
             bound=None,
             book="work",
             observed=1,
+            power=0,
             times=tuple(t for t, _ in self.factor or ()),
         )
