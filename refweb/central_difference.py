@@ -19,9 +19,19 @@ import numpy as np
 from .compiled import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
 from .errors import SolverError
 from .inputs import InputError
-from .lines import LENGTH
 from .probes import INTEGERS, PLACE, PROBE
-from .stepping import MOST, advance, book_energies, ended_by, no_bound, no_energy, passes, rows_ahead, step_bound
+from .stepping import (
+    MOST,
+    advance,
+    book_energies,
+    ended_by,
+    no_bound,
+    no_energy,
+    passes,
+    rows_ahead,
+    set_lengths,
+    step_bound,
+)
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
@@ -151,6 +161,7 @@ class CentralDifference:
             lines = net.line_data.copy()
             numbers = [lines if data is net.line_data else data for data in numbers]
         inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
+        reeled = np.unique(np.concatenate([[], *(d.cells[:, 0] for d in system.line_drives)])).astype(np.int64)
         driven = np.concatenate([[], *(d.cells[:, 0] for d in drives)]).astype(np.int64)
         viscous = [i for i, f in enumerate(families) if f.damping is not None]
         still = [i for i in range(1, len(families)) if i not in viscous]
@@ -181,12 +192,17 @@ class CentralDifference:
             typed_list(INDICES, [d.cells for d in drives]),
             typed_list(MATRIX, [d.data for d in drives]),
             typed_list(MATRIX, [np.zeros((len(d.cells), 0)) for d in drives]),
-            net.natural_length.copy() if system.line_drives else np.zeros(0),
+            system.length[reeled],
+            reeled,
+            net.line_data[reeled],
             typed_list(LINES, [d.kernel for d in system.line_drives]),
-            typed_list(INDICES, [d.cells for d in system.line_drives]),
+            typed_list(INDICES, [np.searchsorted(reeled, d.cells).astype(np.int32) for d in system.line_drives]),
             typed_list(MATRIX, [d.data for d in system.line_drives]),
+            net.cells[reeled],
             typed_list(ENERGY, [system.by_length] if system.line_drives else []),
         )
+        corners = {t for d in system.line_drives for t in d.times}
+        self._corners = np.array([*sorted(corners), *([np.inf] if system.line_drives else []), -np.inf])
         signs = np.array([float(p[-1]) for p in (*probes, *watch)])
         self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
         self._seeing, self._events = list(probes), event_table(events)
@@ -201,10 +217,18 @@ class CentralDifference:
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
     def bound(self, x=None, reach=np.inf):
-        """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m]."""
+        """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m], at any time."""
         x = np.zeros((self.system.rows, 3)) if x is None else x
         rest = np.empty(self.system.rows), self._bounds, self._ends[5], self._dampings, self._cells, self._data
-        return step_bound(reach, 0.0, x, self._masses[0], self._moving, *rest)
+        limit = np.inf
+        for corner in self._corners:
+            self._set_lengths(max(corner, 0.0))
+            limit = min(limit, step_bound(reach, 0.0, x, self._masses[0], self._moving, *rest))
+        return limit
+
+    def _set_lengths(self, t):
+        if self.system.line_drives:
+            set_lengths(t, *self._drives[4:10], self._data[0])
 
     def figures(self, run):
         """What a run has spent, for ``run.json``."""
@@ -218,12 +242,7 @@ class CentralDifference:
         saved[1] = system.initial_velocity() if v is None else v
         saved[1][system.supported] = 0.0
         system.drive(0.0, saved[0], saved[1])
-        if system.line_drives:
-            base, kernels, *lists = self._drives[4:8]
-            lines = self._data[0]
-            lines[:, LENGTH] = base
-            for line_kernel, cells, data in zip(kernels, *lists, strict=True):
-                line_kernel(0.0, lines, cells, data)
+        self._set_lengths(0.0)
         for family, data, out in zip(system.families, self._data, self._outs, strict=True):
             family.force(0.0, saved[0], saved[1], saved[2], family.cells, data, out)
         signs, probes = self._probes[3], self._seeing
@@ -269,7 +288,7 @@ class CentralDifference:
         done = rows_ahead(
             ends, self.safety, step, self.finer, DRIFT, run.state, run.saved, linear, *self._masses, self._moving,
             *self._ends, *self._forces, self._seen, *self._energies, self._bounds, self._dampings, *self._drives,
-            *self._peaks(run), self._watch, run.events, history,
+            self._corners, *self._peaks(run), self._watch, run.events, history,
         )  # fmt: skip
         if done < 0:
             raise SolverError(

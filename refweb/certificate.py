@@ -61,6 +61,7 @@ def applies(system):
 def certify(system, equilibrium, factor=None):
     """The `Certificate` of an equilibrium of a system to which it `applies`; ``factor``, if given, is used again."""
     net, x, bars = system.net, equilibrium.x, system.net.bars
+    system.prepare(equilibrium.step)
     points = len(net.weights)
     weights = np.tile(net.weights, len(net.cells))
     axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)

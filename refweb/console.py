@@ -157,7 +157,7 @@ def modal(summary):
 def _modes(step):
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
     for name in ("mode", "frequency", "along", "moving mass", "most at node", ""):
-        grid.add_column(Text(name), justify="left" if not name else "right")
+        grid.add_column(Text(name), justify="right" if name else "left", no_wrap=bool(name))
     results, squared = list(step["results"].values()), step["squared"]
     for k, result in enumerate(results):
         value, error = abs(result["value"]), result["error"]
@@ -165,8 +165,7 @@ def _modes(step):
         axes = " ".join(axis for axis, share in zip("xyz", step["shares"][k], strict=True) if share >= 0.1)
         remarks = [f"unstable, grows e-fold in {0.15915 / value:.3g} s"] if squared[k] < 0.0 < value else []
         remarks += ["zero within ±"] if error >= value else []
-        equal = [j + 1 for j in (k - 1, k + 1) if 0 <= j < len(results) and _equal(result, results[j])]
-        remarks += [f"as mode {' and '.join(map(str, equal))}"] if equal else []
+        remarks += [f"equal to {k}"] if k and _equal(result, results[k - 1]) else []
         remarks += ["local"] if step["moving"][k] < 0.1 else []
         moving = f"{100.0 * step['moving'][k]:.2g} %"
         grid.add_row(str(k + 1), Text(text), axes, moving, str(result["where"]), ", ".join(remarks))

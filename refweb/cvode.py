@@ -28,6 +28,10 @@ LINEAR_SOLVERS = {
 }
 DENSE = 60
 """Unknown displacements up to which a dense factorization is the fastest."""
+SHORT = 0.5
+"""γω of a step up to which corrector iterations are cheaper without any factorization."""
+RENEWED = 50
+"""Evaluations of forces after which ω is looked at anew."""
 
 
 class Cvode(Implicit):
@@ -72,10 +76,13 @@ class Cvode(Implicit):
             )
         self._mass = np.repeat(system.net.mass, 3)[free]
         self._gamma = self._product = None
+        self._exact = self._plain = False
+        self._sparing = linear_solver == "auto" and self.linear_solver == "block" and not self._consistent
+        self._set_up_at, self._due = None, 0
         if self._consistent:
             self._mass_values = system.mass()
             self._mass_matrix = system.pattern.matrix(self._mass_values)
-            self._mass_factor = Factor(system.pattern)
+            self._mass_factor = _Symmetric(system.pattern)
             self._mass_factor.update(self._mass_values)
 
     def _chosen(self, name):
@@ -89,7 +96,7 @@ class Cvode(Implicit):
         return self._mass_matrix @ v if self._consistent else self._mass * v
 
     def _over_mass(self, f):
-        return self._mass_factor.solve(f) if self._consistent else f / self._mass
+        return self._mass_factor.apply(f) if self._consistent else f / self._mass
 
     def _state(self, t, y):
         """All rows at a state of the unknowns."""
@@ -102,9 +109,10 @@ class Cvode(Implicit):
     def _right_side(self, t, y, yp):
         n = self.unknowns
         self.stats["nfev"] += 1
-        force = self.system.force(t, *self._state(t, y)).ravel()[self.system.free]
+        force = self.system.force(t, *self._state(t, y))
+        self._seen = t, force
         yp[:n] = y[n:]
-        yp[n:] = self._over_mass(force)
+        yp[n:] = self._over_mass(force.ravel()[self.system.free])
 
     def _tangent(self, t, y):
         """Values of K, and of C or None, at a state."""
@@ -117,15 +125,29 @@ class Cvode(Implicit):
 
     def _set_up(self, t, y, yp, jok, jnew, gamma):
         """Factorize M + γC + γ²K; K and C are kept where CVODE allows."""
-        if not jok or self._gamma is None:
+        may = self._sparing and not (self._plain and t == self._set_up_at)  # else iterations have not converged
+        known = self._gamma is not None
+        self._plain = known and may and self._short(gamma)
+        jnew[0] = 0
+        if not known or not jok and not (self._plain and self.stats["nfev"] < self._due):
             self._stiffness, self._damping = self._tangent(t, y)
             self._K = self.system.pattern.matrix(self._stiffness)
             self._C = None if self._damping is None else self.system.pattern.matrix(self._damping)
-            jnew[0] = 1
-        else:
-            jnew[0] = 0
-        self._gamma = gamma
-        self._factorize(gamma)
+            self._due = self.stats["nfev"] + RENEWED
+            self._plain = may and self._short(gamma)
+            jnew[0] = 0 if self._plain else 1  # a set-up that factorizes is still to be had
+        self._gamma, self._set_up_at = gamma, t
+        if not self._plain:
+            self._factorize(gamma)
+
+    def _short(self, gamma):
+        """Whether corrector iterations converge well without a matrix, by a bound on γ|J|."""
+
+        def largest(values):
+            return (np.add.reduceat(np.abs(values), self.system.pattern.indptr[:-1]) / self._mass).max()
+
+        damped = 0.0 if self._damping is None else largest(self._damping)
+        return gamma * (damped + np.sqrt(largest(self._stiffness))) <= SHORT
 
     def _factorize(self, gamma):
         system = self.system
@@ -153,8 +175,11 @@ class Cvode(Implicit):
         return factor
 
     def _precondition(self, t, y, yp, r, z, gamma, delta, side):
-        n = self.unknowns
-        if self._product is not None and gamma == self._gamma and self._true:
+        if self._plain:
+            z[:] = r
+            return
+        n, self._exact = self.unknowns, gamma == self._gamma and self._true
+        if self._product is not None and self._exact:
             z[:] = self._product  # r is (I − γJ) of it, and this inverts just that
             self._product = None
             return
@@ -163,7 +188,12 @@ class Cvode(Implicit):
         z[:n] = r[:n] + self._gamma * z[n:]
 
     def _jacobian_times(self, t, y, yp, u, Ju):
+        if self._plain:
+            Ju[:] = 0.0
+            return
         n, self._product = self.unknowns, u.copy()
+        if self._exact:
+            return  # what it would be, the preconditioner takes away again
         pull = self._K @ u[:n]
         if self._C is not None:
             pull += self._C @ u[n:]
@@ -254,8 +284,8 @@ class Cvode(Implicit):
         )
         self._check(self._solver.init_step(t, np.concatenate([x, v])))
 
-    def _advance(self, stop, last):
-        return float(self._check(self._solver.step(last, "onestep", float(stop) if np.isfinite(stop) else None)).t)
+    def _advance(self, stop, end):
+        return float(self._check(self._solver.step(end, "onestep", float(stop) if np.isfinite(stop) else None)).t)
 
     def _interpolated(self, t):
         y = self._check(self._solver.step(t, "normal", None)).y
@@ -268,7 +298,7 @@ class Cvode(Implicit):
 
 
 class _Symmetric(Factor):
-    """LDLᵀ as a preconditioner: solved once, not refined."""
+    """LDLᵀ solved once and not refined, for preconditioners and for the mass matrix, whose condition is small."""
 
     def apply(self, b):
         return self._solver.solve(b)

@@ -14,7 +14,7 @@ from .laws import SMOOTH
 from .observables import LINE, NODAL, TOTAL, Observe, Result
 from .solution import SOLVER
 from .state import State, floor_remark, strength_remark
-from .stepping import TIME
+from .stepping import SIDE, TIME
 
 _VECTORS = ("momentum", "support_impulse")
 
@@ -140,8 +140,9 @@ class _Twin:
 
     def __enter__(self):
         self._thread, self._ended, self._failure = None, None, None
-        if self._beside:
-            self._thread = threading.Thread(target=self._run, daemon=True)
+        if self._beside:  # the solver is made here: a system is used by one thread at a time
+            solver = self._motion.solver(self._accuracy, twin=True)
+            self._thread = threading.Thread(target=self._run, args=(solver,), daemon=True)
             self._thread.start()
         return self
 
@@ -150,10 +151,10 @@ class _Twin:
         if self._thread is not None:
             self._thread.join()
 
-    def _run(self):
+    def _run(self, solver=None):
         motion = self._motion
         try:
-            solver = motion.solver(self._accuracy, twin=True)
+            solver = solver or motion.solver(self._accuracy, twin=True)
             run = solver.start(*motion.begin)
             last = None
             for _, history in blocks(solver, run, *motion._times()):
@@ -332,7 +333,7 @@ class Motion:
             if found.stats.get("smallest_pivot") == -1:
                 solution.warnings.append(
                     "the equilibrium it starts from is a saddle (a pivot of its tangent is negative): the motion "
-                    'leaves it by itself; law = "tension-only" has no such states'
+                    'leaves it by itself; without a [frame] law = "tension-only" has no such states'
                 )
             solution.warnings += started(self.system, found.x)
         for attempt in range(3):
@@ -358,9 +359,10 @@ class Motion:
             less = (solution.solver["nsteps"] / ended.nsteps) ** 2 if self.explicit else FINER ** (-2.0 / 3.0)
             factor = 1.0 / (1.0 - less)
             solution.reduced = with_errors(results, other, factor)
-            for found, time in zip(solution.events, ended.events[:, TIME], strict=True):
+            for found, width, time in zip(solution.events, self._widths, ended.events[:, TIME], strict=True):
                 if found["time"] is not None and np.isfinite(time):
-                    found["error"] = SPREAD * factor * abs(found["time"] - float(time))
+                    off = abs(found["time"] - float(time))
+                    found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
         if failure:
             solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
 
@@ -404,6 +406,7 @@ class Motion:
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
             for event, time in zip(self.scene.event, run.events[:, TIME], strict=True)
         ]
+        self._widths = run.events[:, SIDE].copy()
         figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.figures(run))
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None

@@ -9,8 +9,10 @@ by Simpson's rule. A flag of success is not believed: the book of energies is ch
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import io
 import re
+import warnings
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +26,10 @@ from .stepping import LEVEL, SIDE, SLOT, STOP, TIME, book_energies, ended_by, no
 
 TRAVEL = 0.2
 """Largest share of a body's radius that anything may move in a step, so that nothing passes through."""
+UNEVEN = 1e-3
+"""Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
+HALVINGS = 8
+"""Number of times that a piece is halved where it does."""
 
 
 @dataclass(eq=False)
@@ -116,10 +122,11 @@ class Implicit:
         self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
         self._working = system.working
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
-        self._held = system.supported
+        self._held, self._fixed = system.supported, np.flatnonzero(system.supported)
         times = [t for part in (*families, *system.drives, *system.line_drives) for t in part.times]
         self._breaks = np.unique(np.array(times, dtype=float))
         self._radius = min((body.radius for body in system.net.bodies), default=np.inf)
+        self._seen = 0.0, np.zeros((0, 3))  # time and force [N] of the solver's last evaluation
 
     # What a solver brings
 
@@ -127,8 +134,8 @@ class Implicit:
         """Initialise the solver."""
         raise NotImplementedError
 
-    def _advance(self, stop, last):
-        """Take one step, not beyond ``stop``, on the way to ``last``; return the time reached."""
+    def _advance(self, stop, end):
+        """Take one step, not beyond ``stop``, on the way to ``end``; return the time reached."""
         raise NotImplementedError
 
     def _interpolated(self, t):
@@ -167,8 +174,12 @@ class Implicit:
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.energy, run.largest = own.sum(), np.abs(own).sum()
         run.rates = self._rates(*self._sample_of(0.0, x, v))
-        with self._reported(run):
+        with self._reported(run), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Custom sparse Jacobian approximation will be ignored")
             self._begin(0.0, x.ravel()[system.free], v.ravel()[system.free])
+        self._unready = self.linear_solver == "sparse"
+        if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
         return run
 
     def rows(self, run, ends):
@@ -192,14 +203,14 @@ class Implicit:
             before = run.time
             while run.time < end and not run.stopped:
                 if run.reached <= run.time:
-                    self._take_step(run, ends[-1])
+                    self._take_step(run, end)
                 self._cover(run, min(run.reached, end))
             self._fill(history[n], run, before)
             if run.stopped:
                 return history[: n + 1]
         return history
 
-    def _take_step(self, run, last):
+    def _take_step(self, run, end):
         """One step of the solver, not beyond a corner of a table, nor further than a body can be passed."""
         stop, ahead = np.inf, self._breaks[self._breaks > run.time * (1.0 + 1e-12)]
         if len(ahead):
@@ -207,12 +218,15 @@ class Implicit:
         if np.isfinite(self._radius):
             speed = 2.0 * np.sqrt((run.v**2).sum(axis=1).max())
             stop = min(stop, run.time + TRAVEL * self._radius / speed) if speed > 0.0 else stop
-        if stop - run.time < 1e-12 * last:
-            stop = run.time + 1e-12 * last
+        if stop - run.time < 1e-12 * end:
+            stop = run.time + 1e-12 * end
         with self._reported(run):
-            reached = self._advance(stop, last)
+            reached = self._advance(stop, end)
             if reached == run.reached:  # SUNDIALS first returns the end of the step that it was last asked inside of
-                reached = self._advance(stop, last)
+                reached = self._advance(stop, end)
+        if self._unready:
+            self._unready = False
+            ctypes.pythonapi.Py_DecRef(ctypes.py_object(self._solver))
         if not reached > run.reached:
             raise SolverError(f"{self.method} makes no step at t = {run.time:.6g} s: raise rtol = {self.rtol:g}")
         run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
@@ -225,27 +239,65 @@ class Implicit:
         system.drive(t, x, v)
         return x, v
 
-    def _cover(self, run, end):
+    def _cover(self, run, end, halvings=HALVINGS):
         """Look at the run in the middle between its time and ``end``, and at the end; leave it there."""
         samples = [self._sample(t) for t in (0.5 * (run.time + end), end)]
+        rates = self._piece(run, samples)
+        if halvings and self._uneven(run, rates, *samples[1][:3]):
+            self._cover(run, samples[0][0], halvings - 1)
+            if not run.stopped:
+                self._cover(run, end, halvings - 1)
+            return
         if len(run.events):
-            stop = self._happened(run, samples)
+            stop = self._happened(run, samples, rates)
             if stop < end:
                 samples = [self._sample(t) for t in (0.5 * (run.time + stop), stop)]
+                rates = self._piece(run, samples)
+        end, count = float(samples[1][0]), len(self._probes)
         for sample in samples:
             self._peaks(run, *sample[:5])
-        width, rates = samples[1][0] - run.time, [run.rates, *(self._rates(*sample) for sample in samples)]
-        power, reaction, _, pull = ((a + 4.0 * b + c) / 6.0 for a, b, c in zip(*rates, strict=True))
-        run.book = run.book + width * power
-        run.impulse = run.impulse + width * reaction
-        run.book[-1] += pull @ (rates[2][2] - rates[0][2])
-        run.rates = rates[2]
-        run.time, run.x, run.v = float(samples[1][0]), *samples[1][1:3]
-        if len(self._weights):
-            total, count = self._energies(run), len(self._probes)
-            for j, value in enumerate(self._weights @ total):
-                if self._signs[count + j] * value > self._signs[count + j] * run.peaks[count + j]:
-                    run.peaks[count + j], run.times[count + j] = value, run.time
+            if len(self._weights):
+                total = self._energies(self._there(run, rates, end, *sample[:3]))
+                for j, value in enumerate(self._weights @ total, count):
+                    if self._signs[j] * value > self._signs[j] * run.peaks[j]:
+                        run.peaks[j], run.times[j] = value, sample[0]
+        run.book, run.impulse = self._booked(run, rates, end, end)
+        run.rates = rates[3]
+        run.time, run.x, run.v = end, *samples[1][1:3]
+
+    def _piece(self, run, samples):
+        """Rates at the start, in the middle and at the end of a piece of a step, and at the start of the next one.
+
+        The last two differ at the corner of a motion, up to which its velocity is that in the middle.
+        """
+        after, driven, (t, x, v) = self._rates(*samples[1]), self._driven, samples[1][:3]
+        last = after
+        if len(driven) and (v[driven] != samples[0][2][driven]).any():
+            v = v.copy()
+            v[driven] = samples[0][2][driven]
+            last = self._rates(*self._sample_of(t, x, v))
+        return run.rates, self._rates(*samples[0]), last, after
+
+    def _uneven(self, run, rates, end, x, v):
+        """Whether powers change too much within a piece, as where damped lines go slack in a long step."""
+        start, middle, last = (rate[0] for rate in rates[:3])
+        apart = (end - run.time) * np.abs(start - 2.0 * middle + last).sum() / 12.0
+        return apart > UNEVEN * max(run.largest, 0.5 * (v * self.system.momentum(v)).sum())
+
+    def _booked(self, run, rates, end, t):
+        """Work, and impulse of the supports, at time t of a piece, by the parabola through its three rates."""
+        width = end - run.time
+        s = (t - run.time) / width
+        a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
+        start, middle, last = rates[:3]
+        power, reaction, _, pull = (a * p + b * q + c * r for p, q, r in zip(start, middle, last, strict=True))
+        book = run.book + width * power
+        book[-1] += pull @ (last[2] - start[2])
+        return book, run.impulse + width * reaction
+
+    def _there(self, run, rates, end, t, x, v):
+        """The run at a state within a piece."""
+        return replace(run, time=t, x=x, v=v, book=self._booked(run, rates, end, t)[0])
 
     def _sample(self, t):
         return self._sample_of(t, *self._at(t))
@@ -253,25 +305,28 @@ class Implicit:
     def _sample_of(self, t, x, v):
         """Time, displacement, velocity, force, what the lines show, and the power of each family, last of motion."""
         force, out = self.system.forces(t, x, v)
-        if not np.isfinite(force).all():
-            row = int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0])
-            raise SolverError(f"number not finite at {self.system.row_name(row)}, t = {t:.6g} s: use a smaller rtol")
+        self._refuse_endless(t, force)
         power, driven = np.zeros(len(out) + 1), self._driven
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
         return t, x, v, force, out[0].copy(), power
 
-    def _happened(self, run, samples):
+    def _refuse_endless(self, t, force):
+        if not np.isfinite(force).all():
+            name = self.system.row_name(int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0]))
+            raise SolverError(f"number not finite at {name}, t = {t:.6g} s: use a smaller rtol") from None
+
+    def _happened(self, run, samples, rates):
         """Note the events between the run's time and the samples; return the time of the first that ends the run."""
-        stop, before = np.inf, run.time
+        stop, before, piece = np.inf, run.time, (run, rates, samples[1][0])
         for sample in samples:
             for event in run.events:
                 if event[TIME] < np.inf:
                     continue
                 was = event[SIDE]
-                if passes(event, self._value(event, run, *sample[:5])):
-                    event[TIME] = self._moment(event, run, was, before, sample[0])
+                if passes(event, self._value(event, piece, *sample[:5])):
+                    event[TIME], event[SIDE] = self._moment(event, piece, was, before, sample[0]), 0.0
                     if event[STOP]:
                         stop = min(stop, event[TIME])
             before = sample[0]
@@ -279,23 +334,23 @@ class Implicit:
         run.events[late, TIME] = np.inf
         return stop
 
-    def _moment(self, event, run, was, low, high):
+    def _moment(self, event, piece, was, low, high):
         """Time at which an event happens, by bisection on the solver's own interpolation."""
         while True:
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 return high
-            if (1.0 if self._value(event, run, *self._sample(middle)[:5]) > event[LEVEL] else -1.0) == was:
+            if (1.0 if self._value(event, piece, *self._sample(middle)[:5]) > event[LEVEL] else -1.0) == was:
                 low = middle
             else:
                 high = middle
 
-    def _value(self, event, run, t, x, v, force, lines):
+    def _value(self, event, piece, t, x, v, force, lines):
         slot = int(event[SLOT])
         if slot < len(self._probes):
             probe, rows, data = self._arrays[slot]
             return probe(t, x, v, force, lines, rows, data, np.zeros(2, dtype=np.int64))
-        total = self._energies(replace(run, time=t, x=x, v=v))
+        total = self._energies(self._there(*piece, t, x, v))
         return self._weights[slot - len(self._probes)] @ total
 
     def _peaks(self, run, t, x, v, force, lines):
@@ -311,7 +366,8 @@ class Implicit:
     def _rates(self, t, x, v, force, lines, power):
         """Powers [W], force of the supports [N], natural lengths [m] and what pulls on them [N]."""
         lengths = self.system.lengths(t, x) if self.system.line_drives else (np.zeros(0), np.zeros(0))
-        return power, -np.where(self._held, force, 0.0).sum(axis=0), *lengths
+        reaction = np.bincount(self._fixed % 3, force.ravel()[self._fixed], 3)
+        return power, -reaction, *lengths
 
     def _driven_energy(self, v):
         mass, driven = self.system.net.mass, self._driven
@@ -341,7 +397,7 @@ class Implicit:
         run.largest = max(run.largest, np.abs(own).sum())
         drift = abs(own.sum() - total[-2] - run.energy)
         run.worst = max(run.worst, drift)
-        if drift > DRIFT * run.largest:
+        if not drift <= DRIFT * run.largest:
             raise OpenBook(
                 f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, "
                 f"limit {DRIFT:g}: use a smaller rtol than {self.rtol:g}"
@@ -355,6 +411,7 @@ class Implicit:
             with contextlib.redirect_stdout(said):
                 yield
         except _Stopped as stop:
+            self._refuse_endless(*self._seen)
             reason = re.sub(r"\[\w+, Error: (-?\d+)\]", "", said.getvalue())
             reason = " ".join(reason.split()) or str(stop)
             x, v = run.x, run.v
@@ -379,6 +436,7 @@ def scales(system):
     sound in the fastest element.
     """
     net = system.net
+    system.prepare(0.0)
     length = net.natural_length
     mass = np.maximum(np.bincount(net.cells.ravel(), minlength=system.rows), 1)
     light = np.where(net.mass > 0.0, net.mass, np.inf) / mass

@@ -231,22 +231,22 @@ def texts(default=MISSING):
     return field(read, default)
 
 
-def nodes(default=MISSING, *, empty=False):
-    """A node number, a name, or a list of them; `refweb.webs.Web.find` turns it into numbers."""
+def nodes(default=MISSING, *, empty=False, what="node"):
+    """A number of a node (or a line), a name, or a list of them; `refweb.webs.Web.find` turns it into numbers."""
 
     def read(name, value):
         if hasattr(value, "tolist"):
             value = value.tolist()
         if isinstance(value, (list, tuple)):
             if not value and not empty:
-                _refuse(name, value, "at least one node")
+                _refuse(name, value, f"at least one {what}")
             return tuple(one(f"{name}[{i}]", x) for i, x in enumerate(value))
         return one(name, value)
 
     def one(name, value):
         if isinstance(value, str):
             return value
-        return _bounded(name, _whole(name, value, "a node number or a name"), "", None, 0, None, None)
+        return _bounded(name, _whole(name, value, f"a {what} number or a name"), "", None, 0, None, None)
 
     return field(read, default)
 

@@ -39,6 +39,7 @@ class InteriorPoint:
     def __init__(self, system, t, x, loose):
         self.system, self.x, self.loose = system, x.copy(), loose
         net, points = system.net, len(system.net.weights)
+        system.prepare(t)
         self.bars = net.bars
         self.axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
         self.natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.line_data[:, LENGTH], points)

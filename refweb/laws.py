@@ -67,6 +67,22 @@ def tangent(law, strain, modulus, slackness, smoothing):
 
 
 @kernel()
+def curvature(law, strain, modulus, slackness, smoothing):
+    """d²σ/dε² [Pa], 2 E η²/r³; 0 for laws without smoothing."""
+    _, r = branch(strain - slackness, smoothing)
+    if law != SMOOTH or r == 0.0:
+        return 0.0
+    share = 2.0 * smoothing / r
+    return 0.5 * modulus * share * share / r
+
+
+@kernel()
+def above_floor(law, strain, modulus, slackness, smoothing):
+    """σ(ε) + αE, how far the stress is above the law's floor [Pa]; infinite for the linear law."""
+    return math.inf if law == LINEAR else modulus * branch(strain - slackness, smoothing)[0]
+
+
+@kernel()
 def energy_density(law, strain, modulus, slackness, smoothing):
     """∫ σ dε from 0 [J/m³]; a Taylor series where |ε| is below 1e-4 of the larger of ε0 and 2η."""
     if law == LINEAR or (law == TENSION_ONLY and strain > 0.0):

@@ -121,8 +121,10 @@ class Observe(Table):
         moved = self.quantity == "work" and (system.drives or system.line_drives)
         if need and self.quantity not in [f.book for f in system.families] and not moved:
             raise InputError(f'quantity = "{self.quantity}" needs {need} in the scene')
-        if moved and net.quasi_static:
-            raise InputError('quantity = "work" is not known in statics with [[motion]]: it depends on the path')
+        loads = [f for f in system.families if f.book == self.quantity == "work"]
+        if net.quasi_static and (moved or any(f.energy is None for f in loads)):
+            tables = "[[motion]], [[pressure]], [[thrust]] and [[reel]]"
+            raise InputError(f'quantity = "work" is not known in statics with {tables}: it depends on the path')
         if self.line is not None and self.line >= len(net.web.lines):
             raise InputError(f"line = {self.line} must be 0 … {len(net.web.lines) - 1}")
         if self.quantity in NODAL:

@@ -38,6 +38,17 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
             kernels[i](t, x, v, f, cells[i], data[i], outs[i])
 
 
+def _inverse_mass(system, t):
+    """What forces are multiplied by [m/N], shape (rows, 3): 0 where nothing moves."""
+    rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
+    system.prepare(t)
+    for family in system.families:
+        if family.bound is not None:
+            family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
+    moving = ~system.supported & (rates > 0.0)[:, None]
+    return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
+
+
 def solve(system, load_steps, progress=None, most=5_000_000):
     """Equilibria at load steps, one after another, each from the one before.
 
@@ -65,17 +76,12 @@ def solve(system, load_steps, progress=None, most=5_000_000):
     families, outs = system.families, system.outs()
     cells, data = typed_list(INDICES, [f.cells for f in families]), typed_list(MATRIX, [f.data for f in families])
     lists = (typed_list(FORCE, [f.force for f in families]), cells, data, typed_list(MATRIX, outs))
-    rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
-    for family in families:
-        if family.bound is not None:
-            family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
-    moving = ~system.supported & (rates > 0.0)[:, None]
-    inverse = np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
-    scale = 0.0
+    x, scale = np.zeros((system.rows, 3)), 0.0
     for t in load_steps:
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
+        inverse = _inverse_mass(system, t)
         v, done, error = np.zeros_like(x), 0, np.inf
         while True:
             f, out = system.forces(t, x)

@@ -8,13 +8,14 @@ import time
 
 import numpy as np
 
-from . import __version__, statics
+from . import __version__
 from .errors import SolverError
 from .io import Folder, check_folder
 from .laws import LINEAR
 from .observables import Result
 from .scene import Scene, in_file
 from .solution import SOLVER, Solution, as_history
+from .spin_limit import turns
 from .state import State, floor_remark, strength_remark
 
 
@@ -112,6 +113,8 @@ class _LoadSteps:
             from . import relaxation
 
             return relaxation.solve
+        from . import statics
+
         return statics.solve
 
     def follow(self, folder, tell):
@@ -216,13 +219,11 @@ def _remarks(state, stats, utilisation):
         yield "floor", text
     if stats["smallest_pivot"] == -1:
         law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
-        yield (
-            "saddle",
-            (
-                f"the equilibrium is a saddle (a pivot of its tangent is negative): {law} push, and the web would "
-                'wrinkle or buckle out of this state; law = "tension-only" has no such states'
-            ),
-        )
+        reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
+        reason += 'law = "tension-only" has no such states'
+        if turns(state.system):
+            reason = "the web would leave this state by itself; start from a web that is deflected"
+        yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
     if stats["slack_nodes"]:
         some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
         yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"

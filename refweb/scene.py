@@ -36,8 +36,15 @@ EFFECTS = {
     "body": "refweb.effects.body:Body",
     "contact": "refweb.effects.contact:Contact",
     "link": "refweb.effects.link:Link",
+    "frame": "refweb.effects.frame:Frame",
+    "pressure": "refweb.effects.pressure:Pressure",
+    "thrust": "refweb.effects.thrust:Thrust",
+    "damping": "refweb.effects.damping:Damping",
+    "bending": "refweb.effects.bending:Bending",
+    "reel": "refweb.effects.reel:Reel",
+    "temperature": "refweb.effects.temperature:Temperature",
 }
-LISTS = ("load", "motion", "point_mass", "velocity", "body", "link")
+LISTS = ("load", "motion", "point_mass", "velocity", "body", "link", "pressure", "thrust", "reel")
 """Effects whose table may stand several times, ``[[load]]``."""
 STARTS = ("web", "equilibrium")
 """What ``start`` may be besides a result folder."""

@@ -190,7 +190,7 @@ class _Pencil:
 
     def _nearest(self, shift, size, attempt):
         """Eigenvalues next above a shift, as far as they are found, and their vectors."""
-        self.solve, unknowns = self._solver(shift), len(self.massive)
+        self._shift, self._solve, unknowns = shift, self._solver(shift), len(self.massive)
         mass = self.M[self.massive][:, self.massive]
         if unknowns <= DENSE or 3 * size >= unknowns:
             flexible, mass = np.column_stack([self._flexible(e) for e in np.eye(unknowns)]), mass.toarray()
@@ -222,7 +222,7 @@ class _Pencil:
         """Displacement of the unknowns with mass under forces on them."""
         whole = np.zeros(self.system.pattern.size)
         whole[self.massive] = force.ravel()
-        y = self.solve(whole)
+        y = self._solve(whole)
         if y is None:
             raise SolverError(f"no modes at step {self.t:g}: the stiffness is singular to rounding")
         return y[self.massive]
@@ -239,9 +239,9 @@ class _Pencil:
         rounding = 8.0 * (size * (abs(self.K) @ size)).sum(axis=0)
         rounding += 2.0 * (vectors * (system.pattern.matrix(self._strained) @ vectors)).sum(axis=0)
         there = self.x.copy()
-        there.ravel()[system.free] += self.solve(system.force(self.t, self.x).ravel()[system.free])
+        there.ravel()[system.free] += self._solver(self._shift)(system.force(self.t, self.x).ravel()[system.free])
         change = system.pattern.matrix(system.stiffness(self.t, there) - self._stiffness)
-        left = abs((vectors * (change @ vectors)).sum(axis=0))
+        left = np.linalg.norm(vectors.T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too
         return residual, residual + _EPS * rounding + left
 
     def described(self, vectors, unstable, zero):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from . import statics
 from .inputs import InputError, short
 
 
@@ -16,6 +15,8 @@ def equilibrium(system, progress=None):
     SolverError
         Where there is no equilibrium, or none is found.
     """
+    from . import statics
+
     (found,) = statics.solve(system.at_rest(), [0.0], progress)
     return found
 
@@ -35,23 +36,27 @@ def stored(system, folder):
     InputError
         Where there is no checkpoint, or it is that of another net.
     """
-    net, name = system.net, f'[solve] start = "{short(str(folder))}":'
+    path = str(folder)
+    net, name = system.net, f'[solve] start = "{path if len(path) <= 60 else "..." + path[-57:]}":'
     try:
         with np.load(folder / "checkpoint.npz") as checkpoint:
             stored = {key: checkpoint[key] for key in ("positions", "displacements", "velocities", "bodies")}
     except OSError as error:
         reason = "is no folder" if not folder.is_dir() else f"checkpoint.npz cannot be read: {error.strerror or error}"
         raise InputError(f'{name} {reason}; it must be "web", "equilibrium" or a result folder') from None
-    except (ValueError, KeyError, EOFError) as error:
-        raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes ({error})") from None
+    except Exception as error:  # whatever an archive that is spoilt leads to
+        reason = short(str(error) or type(error).__name__)
+        raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes ({reason})") from None
     positions, displacements, velocities, bodies = stored.values()
+    arrays = (positions, displacements, velocities)
+    fits = all(a.shape == positions.shape and a.shape[1:] == (3,) and a.dtype.kind == "f" for a in arrays)
+    if not fits or bodies.ndim != 1 or not all(np.isfinite(a).all() for a in arrays):
+        raise InputError(f"{name} checkpoint.npz holds numbers that are not finite, or not three for each node")
     nodes = len(positions) - len(bodies)
     if nodes != net.nodes:
         raise InputError(
             f"{name} holds {nodes} nodes, must be those of this scene, {net.nodes}: same web, order and subdivide"
         )
-    if not all(a.shape == positions.shape and np.isfinite(a).all() for a in (positions, displacements, velocities)):
-        raise InputError(f"{name} checkpoint.npz holds numbers that are not finite, or not one for each node")
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
     pairs = [(body.row, row[body.name]) for body in net.bodies if body.name in row and not body.fixed]

@@ -112,14 +112,19 @@ class State:
 
     @cached_property
     def energies(self):
-        """Energies by column of the book [J]: those of the effects that are present, and their total."""
+        """Energies by column of the book [J]: those of the effects that are present, and their total.
+
+        Work is that of dead loads, and left out where other loads act, whose work depends on the path.
+        """
         book = {}
         for family in (f for f in self.system.families if f.energy is not None):
             energy = float(self.system.energy_of(family, self.time, self.x).sum())
             book[family.book] = book.get(family.book, 0.0) + energy
         work = -book.pop("work") if "work" in book else None
         book["total_energy"] = sum(book.values())
-        return book if work is None else {**book, "work": work}
+        if work is None or any(f.book == "work" and f.energy is None for f in self.system.families):
+            return book
+        return {**book, "work": work}
 
 
 def strength_remark(utilisation):

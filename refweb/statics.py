@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import certificate
+from . import certificate, follower_loads, spin_limit
 from .errors import SolverError
 from .factor import Factor
 from .interior import InteriorPoint
@@ -68,16 +68,20 @@ class Equilibrium:
 
 
 def check_supported(system, t):
-    """Refuse a load that no support carries."""
+    """Refuse a load that no support carries, and a frame that turns too fast."""
     outer = sum(system.force_of(f, t, np.zeros((system.rows, 3))) for f in system.families if not f.internal)
     for rows, axis in system.loose:
         resultant = np.sum(outer[rows, axis]) if np.ndim(outer) else 0.0
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
+            remedy = "support one of them"
+            if spin_limit.turns(system):
+                remedy += ", or move the web so that its centre of mass is on the axis of [frame]"
             raise SolverError(
                 f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
-                f"{resultant:.4g} N at step {t:g}, with no support in that direction: support one of them"
+                f"{resultant:.4g} N at step {t:g}, with no support in that direction: {remedy}"
             )
+    spin_limit.check_speed(system, t)
 
 
 def force_scale(system, t, x, tension):
@@ -111,11 +115,13 @@ class Newton:
         self.geometric = system.assemble_lines(blocks)
         self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
         self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
-        self.factor = Factor(system.pattern)
+        self.follows = follower_loads.act(system)
+        self.factor = (follower_loads.Lu if self.follows else Factor)(system.pattern)
         number = np.full(3 * system.rows, -1)
         number[system.free] = np.arange(len(system.free))
         held = np.concatenate([[], *(number[3 * rows + axis] for rows, axis in system.loose)]).astype(int)
         self.loose = system.pattern.diagonal[held]  # places that hold what floats, whose loads balance
+        self.turns, self.drifting = spin_limit.turns(system), spin_limit.drifting(system)
         self.scale = 0.0
 
     def _matrix(self, t, x, shift, definite):
@@ -135,10 +141,16 @@ class Newton:
                 definite = True
                 continue
             p = self.factor.solve(r)
-            if p is not None and r @ p > 0.0:
+            if self._descends(r, p):
                 return p, shift
             shift = max(4.0 * shift, 1e-12 * self.axial)
         raise NotFound(f"singular tangent at step {t:g}: no shift up to {shift:.3g} N makes it definite", stats)
+
+    def _descends(self, r, p):
+        """Whether p is a step to take: one that exists, leads down, and, in a frame that turns, from no saddle."""
+        if p is None or self.follows:
+            return p is not None
+        return r @ p > 0.0 and not (self.turns and self.factor.negative_pivots() > self.drifting)
 
     def smallest_pivot(self, t, x, stats):
         """Sign of the smallest pivot of K: −1 for a saddle, 0 where K is singular to rounding, 1 for a minimum."""
@@ -146,7 +158,7 @@ class Newton:
         for shift, sign in ((-tiny, 1), (tiny, 0)):
             self.factor.update(self._matrix(t, x, shift, False))
             stats["nlu"] += 1
-            if not self.factor.negative_pivots():
+            if self.factor.negative_pivots() <= self.drifting:
                 return sign
         return -1
 
@@ -200,8 +212,12 @@ class Newton:
                     f"{node}, limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
                     stats,
                 )
-            p, shift = self._step(t, x, r, shift, bool((tension < 0.0).any()), stats)
-            x, energy, shift = self._search(t, x, p, r @ p, energy, shift, stats)
+            compressed = bool((tension < 0.0).any()) and not (self.follows or self.turns)
+            p, shift = self._step(t, x, r, shift, compressed, stats)
+            if self.follows:
+                x, shift = follower_loads.search(system, self.factor, t, x, p, shift, stats)
+            else:
+                x, energy, shift = self._search(t, x, p, r @ p, energy, shift, stats)
             force, out = system.forces(t, x)
             tension = out[0][:, 0].copy()
             stats["nsteps"] += 1
@@ -299,6 +315,7 @@ def solve(system, load_steps, progress=None):
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
     system = system.at_rest()
+    system.prepare(load_steps[0])
     newton, x = Newton(system, progress), np.zeros((system.rows, 3))
     for k, t in enumerate(load_steps):
         spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)
@@ -310,7 +327,8 @@ def solve(system, load_steps, progress=None):
                 raise
             _add(spent, error.stats)
             state = _by_interior_point(newton, t, x, spent)
-        if system.net.law.number != TENSION_ONLY:
+        convex = system.net.law.number == TENSION_ONLY and not newton.turns
+        if not (convex or newton.follows):
             state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
         _add(state.stats, spent)
         if certificate.applies(system):

@@ -14,7 +14,8 @@ MOST = 1e8
 """Largest number of steps of a history row."""
 SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
 """Columns of events: the probe, or behind the probes the sum, whose value passes a level; the side it is on, 1 above
-and −1 not; whether only passing upwards counts; whether the run ends there; time of the event, infinite before."""
+and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts; whether
+the run ends there; time of the event, infinite before."""
 
 
 @kernel()
@@ -46,10 +47,20 @@ def passes(event, value):
 
 
 @kernel()
+def set_lengths(t, lengths, reeled, reeled_lines, line_drives, line_cells, line_data, lines):
+    """Give the elements ``reeled`` their natural lengths at time t; ``lengths`` are those that the drives multiply."""
+    reeled_lines[:, LENGTH] = lengths
+    for i in range(len(line_drives)):
+        line_drives[i](t, reeled_lines, line_cells[i], line_data[i])
+    for c in range(reeled.size):
+        lines[reeled[c], LENGTH] = reeled_lines[c, LENGTH]
+
+
+@kernel()
 def advance(
     count, h, t, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
-    kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths,
-    line_drives, line_cells, line_data, by_length,
+    kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines,
+    line_drives, line_cells, line_data, reeled_cells, by_length,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
     energies, energy_outs, watch, total, events,
 ):  # fmt: skip
@@ -73,7 +84,7 @@ def advance(
         power[i] = outs[i][:, column].sum()
     pull, was = np.empty((2, lengths.size)), np.empty(lengths.size)
     if lengths.size:
-        by_length[0](t, x, first_cells, first_data, pull[0])
+        by_length[0](t, x, reeled_cells, reeled_lines, pull[0])
     for s in range(held.size):
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
@@ -91,13 +102,11 @@ def advance(
         for i in range(len(drives)):
             drives[i](now, x, v, f, drive_cells[i], drive_data[i], drive_outs[i])
         if lengths.size:
-            was[:] = first_data[:, LENGTH]
-            first_data[:, LENGTH] = lengths
-            for i in range(len(line_drives)):
-                line_drives[i](now, first_data, line_cells[i], line_data[i])
-            by_length[0](now, x, first_cells, first_data, pull[1])
+            was[:] = reeled_lines[:, LENGTH]
+            set_lengths(now, lengths, reeled, reeled_lines, line_drives, line_cells, line_data, first_data)
+            by_length[0](now, x, reeled_cells, reeled_lines, pull[1])
             for c in range(lengths.size):
-                book[motion] += 0.5 * (pull[0, c] + pull[1, c]) * (first_data[c, LENGTH] - was[c])
+                book[motion] += 0.5 * (pull[0, c] + pull[1, c]) * (reeled_lines[c, LENGTH] - was[c])
             pull[0] = pull[1]
         first(now, x, v, f, first_cells, first_data, lines)
         for i in still:
@@ -161,7 +170,7 @@ def advance(
                 else:
                     value = np.dot(watch[i - len(probes)], total)
                 if passes(event, value):
-                    event[TIME] = now
+                    event[TIME], event[SIDE] = now, h
                     ended = ended or event[STOP] > 0.0
         if ended:
             return step
@@ -202,8 +211,8 @@ def ended_by(events):
 def rows_ahead(
     ends, safety, step_size, finer, limit, state, saved, linear, mass, inverse, free, held, driven, working, powers,
     still, viscous, kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives, drive_cells,
-    drive_data, drive_outs, lengths, line_drives, line_cells, line_data, by_length,
-    probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
+    drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
+    corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
     watch, events, history,
 ):  # fmt: skip
     """Advance to each time of ``ends`` and write a row of ``history`` there.
@@ -212,6 +221,10 @@ def rows_ahead(
     done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
     x, v and f at the row before; −1 where a row takes more than `MOST` steps. Where an event ends the run, that row is
     the last, and its time that of the event.
+
+    ``corners`` are the times at which a factor of natural lengths has a corner, increasing, then ∞ for the end of a row
+    if there are such factors, then −∞ for its start. The step of a row is safe at all of them: in between a length is a
+    product of positive linear functions of time, and stiffness, which goes with its inverse, is largest at an end.
     """
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
@@ -219,7 +232,10 @@ def rows_ahead(
     total, stopped = np.zeros(len(energies) + 3), False
     for n in range(ends.size):
         interval = ends[n] - state[0]
+        if lengths.size:
+            set_lengths(state[0], lengths, reeled, reeled_lines, line_drives, line_cells, line_data, data[0])
         if interval > 0.0:
+            changing = corners.size > 2 and corners[0] < ends[n] and corners[-3] > state[0]
             back[0], back[1], back[2] = x, v, f
             speed = push = 0.0
             for r in range(linear):
@@ -231,9 +247,18 @@ def rows_ahead(
             else:
                 fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
                 reach = 2.0 * interval * fastest
-                limit_now = step_bound(
-                    reach, fastest, x, mass, free, rates, bounds, viscous, dampings, cells, data
-                )  # fmt: skip
+                limit_now = math.inf
+                for corner in corners:
+                    if changing and (state[0] < corner < ends[n] or corner == math.inf) or corner == -math.inf:
+                        if changing:
+                            now = min(max(corner, state[0]), ends[n])
+                            set_lengths(
+                                now, lengths, reeled, reeled_lines, line_drives, line_cells, line_data, data[0]
+                            )  # fmt: skip
+                        bound = step_bound(
+                            reach, fastest, x, mass, free, rates, bounds, viscous, dampings, cells, data
+                        )  # fmt: skip
+                        limit_now = min(limit_now, bound)
                 steps = interval / (safety * limit_now)
             if steps > MOST:
                 state[2] = interval / steps
@@ -242,10 +267,11 @@ def rows_ahead(
             if finer > 1.0:
                 count = int(math.ceil(finer * count))
             h = total[-1] = interval / count
+            acting = lengths if changing else lengths[:0]
             taken = advance(
                 count, h, state[0], x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
-                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths,
-                line_drives, line_cells, line_data, by_length,
+                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting, reeled, reeled_lines,
+                line_drives, line_cells, line_data, reeled_cells, by_length,
                 probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
                 energies, energy_outs, watch, total, events,
             )  # fmt: skip

@@ -39,6 +39,8 @@ class System:
         One per effect that prescribes natural lengths.
     constraints : list of refweb.effects.Constraint
         One per effect that keeps distances; no force of the system holds them.
+    length : ndarray, shape (cells,)
+        Natural length of each element as built [m], which the line drives multiply.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     """
@@ -48,7 +50,7 @@ class System:
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
         self.net, self.effects = net, effects
-        self.rows = len(net.points)
+        self.rows, self.length = len(net.points), net.natural_length.copy()
         acting = []
         for effect in effects:
             if hasattr(effect, "on"):
@@ -147,14 +149,10 @@ class System:
 
         return by_length(self.net)
 
-    @cached_property
-    def _length(self):
-        return self.net.natural_length.copy()
-
     def prepare(self, t):
         """Give the lines their natural lengths at time t, where an effect prescribes them."""
         if self.line_drives:
-            self.net.line_data[:, LENGTH] = self._length
+            self.net.line_data[:, LENGTH] = self.length
             for d in self.line_drives:
                 d.kernel(t, self.net.line_data, d.cells, d.data)
 
@@ -233,12 +231,15 @@ class System:
         """Total potential Π [J]: that of the lines and of all loads."""
         return sum(self.energy_of(f, t, x).sum() for f in self.families)
 
-    def stiffness(self, t, x, v=None, definite=False):
-        """Values of K = −∂f/∂x [N/m] in the fixed pattern; ``definite`` leaves out what is negative."""
+    def stiffness(self, t, x, v=None, definite=False, only=None):
+        """Values of K = −∂f/∂x [N/m] in the fixed pattern; ``definite`` leaves out what is negative.
+
+        ``only`` is the name of an effect, to leave out all others.
+        """
         self.prepare(t)
         v = self._rest if v is None else v
         for family, blocks in zip(self._stiff, self._blocks, strict=True):
-            if family.stiffness is None:
+            if family.stiffness is None or only not in (None, family.name):
                 blocks[:] = 0.0
             else:
                 family.stiffness(t, x, v, blocks, family.cells, family.data, definite)

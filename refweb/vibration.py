@@ -126,7 +126,7 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
     started = time.process_time(), time.perf_counter()
     system = scene.build()
     with in_file(scene.file):
-        rest = _at_rest(scene, system)
+        rest = _at_rest(system)
     if announce is not None:
         announce(scene, system)
     found = Modes(scene, web=web_of(system), versions=_versions(), columns=COLUMNS)
@@ -153,12 +153,14 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
     return found
 
 
-def _at_rest(scene, system):
+def _at_rest(system):
     """The system that vibrates; refuses what has no modes."""
     rest = system.at_rest()
-    if not rest.symmetric:
-        names = ", ".join(f"[[{family.name}]]" for family in rest.families if not family.symmetric)
-        raise InputError(f"{names} has no potential, so there are no natural modes: leave it out")
+    if rest.constraints:
+        raise InputError("[[link]]: modes take no lengths that are held exactly: make it a stiff line")
+    for family in rest.families:
+        if family.stiffness is not None and not family.symmetric:
+            raise InputError(f"{family.name} has no potential, so there are no natural modes: leave it out")
     if not len(rest.free):
         raise InputError("no node is free, so there are no modes: support fewer of them")
     return rest
@@ -236,10 +238,11 @@ def _remarks(here, state):
             "saddle and the web leaves it by itself",
         )
     if here.zero:
-        slack = f", {len(state.slack_nodes)} nodes on slack lines only" if len(state.slack_nodes) else ""
-        yield "zero", f"{here.zero} directions have no stiffness{slack}: they have no frequency and are not listed"
-    bent = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
-    if count := np.count_nonzero(bent & (abs(state.element_strain - net.slackness) <= STRAIN)):
+        yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
+    if count := len(state.slack_nodes):
+        yield "slack", f"{count} nodes hang on slack lines only, their positions are not unique"
+    kinked = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
+    if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
         yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
     for text in floor_remark(net, float(state.stress.max())):
         yield "floor", text
@@ -249,6 +252,6 @@ def _notices(system):
     """What the modes leave out."""
     still = np.zeros((system.rows, 3))
     if system.damping(0.0, still, still) is not None:
-        yield "forces that depend on velocity are left out: the frequencies are those without damping"
+        yield "forces that depend on velocity, damping or Coriolis forces, are left out"
     if free := [body.name for body in system.net.bodies if not body.fixed]:
         yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

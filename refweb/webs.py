@@ -169,6 +169,49 @@ class Web:
             found = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
 
+    def find_lines(self, selection, name="lines"):
+        """Line numbers of a selection.
+
+        Parameters
+        ----------
+        selection : int, str or list of them
+            Line numbers, groups, "rim" (the lines between two nodes of the rim) or "all".
+        name : str
+            What messages call the selection.
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            Line numbers as int64, increasing, each once.
+
+        Raises
+        ------
+        InputError
+            For a number out of range, or a name that is that of no line.
+        """
+        if isinstance(selection, (list, tuple, np.ndarray)):
+            found = [self._find_lines(f"{name}[{i}]", one) for i, one in enumerate(selection)]
+        else:
+            found = [self._find_lines(name, selection)]
+        return np.unique(np.concatenate(found)).astype(np.int64)
+
+    def _find_lines(self, name, one):
+        if not isinstance(one, str):
+            if not 0 <= node_number(name, one) < len(self.lines):
+                raise InputError(f"{name} = {one} must be 0 … {len(self.lines) - 1}")
+            return [one]
+        known = [group for group in dict.fromkeys(self.groups) if group]
+        if one in known:
+            return np.flatnonzero(np.array(self.groups) == one)
+        if one == "all":
+            return np.arange(len(self.lines))
+        if one != "rim":
+            raise InputError(f"{name} = {shown(one)} names no line, {nearest(one, ('rim', 'all', *known))}")
+        found = np.flatnonzero(np.isin(self.lines, self.rim).all(axis=1))
+        if not len(found):
+            raise InputError(f'{name} = "rim": no line of this web joins two nodes of its rim, give line numbers')
+        return found
+
     def _find_one(self, name, one):
         if not isinstance(one, str):
             if not 0 <= node_number(name, one) < len(self.points):

@@ -1,5 +1,7 @@
 """Small nets that several tests use."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from refweb import lines
@@ -32,8 +34,8 @@ def skew_cable(law="smooth"):
     return Cable(modulus=1e5, area=1e-4, density=300.0, groups=groups, **LAWS[law])
 
 
-def skew_net(law="smooth", **options):
-    return lines.build(skew_web(), skew_cable(law), **options)
+def skew_net(law="smooth", pieces=1, **options):
+    return lines.build(skew_web(), replace(skew_cable(law), subdivide=pieces), **options)
 
 
 def system(web, cable, effects=(), quasi_static=True, supported=None):

@@ -23,10 +23,14 @@ LAYERS = [
     ["stepping"],
     ["pattern", "factor"],
     ["effects"],
+    ["lengths"],
     ["effects.elasticity", "effects.gravity", "effects.load", "effects.motion", "effects.point_mass"]
-    + ["effects.velocity", "effects.body", "effects.contact"],
+    + ["effects.velocity", "effects.body", "effects.contact"]
+    + ["effects.damping", "effects.bending"]
+    + ["effects.frame", "effects.pressure", "effects.thrust"]
+    + ["effects.reel", "effects.temperature"],
     ["system"],
-    ["certificate", "interior", "spectrum"],
+    ["certificate", "interior", "spectrum", "spin_limit", "follower_loads"],
     ["statics", "central_difference"],
     ["implicit"],
     ["cvode"],

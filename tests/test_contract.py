@@ -8,6 +8,7 @@ import importlib
 import inspect
 import pkgutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import nets
 import numpy as np
@@ -38,6 +39,26 @@ EXAMPLES = {
         dict(name="wall", radius=0.4, position=(0.2, 0.9, -0.1), fixed=True),
     ],
     "Contact": [dict(stiffness=1e3), dict(stiffness=1e2, bodies=dict(wall=dict(stiffness=1e4)))],
+    "Frame": [dict(angular_velocity=(1.0, -2.0, 3.0))],
+    "Pressure": [
+        dict(lines="all", normal=(1.0, 2.0, -2.0), value=30.0),
+        dict(lines=[0, 4], normal=(0.0, 0.0, 1.0), value=20.0, factor=[(0.0, 0.0), (1.0, 2.0), (3.0, -1.0)]),
+        dict(lines="edge", normal=(0.0, 0.0, 2.0), value=-7.0, away_from=(0.5, 0.5, 0.0)),
+    ],
+    "Thrust": [
+        dict(node=4, line=5, force=-3.0),
+        dict(node=0, line=0, force=2.0, factor=[(0.0, 0.0), (1.0, 2.0), (3.0, -1.0)]),
+    ],
+    "Damping": [dict(time=0.02), dict(rate=3.0)],
+    "Bending": [dict(stiffness=2.0)],
+    "Reel": [
+        dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
+        dict(lines="all", factor=[(0.5, 1.0), (0.9, 1.1)]),
+    ],
+    "Temperature": [
+        dict(expansion=1e-4, change=[(0.0, 0.0), (1.0, -100.0)]),
+        dict(expansion=1e-4, change=30.0, groups=dict(tie=dict(change=[(0.0, 0.0), (2.0, 200.0)]))),
+    ],
 }
 ROLES = ("on", "extend", "start")
 
@@ -69,7 +90,7 @@ def example(name, i):
 
 def make(name, i, law):
     """(net, system of one effect); a contact has two bodies to touch, with ends of lines and with their middles."""
-    net = skew_net(law)
+    net = skew_net(law, pieces=3 if name == "Bending" else 1)  # no line of it continues another
     bodies = [example("Body", 0), example("Body", 1)] if name == "Contact" else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
@@ -95,7 +116,16 @@ def test_effect(name, i, law, seed):
     net, system = make(name, i, law)
     if system.drives:
         return drive(net, system)
-    (family,) = system.families
+    if system.line_drives:
+        return line_drive(name, i, law, seed)
+    assert system.families
+    for family in system.families:
+        alone = SimpleNamespace(on=lambda _, family=family: family)
+        check_family(net, System(net, [alone], np.zeros(net.points.shape, dtype=bool)), family, seed)
+
+
+def check_family(net, system, family, seed):
+    """A family alone in its system."""
     assert family.cells.dtype == np.int32 and len(family.cells) == len(family.data)
     x, v = state(net, seed)
     d = np.where(system.supported, 0.0, state(net, seed + 100)[0])
@@ -117,11 +147,25 @@ def test_effect(name, i, law, seed):
         forces = [system.force(t, x + h * d, v).ravel()[system.free] - force.ravel()[system.free] for h in steps]
         product = K @ d.ravel()[system.free]
         remainder = [np.linalg.norm(f + h * product) for h, f in zip(steps, forces, strict=True)]
-        assert abs(slope(remainder, steps) - 2) < 0.1
+        assert max(remainder) <= 1e-13 * np.abs(force).sum() or abs(slope(remainder, steps) - 2) < 0.1
         if family.energy is not None:
             assert abs(K - K.T).max() <= 1e-13 * abs(K).max()
         values = np.linalg.eigvalsh(system.pattern.matrix(system.stiffness(t, x, v, definite=True)).toarray())
         assert values[0] >= -1e-12 * values[-1]
+
+    if family.damping is not None:
+        C = system.pattern.matrix(system.damping(t, x, v))
+        forces = [system.force(t, x, v + h * d).ravel()[system.free] - force.ravel()[system.free] for h in steps]
+        product = C @ d.ravel()[system.free]
+        remainder = [np.linalg.norm(f + h * product) for h, f in zip(steps, forces, strict=True)]
+        assert max(remainder) <= 1e-13 * np.abs(force).sum() or abs(slope(remainder, steps) - 2) < 0.1
+        values = np.linalg.eigvalsh((C + C.T).toarray())
+        assert values[0] >= -1e-12 * values[-1] and (values[-1] > 0.0 or family.power is None)
+
+    if family.power is not None:
+        (out,) = system.forces(t, x, v)[1]
+        np.testing.assert_allclose(out[:, family.power].sum(), np.sum(force * v), rtol=1e-12)
+        assert family.book == "work" or out[:, family.power].max() <= 0.0
 
     if family.internal:
         position = net.points + x
@@ -146,7 +190,8 @@ def test_extension(name, i):
     np.testing.assert_array_equal(net.mass, before[1])
     np.testing.assert_array_equal(longer.points[:rows], net.points)
     assert (longer.mass[:rows] >= net.mass).all() and len(longer.mass) == len(longer.points) >= rows
-    assert longer.web is net.web and longer.cells is net.cells and longer.line_data is net.line_data
+    assert longer.web is net.web and longer.cells is net.cells
+    np.testing.assert_array_equal(longer.line_data[:, : net.line_data.shape[1]], net.line_data)
     added = getattr(effect, "mass", 0.0) or 0.0
     times = len(effect.node) if hasattr(effect, "node") else 1
     np.testing.assert_allclose(longer.mass.sum() - net.mass.sum(), times * added, rtol=1e-14)
@@ -264,6 +309,25 @@ def drive(net, system):
             system.drive(t + h, there)
             np.testing.assert_allclose(there, here + h * v, atol=1e-15)
         assert not np.delete(here, driven.cells[:, 0], axis=0).any()
+
+
+def line_drive(name, i, law, seed):
+    """Lengths are a factor times what they are otherwise, in any order of times; ∂E/∂L is the slope of energy."""
+    net, effect = skew_net(law), example(name, i)
+    own, free = net.natural_length.copy(), np.zeros((len(net.points), 3), dtype=bool)
+    system = System(net, [CLASSES["Elasticity"](), effect, CLASSES["Reel"](lines=[0], factor=[(0.0, 0.95)])], free)
+    x, steps, t = state(net, seed)[0], np.array([2e-3, 1e-3, 5e-4, 2.5e-4]), 0.7
+    alone = System(skew_net(law), [CLASSES["Elasticity"](), effect], free)
+    for time in (t, 9.0, -1.0, t):
+        lengths, others = system.lengths(time, x)[0], alone.lengths(time, x)[0]
+        assert (lengths > 0.0).all()
+        np.testing.assert_allclose(lengths, others * np.where(net.line == 0, 0.95, 1.0), rtol=1e-15)
+    driven = np.concatenate([drive.cells[:, 0] for drive in system.line_drives])
+    np.testing.assert_array_equal(np.delete(lengths, driven), np.delete(own, driven))
+    energy, (lengths, pull) = system.energy(t, x), system.lengths(t, x)
+    changes = [system.lengths(t + h, x)[0] - lengths for h in steps]
+    remainder = [abs(system.energy(t + h, x) - energy - pull @ d) for h, d in zip(steps, changes, strict=True)]
+    assert max(remainder) <= 1e-13 * energy or abs(slope(remainder, steps) - 2) < 0.1  # slack lines have no slope
 
 
 def test_load_with_a_table_and_in_load_steps():

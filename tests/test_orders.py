@@ -293,44 +293,67 @@ def slackening(s, t):
     return STRAIN * s + wave * (np.sin(speed * until) / speed + np.cos(speed * until) * (t - until))
 
 
-def knocked(net_system, end):
-    """Displacement of the rows at a time, by an explicit method of order 8; the ends move as `slackening` says."""
+def knock(s):
+    """Velocity that `slackening` starts with."""
+    return -KNOCK * np.sin(NUMBER * (s - MIDDLE))
+
+
+def snapping(s, t):
+    """Displacement of a cable that starts at rest with the strain −k(s − d), slack beyond s = d, at time t.
+
+    The taut part pulls on the slack one and takes up its slack behind a front that moves by c/2, where the strain jumps
+    from −kct/2 to kct/6: balance of momentum across it, ρ (c/2)² [ε] = [T], and one velocity for [u] = 0. Waves from it
+    fill −ct < s − d < ct/2.
+    """
+    z = s - MIDDLE
+    taken_up = -((z - t) ** 2) / 4 - (z + t) ** 2 / 36
+    return STRAIN * np.select([z < -t, z < t / 2], [-(z**2 + t**2) / 2, taken_up], -(z**2) / 2)
+
+
+def at_rest(s):
+    """Velocity that `snapping` starts with."""
+    return 0.0 * s
+
+
+def motion(net_system, exact, velocity, end):
+    """Displacement of the rows at a time, by an explicit method of order 8; the ends of the rod move as they should."""
     net, free = net_system.net, net_system.free // 3
     s, held = net.points[:, 0], np.flatnonzero(net_system.supported[:, 0])
 
     def placed(t, y):
         x = np.zeros((net_system.rows, 3))
-        x[free, 0], x[held, 0] = y, slackening(s[held], t)
+        x[free, 0], x[held, 0] = y, exact(s[held], t)
         return x
 
     def rate(t, y):
         force = net_system.force(t, placed(t, y[: len(free)]))[free, 0]
         return np.concatenate([y[len(free) :], force / net.mass[free]])
 
-    start = np.concatenate([STRAIN * s[free], -KNOCK * np.sin(NUMBER * (s[free] - MIDDLE))])
+    start = np.concatenate([exact(s[free], 0.0), velocity(s[free])])
     solution = solve_ivp(rate, (0.0, end), start, method="DOP853", rtol=1e-8, atol=1e-12)
     return placed(end, solution.y[: len(free), -1])
 
 
-def order_of_slackening(order, counts, end):
+def order_of_motion(order, counts, end, exact=slackening, velocity=knock):
+    """Order of the L2 error of the displacement at a time."""
     errors, (places, weights) = [], elements.gauss(12)
     for count in counts:
         net_system = rod(count, order)
         net = net_system.net
-        x = knocked(net_system, end)[:, 0]
-        errors.append(size(net, curve(net, x, places) - slackening(curve(net, net.points[:, 0], places), end), weights))
+        x = motion(net_system, exact, velocity, end)[:, 0]
+        errors.append(size(net, curve(net, x, places) - exact(curve(net, net.points[:, 0], places), end), weights))
     return fitted(counts, errors)
 
 
 TAUT, SLACK = 0.3, 0.6
-"""Times at which all is taut, least at s = d, where the strain is 0.29 e; and at which 1.2 of 2 m are slack."""
+"""Times at which all of the knocked cable is taut, and at which 1.2 of its 2 m are slack."""
 
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_motion_of_a_taut_cable_converges_with_the_orders_of_the_element(order):
-    """p + 1 in L2, with lumped mass, over time."""
-    assert STRAIN > KNOCK * np.sin(NUMBER * TAUT) * 1.0 - 0.0
-    assert abs(order_of_slackening(order, (10, 14, 20, 28), TAUT) - (order + 1)) < ORDER
+    """p + 1 in L2, with lumped mass, over time; the least strain, at s = d, is above a quarter of what it was."""
+    assert STRAIN - KNOCK * np.sin(NUMBER * TAUT) > STRAIN / 4
+    assert abs(order_of_motion(order, (10, 14, 20, 28), TAUT) - (order + 1)) < ORDER
 
 
 @pytest.mark.parametrize(
@@ -345,7 +368,18 @@ def test_motion_of_a_cable_that_goes_slack(order, counts, expected):
     strain alone would leave order 2. Over a factor of 2 in size the rest is up to a fifth of the error: ±0.25.
     """
     assert 1 / np.tan(NUMBER * SLACK) / np.tan(np.arccos(STRAIN / KNOCK / np.sin(NUMBER * SLACK))) > 1
-    assert abs(order_of_slackening(order, counts, SLACK) - expected) < 0.25
+    assert abs(order_of_motion(order, counts, SLACK) - expected) < 0.25
+
+
+@pytest.mark.parametrize("order, counts", [(1, (80, 160, 320)), (2, (40, 80, 160)), (3, (20, 40, 80))])
+def test_motion_of_a_slack_cable_that_is_pulled_taut(order, counts):
+    """Order 1 at best: a jump in strain inside an element, which snaps taut at once and rings behind the front.
+
+    The front takes energy out of the exact motion that the elements keep as vibration of their own length. Its phase
+    when the error is looked at is another for each size: ±0.25 for p = 1 and 2; cubic elements converge more slowly.
+    """
+    found = order_of_motion(order, counts, 0.4, snapping, at_rest)
+    assert abs(found - 1) < 0.25 if order < 3 else 0.3 < found < 1.25
 
 
 def test_quadrature_across_a_kink_is_of_second_order():

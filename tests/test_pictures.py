@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import refweb
 from refweb import drawing, pictures
 from refweb.inputs import InputError
 from refweb.views import View
@@ -146,6 +147,22 @@ def test_higher_order_elements_are_curves(tmp_path):
     meshio.Mesh(nodes, [("line3", [[0, 1, 2]])], cell_data={"tension": [[1.0]]}).write(folder / "frames/web_000000.vtu")
     path = pictures.shots.read(folder, 0).paths[0]
     assert path[:, 2] == pytest.approx(path[:, 0] * (path[:, 0] - 1), abs=1e-15)
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_curved_elements_of_a_run_are_drawn(no_opengl, tmp_path, order):
+    """A cable of four elements that hangs: curves are seen, beside their chords by 2 cm or more; undeformed, lines."""
+    cable = refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1e4, order=order, subdivide=2)
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], natural_length=1.2)
+    gravity = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
+    scene = refweb.Scene(web=web, cable=cable, effects=[gravity], supports=refweb.Supports(nodes=[0, 2]))
+    refweb.run(scene, out=tmp_path / "cable")
+    assert colours(pictures.picture(tmp_path / "cable"))[0] > 100
+    shot = pictures.shots.read(tmp_path / "cable", 0)
+    assert shot.paths.shape == shot.origin.shape == (4, 9, 3) and shot.tree
+    assert not shot.origin[:, :, 1:].any() and np.abs(np.diff(shot.origin, 2, axis=1)).max() < 1e-13
+    chord = np.linspace(shot.paths[:, 0], shot.paths[:, -1], 9, axis=1)
+    assert np.linalg.norm(shot.paths - chord, axis=2).max() > 0.02
 
 
 def test_slack_lines_are_grey_and_no_part_of_the_range(film):

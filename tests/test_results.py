@@ -8,8 +8,10 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
+from vtkmodules.vtkCommonCore import reference
 
 import refweb
+from refweb import elements
 
 STEPS = (0.5, 1.0, 2.0, 3.0)
 MODULUS, AREA, DENSITY, WEIGHT = 1e5, 1e-4, 300.0, np.array([0.3, 0.0, -2.0])
@@ -175,6 +177,73 @@ def test_frames_open(written, web, solution, read):
     np.testing.assert_array_equal(cell["tension"], solution.tension)
 
 
+def hanging(order, subdivide):
+    """A cable of two lines that hangs far down, its elements bent."""
+    return refweb.Scene(
+        web=refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0.2), elements=2, length=1.4),
+        cable=refweb.Cable(
+            law="tension-only", modulus=MODULUS, area=AREA, density=2e4, order=order, subdivide=subdivide
+        ),
+        effects=[refweb.Gravity(acceleration=(0.0, 0.0, -9.81))],
+    )
+
+
+@pytest.mark.parametrize("order, subdivide", [(1, 3), (2, 1), (2, 3), (3, 1), (3, 2)])
+def test_frames_of_curved_and_divided_lines(tmp_path, order, subdivide):
+    """Cells of the order of the elements, whose nodes VTK has evenly: its curve is the element's own, to 1e-12 of 1 m.
+
+    The undeformed points lie on the straight lines of the web; the web's own nodes come first, as they are numbered.
+    """
+    solution = refweb.run(hanging(order, subdivide), out=tmp_path / "out")
+    state, net = solution.state, solution.state.system.net
+    path = tmp_path / "out" / "frames" / "web_000000.vtu"
+    mesh, grid = meshio.read(path), pyvista.read(path)
+    (block,) = mesh.cells
+    kinds = {1: ("line", "LINE"), 2: ("line3", "QUADRATIC_EDGE"), 3: ("line4", "CUBIC_LINE")}[order]
+    assert block.type == kinds[0] and set(grid.celltypes) == {pyvista.CellType[kinds[1]]}
+    np.testing.assert_array_equal(grid.cells.reshape(-1, order + 2)[:, 1:], block.data)
+    np.testing.assert_array_equal(np.asarray(grid.points), mesh.points)
+    assert len(block.data) == 2 * subdivide and mesh.points.dtype == np.float64
+
+    places = np.linspace(0.0, 1.0, 21)
+    functions = elements.values(elements.line_element(order), places)[0]
+    sagging = 0.0
+    for number, (cell, nodes) in enumerate(zip(block.data, net.cells, strict=True)):
+        vtk = grid.GetCell(number)
+        at = vtk.GetParametricCoords()
+        first, last = at[0], at[3]
+        curve, weights = np.empty((21, 3)), np.empty(order + 1)
+        for point, place in zip(curve, places, strict=True):
+            vtk.EvaluateLocation(reference(0), (first + place * (last - first), 0, 0), point, weights)
+        own = functions @ state.position[nodes]
+        np.testing.assert_allclose(curve, own, rtol=0, atol=1e-12)
+        chord = own[0] + places[:, None] * (own[-1] - own[0])
+        sagging = max(sagging, np.linalg.norm(own - chord, axis=1).max())
+        np.testing.assert_array_equal(mesh.points[cell[:2]], state.position[nodes[:2]])
+    assert sagging > 1e-3 if order > 1 else sagging < 1e-12  # so that places along the element matter
+
+    straight = mesh.points - mesh.point_data["displacement"]
+    np.testing.assert_allclose(straight[:3], net.web.points, rtol=0, atol=4e-16)
+    even = np.array([0.0, 1.0, *np.arange(1, order) / order])
+    for number, cell in enumerate(block.data):
+        line, piece = divmod(number, subdivide)
+        start, end = net.web.points[net.web.lines[line]]
+        along = (piece + even[:, None]) / subdivide
+        np.testing.assert_allclose(straight[cell], start + along * (end - start), rtol=0, atol=1e-15)
+
+    names = {"tension", "stress", "strain", "natural_length", "slack"} | ({"line"} if subdivide > 1 else set())
+    assert set(mesh.cell_data) == names
+    if subdivide > 1:
+        np.testing.assert_array_equal(mesh.cell_data["line"][0], np.repeat([0, 1], subdivide))
+    data = {name: values[0] for name, values in mesh.cell_data.items()}
+    np.testing.assert_allclose(data["natural_length"], 0.7 / subdivide, rtol=1e-15)
+    np.testing.assert_allclose(data["tension"], AREA * data["stress"], rtol=1e-15)
+    np.testing.assert_array_equal(data["tension"].reshape(2, -1).max(axis=1), solution.tension)
+    np.testing.assert_allclose(mesh.point_data["mass"].sum(), 2e4 * AREA * 1.4, rtol=1e-13)
+    weight = 2e4 * AREA * 1.4 * 9.81
+    np.testing.assert_allclose(mesh.point_data["reaction"].sum(axis=0), [0, 0, weight], rtol=0, atol=1e-8 * weight)
+
+
 def listed(folder):
     root = ElementTree.parse(folder / "web.pvd").getroot()
     return [(float(entry.get("timestep")), entry.get("file")) for entry in root.iter("DataSet")]
@@ -199,8 +268,10 @@ def test_selected_frames(tmp_path, every, kept):
 
 def test_checkpoint(written, solution):
     with np.load(written / "checkpoint.npz") as checkpoint:
-        assert set(checkpoint) == {"time", "positions", "velocities", "supported"} and checkpoint["time"] == STEPS[-1]
+        assert set(checkpoint) == {"time", "positions", "displacements", "velocities", "supported", "bodies"}
+        assert checkpoint["time"] == STEPS[-1] and checkpoint["bodies"].tolist() == []
         np.testing.assert_array_equal(checkpoint["positions"], solution.positions)
+        np.testing.assert_array_equal(checkpoint["displacements"], solution.displacement)
         assert checkpoint["velocities"].shape == solution.positions.shape and not checkpoint["velocities"].any()
 
 

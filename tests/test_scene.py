@@ -85,6 +85,8 @@ slackness = 1e-4
 smoothing = 1e-5
 prestrain = 0.01
 strength = 2e8
+order = 2
+subdivide = 3
 [cable.groups.end]
 modulus = 8e7
 area = 2e-4
@@ -123,6 +125,7 @@ displacement = [[0.0, 0.0, 0.0, 0.0], [1.0, -0.2, 0.0, 0.0]]
 kind = "static"
 method = "newton"
 load_steps = [1, 2.5]
+mass = "consistent"
 
 [output]
 frames = 2
@@ -165,6 +168,8 @@ def test_every_table_and_key(tmp_path):
             smoothing=1e-5,
             prestrain=0.01,
             strength=2e8,
+            order=2,
+            subdivide=3,
             groups={"end": end, "middle": refweb.Group(area=1.5e-4)},
         ),
         supports=refweb.Supports(nodes=["rim", 0]),
@@ -175,7 +180,7 @@ def test_every_table_and_key(tmp_path):
             refweb.Load(node=[1, "tip"], force=(0, 0, 1), factor=[(0, 0), (1, 1)]),
             refweb.Motion(node="ends", displacement=[(0, 0, 0, 0), (1, -0.2, 0, 0)]),
         ],
-        solve=refweb.Static(load_steps=[1, 2.5]),
+        solve=refweb.Static(load_steps=[1, 2.5], mass="consistent"),
         output=refweb.Output(frames=2),
         observe=[
             refweb.Observe(name="tip height", quantity="position", node="tip", component=2, reduce="max"),
@@ -205,9 +210,11 @@ def test_defaults(tmp_path):
             "slackness": 0.0,
             "smoothing": 1e-5,
             "prestrain": 0.0,
+            "order": 1,
+            "subdivide": 1,
             "groups": {},
         },
-        "solve": {"kind": "static", "method": "newton", "load_steps": [1.0]},
+        "solve": {"kind": "static", "method": "newton", "load_steps": [1.0], "mass": "lumped"},
         "output": {"frames": 1},
         "observe": [
             {"name": "deflection", "quantity": "displacement", "reduce": "max"},
@@ -401,8 +408,8 @@ WRONG = [
     ("tite", "x", 'tite = "x": unknown table or key, did you mean "title"?'),
     ("quux", {"a": 1}, "[quux]: unknown table or key, known: schema, title, seed, web"),
     ("links", [{"nodes": [0, 1]}], "[[links]]: unknown table or key"),
-    ("cable.order", 2, "[cable] order = 2: unknown key"),
-    ("cable.subdivide", 2, "[cable] subdivide = 2: unknown key"),
+    ("cable.groups", {"end": {"order": 2}}, "[cable] groups.end order = 2: unknown key, known: modulus"),
+    ("solve.start", "equilibrium", '[solve] start = "equilibrium": unknown key, known: kind, method, load_steps, mass'),
     ("solve.duration", 0.25, "[solve] duration = 0.25: unknown key"),
     ("solve.rtol", 1e-6, "[solve] rtol = 1e-06: unknown key, known: kind, method, load_steps"),
     ("output", {"interval": 1e-3}, "[output] interval = 0.001"),
@@ -415,6 +422,7 @@ WRONG = [
     ("web", {**WINDOW, "mesh": "hexagonn"}, '[web] mesh = "hexagonn" must be one of', 'did you mean "hexagon"?'),
     ("solve.kind", "statics", '[solve] kind = "statics": unknown kind', "static"),
     ("solve.method", "newtn", '[solve] method = "newtn" must be', '"newton"'),
+    ("solve.mass", "lump", '[solve] mass = "lump" must be one of "lumped", "consistent"', 'did you mean "lumped"?'),
     ("cable.law", "Tension-Only", '[cable] law = "Tension-Only" must be one of', 'did you mean "tension-only"?'),
     ("web", None, "[web] is missing"),
     ("cable", None, "[cable] is missing"),
@@ -458,7 +466,13 @@ WRONG = [
     ("supports", {"nodes": 0, "components": []}, "[supports] components = [] must be a list with at least one of"),
     ("supports", {"components": ["x"]}, "[supports] nodes is missing"),
     ("support.0.components", ["w"], '[[support]] 1 components[0] = "w" must be one of 0, 1, 2, "x", "y", "z"'),
+    ("cable.order", 2.0, "[cable] order = 2.0 must be one of 1, 2, 3"),
+    ("cable.order", True, "[cable] order = True must be one of 1, 2, 3"),
+    ("cable.subdivide", 2.5, "[cable] subdivide = 2.5 must be a whole number"),
     # limits
+    ("cable.order", 4, "[cable] order = 4 must be one of 1, 2, 3"),
+    ("cable.subdivide", 0, "[cable] subdivide = 0 must be ≥ 1"),
+    ("cable.subdivide", 1001, "[cable] subdivide = 1001 must be ≤ 1000"),
     ("cable.area", -1e-4, "[cable] area = -0.0001 must be > 0 [m²]"),
     ("cable.density", -1, "[cable] density = -1.0 must be ≥ 0 [kg/m³]"),
     ("cable.prestrain", -1.0, "[cable] prestrain = -1.0 must be > -1 [1]"),
@@ -531,6 +545,46 @@ def refused(path, *parts):
     assert len(message) < 320
     for part in parts:
         assert part in message
+
+
+DYNAMIC = {"kind": "dynamic", "method": "central-difference", "duration": 0.1}
+# What a scene must not have with its method or start: changes of the chain, and what the one line says.
+UNFIT = {
+    "order": (
+        {"cable.order": 2, "cable.subdivide": 3},
+        ["[cable] order = 2 must be 1 with central-difference", "use subdivide = 6", 'method = "cvode"'],
+    ),
+    "mass": (
+        {"solve.mass": "consistent"},
+        ['[solve] mass = "consistent" must be "lumped" with central-difference', 'method = "cvode"'],
+    ),
+    "folder": (
+        {"solve.start": "nowhere"},
+        ['[solve] start = "', 'nowhere": is no folder; it must be "web", "equilibrium" or a result folder'],
+    ),
+    "misspelt": (
+        {"solve.start": "equilibrum"},
+        ['equilibrum": is no folder; it must be "web", "equilibrium" or a result folder'],
+    ),
+    "file": ({"solve.start": "scene.toml"}, ['scene.toml": is no folder']),
+    "no result": ({"solve.start": "."}, ["checkpoint.npz cannot be read: No such file", "a result folder"]),
+}
+
+
+@pytest.mark.parametrize("case", UNFIT)
+def test_scene_that_its_method_or_start_does_not_fit(tmp_path, monkeypatch, case):
+    changes, parts = UNFIT[case]
+    given = chain(solve=DYNAMIC)
+    for path, value in changes.items():
+        given = changed(given, path, value)
+    monkeypatch.chdir("/")
+    with pytest.raises(refweb.InputError) as error:
+        refweb.run(write(tmp_path, given), out=tmp_path / "out")
+    message = str(error.value)
+    assert message.startswith("scene.toml: ") and message.isprintable() and len(message) < 320
+    for part in parts:
+        assert part in message
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
 
 
 TEXT = tomli_w.dumps(chain())

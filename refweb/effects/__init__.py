@@ -161,8 +161,8 @@ class LineDrive:
     ----------
     cells : ndarray of int32, shape (elements, 1)
         The elements it changes.
-    data : ndarray, shape (elements, columns)
-        Numbers of each.
+    data : ndarray, shape (rows, columns)
+        Numbers of the kernel.
     kernel : kernel
         Multiplies the natural lengths at time t; what multiplies them before or after does not matter.
     times : sequence of float

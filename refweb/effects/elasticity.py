@@ -11,7 +11,6 @@ and the strain ε = (2 X'·u' + u'·u' + |X'|² − L²)/(L(l + L)), which keeps
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,26 +18,8 @@ import numpy as np
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import Table
 from ..laws import energy_density, prepared_stress, stress, tangent
-from ..lines import AXIAL_STIFFNESS, G0, LENGTH, R0, REFERENCE, SLACKNESS, SMOOTHING
+from ..lines import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
 from . import Family
-
-
-@kernel()
-def strain(x, cells, data, c, q, nodes, gradients):
-    """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
-    u0 = u1 = u2 = 0.0
-    for a in range(nodes):
-        row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]  # unsigned: no row counts from the end
-        u0 += d * x[row, 0]
-        u1 += d * x[row, 1]
-        u2 += d * x[row, 2]
-    r0, r1, r2, r = data[c, REFERENCE], data[c, REFERENCE + 1], data[c, REFERENCE + 2], data[c, REFERENCE + 3]
-    natural = data[c, LENGTH]
-    p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
-    length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-    square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)
-    inverse = 1.0 / length if length > 0.0 else 0.0
-    return p0, p1, p2, inverse, square / (natural * (length + natural))
 
 
 @functools.cache

@@ -8,25 +8,17 @@ import numpy as np
 
 from ..compiled import ENERGY, FORCE, kernel
 from ..inputs import Table, nodes, rows, vector
-from ..time_tables import flattened, interpolate
+from ..time_tables import factor, factor_at
 from . import Family, column
-
-
-@kernel()
-def factor_at(t, data, c):
-    """Factor of a load: its table's value, or without a table ``data[c, 3] + data[c, 4] t``."""
-    if data[c, 5] > 0.0:
-        return interpolate(t, data[c], 5, 2, 1)[0]
-    return data[c, 3] + data[c, 4] * t
 
 
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
     for c in range(cells.shape[0]):
-        row, factor = cells[c, 0], factor_at(t, data, c)
-        out[c, 0] = factor * (data[c, 0] * v[row, 0] + data[c, 1] * v[row, 1] + data[c, 2] * v[row, 2])
+        row, times = cells[c, 0], factor_at(t, data[c], 3)
+        out[c, 0] = times * (data[c, 0] * v[row, 0] + data[c, 1] * v[row, 1] + data[c, 2] * v[row, 2])
         for i in range(3):
-            f[row, i] += factor * data[c, i]
+            f[row, i] += times * data[c, i]
 
 
 @kernel(ENERGY)
@@ -34,7 +26,7 @@ def energy(t, x, cells, data, out):
     for c in range(cells.shape[0]):
         row = cells[c, 0]
         work = data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2]
-        out[c] = -factor_at(t, data, c) * work
+        out[c] = -factor_at(t, data[c], 3) * work
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +51,7 @@ class Load(Table):
     def on(self, net):
         """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
-        numbers = [*self.force, *((0.0, 1.0) if net.quasi_static else (1.0, 0.0))]
-        numbers += flattened(self.factor) if self.factor else [0.0]
+        numbers = [*self.force, *factor(self.factor, net.quasi_static)]
         return Family(
             name="load",
             cells=column(loaded),

@@ -1,0 +1,207 @@
+"""Bending stiffness: torsion springs between elements that continue each other.
+
+With a and b the vectors of two elements that follow each other, n = a × b and θ = atan2(|n|, a·b) the angle by which
+the line turns, a spring has the energy ½ k θ², k = B/L̄, L̄ the mean of the two natural lengths: the curvature θ/L̄ over
+the length L̄. With its moment m = k (θ/|n|) n the forces are
+
+    f_i = −m × a/|a|²,        f_k = −m × b/|b|²,        f_j = −f_i − f_k
+
+on the first, last and middle node. Where a line is folded back onto itself, θ = π, the energy is finite; the direction
+of the force is that of rounding, or of none.
+
+This is the bending of the multi-particle model, whose states of rest are straight. n is evaluated from displacements,
+so that tiny deflections keep their digits.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..inputs import InputError, Table, real
+from . import Family
+
+LARGEST = math.radians(30.0)
+"""Largest angle between elements that continue each other in the web's position."""
+ROUNDING = 1e-9
+"""Angles that differ by less are the same [rad]."""
+
+
+@kernel()
+def cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel()
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel()
+def bent(x, cells, data, c):
+    """(a, b, a × b, θ, θ/|a × b|) of spring c; the last is 0 where it has no value."""
+    i, j, k = cells[c, 0], cells[c, 1], cells[c, 2]
+    a, b = (data[c, 1], data[c, 2], data[c, 3]), (data[c, 4], data[c, 5], data[c, 6])
+    u = (x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2])
+    w = (x[k, 0] - x[j, 0], x[k, 1] - x[j, 1], x[k, 2] - x[j, 2])
+    now_a, now_b = (a[0] + u[0], a[1] + u[1], a[2] + u[2]), (b[0] + w[0], b[1] + w[1], b[2] + w[2])
+    n, o, p = cross(a, b), cross(a, w), cross(u, now_b)
+    n = (n[0] + o[0] + p[0], n[1] + o[1] + p[1], n[2] + o[2] + p[2])
+    sine, cosine = math.sqrt(dot(n, n)), dot(now_a, now_b)
+    angle = math.atan2(sine, cosine)
+    if sine > 0.0:
+        return now_a, now_b, n, angle, angle / sine
+    return now_a, now_b, n, angle, 1.0 / cosine if cosine > 0.0 else 0.0
+
+
+@kernel()
+def inverse_square(a):
+    square = dot(a, a)
+    return 1.0 / square if square > 0.0 else 0.0
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        a, b, n, _, ratio = bent(x, cells, data, c)
+        first, last = cross(n, a), cross(n, b)
+        first_scale = data[c, 0] * ratio * inverse_square(a)
+        last_scale = data[c, 0] * ratio * inverse_square(b)
+        for r in range(3):
+            first_pull, last_pull = first_scale * first[r], last_scale * last[r]
+            f[cells[c, 0], r] -= first_pull
+            f[cells[c, 1], r] += first_pull + last_pull
+            f[cells[c, 2], r] -= last_pull
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    for c in range(cells.shape[0]):
+        angle = bent(x, cells, data, c)[3]
+        out[c] = 0.5 * data[c, 0] * angle * angle
+
+
+@kernel()
+def second_derivative(angle):
+    """d²(½ θ²)/dw² of w = cos θ, (1 − θ cot θ)/sin² θ."""
+    square = angle * angle
+    if square < 1e-3:
+        return 1.0 / 3.0 + square * (2.0 / 15.0 + square * (2.0 / 63.0 + square * (4.0 / 675.0)))
+    return (1.0 - angle / math.tan(angle)) / math.sin(angle) ** 2
+
+
+@kernel(STIFFNESS)
+def stiffness(t, x, v, blocks, cells, data, definite):
+    # With α = a/|a|, β = b/|b|, w = α·β, P = I − αα, Q = I − ββ, p = ∂w/∂α = β − wα, q = ∂w/∂β = α − wβ, and F(w) the
+    # energy: |a|² E_aa = F'' pp − F' (pα + αp + w P) and |a||b| E_ab = F'' pq + F' PQ. The semidefinite part has P and
+    # −PQ in their place, the same where the line is straight. (a, b) = `from_nodes` (i, j, k).
+    from_nodes = ((-1.0, 1.0, 0.0), (0.0, -1.0, 1.0))
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        a, b, _, angle, ratio = bent(x, cells, data, c)
+        if ratio == 0.0:
+            continue
+        va, vb, w = math.sqrt(inverse_square(a)), math.sqrt(inverse_square(b)), math.cos(angle)
+        slope, curve, tilt, straight = data[c, 0], 0.0, 0.0, 1.0
+        if not definite:
+            slope *= ratio / (va * vb)
+            curve, tilt, straight = data[c, 0] * second_derivative(angle), slope, w
+        for r in range(3):
+            for s in range(3):
+                ar, br, as_, bs = va * a[r], vb * b[r], va * a[s], vb * b[s]
+                pr, qr, ps, qs = br - w * ar, ar - w * br, bs - w * as_, as_ - w * bs
+                one = 1.0 if r == s else 0.0
+                aa = va * va * (curve * pr * ps + tilt * (pr * as_ + ar * ps) + slope * straight * (one - ar * as_))
+                bb = vb * vb * (curve * qr * qs + tilt * (qr * bs + br * qs) + slope * straight * (one - br * bs))
+                ab = va * vb * (curve * pr * qs - slope * (one - br * bs - ar * qs))
+                for m in range(3):
+                    for n in range(3):
+                        am, bm, an, bn = from_nodes[0][m], from_nodes[1][m], from_nodes[0][n], from_nodes[1][n]
+                        blocks[c, 3 * m + r, 3 * n + s] += am * an * aa + bm * bn * bb + am * bn * ab
+                        blocks[c, 3 * n + s, 3 * m + r] += am * bn * ab
+
+
+@kernel(BOUND)
+def bound(reach, speed, x, mass, rates, cells, data):
+    # Of a straight line the rows of k gg, g = (1/|a|, 1/|a| + 1/|b|, 1/|b|); turning adds at most k θ/|a|² along and
+    # across a, and takes away out of the plane.
+    for c in range(cells.shape[0]):
+        a, b, _, angle, _ = bent(x, cells, data, c)
+        va, vb = math.sqrt(inverse_square(a)), math.sqrt(inverse_square(b))
+        first, last = va * (va + vb + angle * va), vb * (va + vb + angle * vb)
+        rates[cells[c, 0]] += 2.0 * data[c, 0] * first
+        rates[cells[c, 1]] += 2.0 * data[c, 0] * (first + last)
+        rates[cells[c, 2]] += 2.0 * data[c, 0] * last
+
+
+def springs(net):
+    """Springs between elements whose ends continue each other: every end and the one, or those, it turns least to.
+
+    Returns
+    -------
+    rows : ndarray of int, shape (springs, 3)
+        First, middle and last node.
+    elements : ndarray of int, shape (springs, 2)
+        The two elements.
+    """
+    node, other = net.cells.ravel(), net.cells[:, ::-1].ravel()
+    order = np.argsort(node, kind="stable")
+    node, other, element = node[order], other[order], order // 2
+    outward = net.points[other] - net.points[node]
+    apart = range(1, max(np.bincount(node).max(), 2))
+    first, second = np.hstack([np.flatnonzero(node[n:] == node[:-n]) + [[0], [n]] for n in apart])
+    a, b = -outward[first], outward[second]
+    turn = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+    least = np.full(len(node), LARGEST)
+    np.minimum.at(least, first, turn)
+    np.minimum.at(least, second, turn)
+    kept = turn <= np.maximum(least[first], least[second]) + ROUNDING
+    first, second = first[kept], second[kept]
+    rows = np.column_stack([other[first], node[first], other[second]])
+    return rows, np.column_stack([element[first], element[second]])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bending(Table):
+    """Bending stiffness of lines that continue each other at a node within 30°, and of the elements of each line.
+
+    Parameters
+    ----------
+    stiffness : float
+        B = E I [N m²]. Springs are those of the natural lengths that the web is made with.
+    """
+
+    stiffness: float = real(above=0, unit="N·m²")
+
+    def on(self, net):
+        """The family of all springs.
+
+        Two supported nodes that follow each other clamp a line in the middle between them.
+        """
+        if net.order > 1:
+            raise InputError(
+                f"stiffness = {self.stiffness:g} needs [cable] order = 1, not {net.order}: its springs stand between "
+                f"straight elements; use subdivide = {net.order * net.subdivide}, which has the same nodes"
+            )
+        rows, elements = springs(net)
+        if not len(rows):
+            raise InputError(
+                f"stiffness = {self.stiffness:g} bends nothing: no line of this web continues another within 30°; "
+                "give [cable] subdivide > 1 for lines that bend between their nodes, or leave the table out"
+            )
+        spring = self.stiffness / net.natural_length[elements].mean(axis=1)
+        vectors = net.points[rows[:, 1:]] - net.points[rows[:, :-1]]
+        return Family(
+            name="bending",
+            cells=np.ascontiguousarray(rows, dtype=np.int32),
+            data=np.column_stack([spring, vectors.reshape(-1, 6)]),
+            force=force,
+            energy=energy,
+            stiffness=stiffness,
+            bound=bound,
+            book="bending_energy",
+            internal=True,
+        )

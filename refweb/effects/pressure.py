@@ -1,0 +1,184 @@
+"""Pressure on lines in a plane, which stays at right angles to them: the load of a flow, or of gas in a flat hose.
+
+With the unit normal n of the plane, p per current length and x' = dx/dξ along an element
+
+    force on node a      ∫ N_a p x' × n dξ
+    stiffness of (a, b)  ∫ N_a dN_b/dξ dξ p [n]×
+
+exactly, for every order: the force depends on positions alone and not on natural length. On a closed loop in a plane it
+has the potential −p × area; on other lines it has none, and its work depends on the path.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import BOUND, FORCE, STIFFNESS, kernel
+from ..inputs import InputError, Table, field, node_number, numbers_list, real, rows, shown, vector
+from ..lines import REFERENCE
+from ..time_tables import factor, factor_at
+from . import Family
+
+# Columns of data: p n; dX/dξ; the largest |factor|; the factor.
+NORMAL, ALONG, MOST, FACTOR = 0, 3, 6, 7
+
+
+@functools.cache
+def kernels(nodes, shares, couples):
+    """Force, stiffness and bound kernels.
+
+    Parameters
+    ----------
+    nodes : int
+        Nodes per element.
+    shares : tuple of float
+        ∫ N_a dξ by node.
+    couples : tuple of float
+        ∫ N_a dN_b/dξ dξ, row by row.
+    """
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            times, power = factor_at(t, data[c], FACTOR), 0.0
+            n0, n1, n2 = times * data[c, 0], times * data[c, 1], times * data[c, 2]
+            for a in range(nodes):
+                row, share = cells[c, a], shares[a]
+                d0, d1, d2 = share * data[c, ALONG], share * data[c, ALONG + 1], share * data[c, ALONG + 2]
+                for b in range(nodes):
+                    other, couple = cells[c, b], couples[nodes * a + b]
+                    d0 += couple * x[other, 0]
+                    d1 += couple * x[other, 1]
+                    d2 += couple * x[other, 2]
+                p0, p1, p2 = d1 * n2 - d2 * n1, d2 * n0 - d0 * n2, d0 * n1 - d1 * n0
+                f[row, 0] += p0
+                f[row, 1] += p1
+                f[row, 2] += p2
+                power += p0 * v[row, 0] + p1 * v[row, 1] + p2 * v[row, 2]
+            out[c, 0] = power
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            times = factor_at(t, data[c], FACTOR)
+            for a in range(nodes if not definite else 0):
+                for b in range(nodes):
+                    for i in range(3):
+                        j, k = (i + 1) % 3, (i + 2) % 3
+                        push = times * couples[nodes * a + b] * data[c, NORMAL + i]
+                        blocks[c, 3 * a + j, 3 * b + k] -= push
+                        blocks[c, 3 * a + k, 3 * b + j] += push
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        for c in range(cells.shape[0]):
+            most = data[c, MOST] * math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))
+            for a in range(nodes):
+                for b in range(nodes):
+                    rates[cells[c, a]] += most * abs(couples[nodes * a + b])
+
+    return force, stiffness, bound
+
+
+def _lines(name, value):
+    if isinstance(value, str):
+        return value
+    return numbers_list(number=node_number).metadata["read"](name, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pressure(Table):
+    """A force per current length, at right angles to lines and to the normal of a plane.
+
+    It pushes to the right of a line's direction, from its first node to its second, as seen from the tip of the normal:
+    a loop that runs counterclockwise is blown up. ``away_from`` asks for the side instead. Only the part of a line in
+    the plane counts.
+
+    Parameters
+    ----------
+    lines : "all", str or list of int
+        Lines by number, those of a group, or all.
+    normal : sequence of 3 float
+        Normal of the plane, of any length.
+    value : float
+        p, force per current length [N/m].
+    away_from : sequence of 3 float, optional
+        A point [m] on the other side: every line is pushed away from it, judged in the web's position.
+    factor : sequence of (t, factor), optional
+        Multiplies p; linear in between, end values held. Without it p acts in full, or, in statics, times the load
+        step.
+    """
+
+    lines: object = field(_lines)
+    normal: tuple = vector()
+    value: float = real(unit="N/m")
+    away_from: tuple | None = vector(None, unit="m")
+    factor: tuple | None = rows(2, None, increasing=True)
+
+    def check(self):
+        if not any(self.normal):
+            raise InputError("normal = [0, 0, 0] must have a direction")
+
+    def on(self, net):
+        """The family of the elements of these lines; ``out`` is the power [W]."""
+        lines = self._found(net.web)
+        at = np.flatnonzero(np.isin(net.line, lines))
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
+        pushed = self.value * sides[net.line[at], None] * normal
+        times = factor(self.factor, net.quasi_static)
+        most = max((abs(row[1]) for row in self.factor or ()), default=1.0)
+        numbers = np.tile([most, *times], (len(at), 1))
+        force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
+        return Family(
+            name="pressure",
+            cells=np.ascontiguousarray(net.cells[at]),
+            data=np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3], numbers]),
+            force=force,
+            energy=None,
+            stiffness=stiffness,
+            bound=bound,
+            book="work",
+            observed=1,
+            power=0,
+            symmetric=False,
+            times=tuple(t for t, _ in self.factor or ()),
+        )
+
+    def _found(self, web):
+        """Numbers of the lines."""
+        count = len(web.lines)
+        if self.lines == "all":
+            return np.arange(count)
+        if isinstance(self.lines, str):
+            found = np.flatnonzero(np.array(web.groups) == self.lines)
+            if not len(found):
+                raise InputError(f'lines = {shown(self.lines)} must be "all", a group of the web or a list of numbers')
+            return found
+        for line in self.lines:
+            if line >= count:
+                raise InputError(f"lines = {line} must be 0 … {count - 1}")
+        return np.array(self.lines)
+
+    def _sides(self, web, lines, normal):
+        """Of each line 1 if it pushes away from the point by itself, −1 if not."""
+        ends = web.points[web.lines]
+        push = np.cross(ends[:, 1] - ends[:, 0], normal)
+        side = ((ends.mean(axis=1) - self.away_from) * push).sum(axis=1)
+        for line in lines[side[lines] == 0.0][:1]:
+            raise InputError(f"away_from = {list(self.away_from)} is on neither side of line {line}")
+        return np.sign(side)
+
+
+def _integrals(places):
+    """∫ N_a dξ, and ∫ N_a dN_b/dξ dξ row by row, of an element with nodes at these places in [0, 1]."""
+    power = np.arange(len(places))
+    functions = np.linalg.inv(np.vander(places, increasing=True))  # by power, then node
+    slopes = power / np.maximum(power + power[:, None], 1)
+    couples = functions.T @ slopes @ functions
+    return tuple((couples @ places).tolist()), tuple(couples.ravel().tolist())

@@ -1,0 +1,36 @@
+"""Reels: lines whose natural length is a function of time, as a winch or a closing line has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..inputs import InputError, Table, nodes, rows
+from ..lengths import scaled
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reel(Table):
+    """Lines that are reeled in or paid out; their nodes keep their mass, and the reel does work.
+
+    The factors of a line on several reels, and that of its temperature, multiply.
+
+    Parameters
+    ----------
+    lines : int, str or list
+        Lines, by number or group, "all", or "rim": those between two nodes of the rim.
+    factor : sequence of (t, factor)
+        Natural length over its own [1], > 0; linear in between, end values held. In statics t is the load step.
+    """
+
+    lines: object = nodes(what="line")
+    factor: tuple = rows(2, increasing=True)
+
+    def check(self):
+        """Refuse a natural length that is not positive."""
+        for i, (_, factor) in enumerate(self.factor):
+            if not factor > 0.0:
+                raise InputError(f"factor[{i}][1] = {factor:g} must be > 0 [1]: no line is reeled in to nothing")
+
+    def on(self, net):
+        """The drive of the natural lengths."""
+        return scaled(net, net.web.find_lines(self.lines), self.factor)

@@ -1,0 +1,142 @@
+"""Thrust along a line: a force on a node that turns with the line's tangent there.
+
+With d = ±dx/dξ at the node, into the line, and e = d/|d|
+
+    force on the node     F e
+    stiffness towards b   −F (∂d/∂x_b) (I − e⊗e)/|d|.
+
+It has no potential. A line that has no length at the node has no direction, and no thrust acts.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..compiled import BOUND, FORCE, STIFFNESS, kernel
+from ..inputs import InputError, Table, field, node_number, nodes, real, rows, shown
+from ..lines import REFERENCE
+from ..time_tables import factor, factor_at
+from . import Family
+
+SHORTER = 0.5
+"""Length, of that at a history row, down to which a line may shrink until the next within the bound of the step."""
+
+
+# Columns of data: F; d at x = 0; ∂d/∂x of each node, the first of which is the one that is pulled; behind these the
+# largest |factor| and the factor.
+ALONG, SLOPES = 1, 4
+
+
+@kernel()
+def direction(x, cells, data, c, nodes):
+    """(e, 1/|d| or 0)."""
+    d0, d1, d2 = data[c, ALONG], data[c, ALONG + 1], data[c, ALONG + 2]
+    for b in range(nodes):
+        row, slope = cells[c, b], data[c, SLOPES + b]
+        d0 += slope * x[row, 0]
+        d1 += slope * x[row, 1]
+        d2 += slope * x[row, 2]
+    length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    inverse = 1.0 / length if length > 0.0 else 0.0
+    return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
+
+
+@functools.cache
+def kernels(nodes):
+    """Force, stiffness and bound kernels of elements with so many nodes."""
+    most, times = SLOPES + nodes, SLOPES + nodes + 1
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            (e0, e1, e2), _ = direction(x, cells, data, c, nodes)
+            row, pull = cells[c, 0], data[c, 0] * factor_at(t, data[c], times)
+            f[row, 0] += pull * e0
+            f[row, 1] += pull * e1
+            f[row, 2] += pull * e2
+            out[c, 0] = pull * (e0 * v[row, 0] + e1 * v[row, 1] + e2 * v[row, 2])
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            e, inverse = direction(x, cells, data, c, nodes)
+            turn = data[c, 0] * factor_at(t, data[c], times) * inverse
+            for b in range(nodes if not definite else 0):
+                for i in range(3):
+                    for j in range(3):
+                        across = (1.0 if i == j else 0.0) - e[i] * e[j]
+                        blocks[c, i, 3 * b + j] = -turn * data[c, SLOPES + b] * across
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        for c in range(cells.shape[0]):
+            _, inverse = direction(x, cells, data, c, nodes)
+            turn = 1.4 * abs(data[c, 0]) * data[c, most] * inverse / SHORTER  # row sums of I − e⊗e are below 1.4
+            for b in range(nodes):
+                rates[cells[c, 0]] += turn * abs(data[c, SLOPES + b])
+
+    return force, stiffness, bound
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thrust(Table):
+    """A force on a node at the end of a line, along the line's current direction there.
+
+    Parameters
+    ----------
+    node : int or str
+        One node, by number or name.
+    line : int
+        A line that ends at it.
+    force : float
+        Force [N]; a positive one pulls the node into the line, towards its other end.
+    factor : sequence of (t, factor), optional
+        Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
+        times the load step.
+    """
+
+    node: object = nodes()
+    line: int = field(node_number)
+    force: float = real(unit="N")
+    factor: tuple | None = rows(2, None, increasing=True)
+
+    def on(self, net):
+        """The family of one element; ``out`` is the power [W]."""
+        found, count = net.web.find(self.node), len(net.web.lines)
+        if len(found) != 1:
+            raise InputError(f"node = {shown(self.node)} is {len(found)} nodes, must be one")
+        if self.line >= count:
+            raise InputError(f"line = {self.line} must be 0 … {count - 1}")
+        ends = net.web.lines[self.line]
+        if found[0] not in ends:
+            raise InputError(f"node = {shown(self.node)} is no end of line {self.line}, {ends[0]} or {ends[1]}")
+        second = int(found[0] == ends[1])
+        cell = np.flatnonzero(net.line == self.line)[-second]
+        place, sign = float(second), 1.0 - 2.0 * second
+        order = np.argsort(abs(net.places - place))
+        power = np.arange(len(order))
+        functions = np.linalg.inv(np.vander(net.places, increasing=True))
+        slopes = sign * (power[1:] * place ** (power[1:] - 1)) @ functions[1:]
+        reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
+        most = max((abs(row[1]) for row in self.factor or ()), default=1.0)
+        numbers = [self.force, *reference, *slopes[order], most, *factor(self.factor, net.quasi_static)]
+        force, stiffness, bound = kernels(len(order))
+        return Family(
+            name="thrust",
+            cells=np.ascontiguousarray(net.cells[[cell]][:, order]),
+            data=np.array([numbers]),
+            force=force,
+            energy=None,
+            stiffness=stiffness,
+            bound=bound,
+            book="work",
+            observed=1,
+            power=0,
+            symmetric=False,
+            times=tuple(t for t, _ in self.factor or ()),
+        )

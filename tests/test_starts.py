@@ -1,0 +1,348 @@
+"""Where dynamics starts from: the web, its equilibrium, or the last state of another run."""
+
+import json
+
+import numpy as np
+import pytest
+import tomli_w
+
+import refweb
+from refweb.__main__ import main
+
+GRAVITY = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
+PULL = (0.3, 0.0, -2.0)
+CALM = refweb.Gravity(acceleration=(0.0, 0.0, 0.0))
+PULLED = (GRAVITY, refweb.Load(node="centre", force=PULL))
+NEAR = 1e-9
+"""Of a deflection: Newton's method ends at a residual of 1e-10 of the load or below, which moves a taut web by as much
+or, where it stiffens, less; a motion that the residual starts swings to twice that."""
+
+
+def cable(**changes):
+    given = dict(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
+    return refweb.Cable(**{**given, **changes})
+
+
+def scene(start="web", effects=(), duration=0.02, solve=None, **changes):
+    """A small square web that is pulled down at its centre."""
+    given = dict(
+        title="Started",
+        web=refweb.Window(mesh="square", rows=4, columns=4, side=0.2),
+        cable=cable(),
+        effects=effects or PULLED,
+        solve=solve or refweb.Dynamic(duration=duration, start=str(start)),
+        accuracy=None if solve else refweb.Accuracy(error="none"),
+        output=refweb.Output() if solve else refweb.Output(interval=1e-3, frames=1),
+    )
+    return refweb.Scene(**{**given, **changes})
+
+
+def static(effects, t=1.0, **changes):
+    """Displacement of the web's nodes in the equilibrium of a static scene at a load step."""
+    return refweb.run(scene(effects=effects, solve=refweb.Static(load_steps=[t]), **changes)).displacement
+
+
+def first(solution):
+    """(displacement, velocity) of the nodes in the first frame."""
+    state = solution.frames[0][1]
+    assert state.time == 0.0
+    return state.x[: state.system.net.nodes], state.v[: state.system.net.nodes]
+
+
+def ball(**changes):
+    given = dict(name="ball", radius=0.1, mass=1.0, position=(0.03, 0.02, -0.115), velocity=(0.0, 0.0, 2.0))
+    return refweb.Body(**{**given, **changes})
+
+
+CONTACT = refweb.Contact(stiffness=1e5)
+
+
+# Equilibrium
+
+
+@pytest.mark.parametrize("subdivide", [1, 2])
+def test_equilibrium_stays_where_it_is(subdivide):
+    """It is a fixed point of the integrator for some hundred steps, in which a start from the web swings about it."""
+    divided = cable(subdivide=subdivide)
+    still, moving = (refweb.run(scene(start, cable=divided)) for start in ("equilibrium", "web"))
+    x, v = first(still)
+    assert not v.any() and still.warnings == [] and still.solver["nsteps"] > 100
+    deflection, speed = np.abs(x).max(), np.abs(moving.frames[-1][1].v).max()
+    for _, state in still.frames:
+        np.testing.assert_allclose(state.x, x, rtol=0, atol=NEAR * deflection)
+        np.testing.assert_allclose(state.v, 0.0, rtol=0, atol=NEAR * speed)
+    assert max(np.abs(state.x - x).max() for _, state in moving.frames) > 0.5 * deflection
+    np.testing.assert_allclose(x, static(still.scene.effects, cable=divided), rtol=0, atol=NEAR * deflection)
+    np.testing.assert_allclose(still.history["total_energy"], still.history["total_energy"][0], rtol=NEAR)
+    assert np.abs(still.history["work"]).max() <= NEAR * np.abs(still.history["strain_energy"]).max()
+
+
+def test_equilibrium_is_that_of_the_loads_at_the_start():
+    """A table's value at t = 0, and in full where there is none; what the table says later moves the web."""
+    table = refweb.Load(node="centre", force=PULL, factor=[(-1.0, 0.0), (0.0, 0.4), (0.01, 3.0)])
+    full = refweb.Load(node=3, force=(0.0, 0.5, 0.5))
+    solution = refweb.run(scene("equilibrium", effects=(GRAVITY, table, full)))
+    share = refweb.Load(node="centre", force=0.4 * np.array(PULL))
+    expected = static((GRAVITY, share, full))
+    np.testing.assert_allclose(first(solution)[0], expected, rtol=0, atol=NEAR * np.abs(expected).max())
+    assert np.abs(solution.displacement - expected).max() > 0.05 * np.abs(expected).max()
+
+
+def test_equilibrium_has_the_motion_of_the_start():
+    """Nodes that are elsewhere at t = 0 pull the web with them, and it does not start with a jump."""
+    rise = refweb.Motion(node=[0, 1], displacement=[(0.0, 0.0, 0.01, 0.05), (1.0, 0.0, 0.01, 0.05)])
+    load = refweb.Load(node="centre", force=PULL, factor=[(0.0, 1.0)])
+    solution = refweb.run(scene("equilibrium", effects=(GRAVITY, load, rise)))
+    expected = static((GRAVITY, load, rise), t=0.0)
+    np.testing.assert_array_equal(expected[[0, 1]], 2 * [[0.0, 0.01, 0.05]])
+    deflection = np.abs(expected).max()
+    np.testing.assert_allclose(first(solution)[0], expected, rtol=0, atol=NEAR * deflection)
+    np.testing.assert_allclose(solution.displacement, expected, rtol=0, atol=NEAR * deflection)
+    assert solution.warnings == []
+    assert any("has moved node 0 at t = 0" in text for text in refweb.run(scene(effects=(rise,))).warnings)
+
+
+def test_free_bodies_wait_and_fixed_ones_act():
+    """A free ball in the web's way is where its table says and moves as it says; the web does not feel it before."""
+    plain, wall = PULLED, ball(fixed=True, mass=None, velocity=(0, 0, 0))
+    expected = static(plain)
+    solution = refweb.run(scene("equilibrium", effects=(*plain, ball(), CONTACT), duration=5e-3))
+    np.testing.assert_allclose(first(solution)[0], expected, rtol=0, atol=NEAR * np.abs(expected).max())
+    state = solution.frames[0][1]
+    np.testing.assert_array_equal(state.position[-1], [0.03, 0.02, -0.115])
+    np.testing.assert_array_equal(state.v[-1], [0.0, 0.0, 2.0])
+    assert solution.frames[-1][1].v[-1, 2] < 1.9  # gravity takes 0.05 m/s from it, the web more
+    assert any("overlaps the web at the start" in text for text in solution.warnings)
+    held = refweb.run(scene("equilibrium", effects=(*plain, wall, CONTACT), duration=5e-3))
+    lifted = static((*plain, wall, CONTACT))
+    assert np.abs(lifted - expected).max() > 0.1 * np.abs(expected).max()
+    # Contact is stiff and its tangent is not that of a taut web alone; the residual is the same.
+    np.testing.assert_allclose(first(held)[0], lifted, rtol=0, atol=10 * NEAR * np.abs(lifted).max())
+    np.testing.assert_allclose(held.displacement, lifted, rtol=0, atol=10 * NEAR * np.abs(lifted).max())
+
+
+def test_velocities_apply_in_the_equilibrium():
+    kick = refweb.Velocity(node="centre", value=(0.0, 0.1, 1.0))
+    solution = refweb.run(scene("equilibrium", effects=(GRAVITY, kick), duration=5e-3))
+    x, v = first(solution)
+    centre = solution.state.system.net.web.centre
+    np.testing.assert_array_equal(v[centre], [0.0, 0.1, 1.0])
+    assert not np.delete(v, centre, axis=0).any()
+    np.testing.assert_allclose(x, static((GRAVITY,)), rtol=0, atol=NEAR * np.abs(x).max())
+
+
+def test_no_equilibrium_to_start_from(tmp_path, capsys):
+    """A web that nothing holds falls: the run fails, says why, and is marked."""
+    free = scene("equilibrium", effects=(GRAVITY,), supports=refweb.Supports(nodes=[]))
+    with pytest.raises(refweb.SolverError, match="no equilibrium: .* carried off along z by"):
+        refweb.run(free, out=tmp_path / "out")
+    (tmp_path / "free.toml").write_text(tomli_w.dumps(free.to_dict()), encoding="utf-8")
+    assert main(["run", str(tmp_path / "free.toml"), "--out", str(tmp_path / "other")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
+    for name in ("out", "other"):
+        run = json.loads((tmp_path / name / "run.json").read_text(encoding="utf-8"))
+        assert run["status"] == "failed" and "carried off along z" in run["message"]
+        assert not list((tmp_path / name / "frames").iterdir())
+
+
+def test_saddle_to_start_from_is_named():
+    """A straight chain of compressed bars is in equilibrium, and would buckle."""
+    chain = refweb.Inline(points=[[i, 0, 0] for i in range(4)], lines=[[0, 1], [1, 2], [2, 3]], supports=[0, 3])
+    bars = cable(law="linear", prestrain=-0.1)
+    solution = refweb.run(scene("equilibrium", web=chain, cable=bars, effects=(CALM,), duration=1e-3))
+    assert any("saddle" in text and "starts from" in text for text in solution.warnings)
+
+
+# The last state of another run
+
+H, END = 5e-5, 0.01
+"""A step that all of these scenes have, below the bound of each; a time at which the ball is in the web [s]."""
+
+
+def hit(start="web", duration=END, bodies=None, **changes):
+    """The web, pulled and hit by a ball; nothing depends on time."""
+    bodies = (ball(),) if bodies is None else bodies
+    solve = refweb.Dynamic(duration=duration, start=str(start), step_size=H)
+    effects = (GRAVITY, refweb.Load(node="centre", force=PULL), *bodies, refweb.Contact(stiffness=1e3))
+    return scene(
+        effects=effects,
+        solve=solve,
+        accuracy=refweb.Accuracy(error="none"),
+        output=refweb.Output(interval=1e-3, frames=5),
+        **changes,
+    )
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    """(folder, solution) of a run in which the ball is in the web at the end."""
+    folder = tmp_path_factory.mktemp("starts") / "first"
+    return folder, refweb.run(hit(), out=folder)
+
+
+def files(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_run_goes_on_where_another_ended(ended, tmp_path):
+    """The state is the same to the last bit; from there on only the rounding of times, and so of steps, differs.
+
+    Contact is soft enough for 400 steps to amplify that by less than 1e4.
+    """
+    folder, before = ended
+    went_on = refweb.run(hit(folder))
+    state = went_on.frames[0][1]
+    for name in ("x", "v"):
+        np.testing.assert_array_equal(getattr(state, name), getattr(before.state, name))
+    assert state.time == 0.0 and before.state.time == END and before.history["contact_energy"][-1] > 0.0
+    for axis in "xyz":
+        assert went_on.history[f"momentum_{axis}"][0] == before.history[f"momentum_{axis}"][-1]
+        assert went_on.history[f"support_impulse_{axis}"][0] == 0.0
+    whole = refweb.run(hit(duration=2 * END))
+    assert whole.solver["nsteps"] == before.solver["nsteps"] + went_on.solver["nsteps"]
+    for name in ("x", "v"):
+        expected = getattr(whole.state, name)
+        np.testing.assert_allclose(getattr(went_on.state, name), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+    rows = len(went_on.history["time"])
+    np.testing.assert_allclose(went_on.history["time"] + END, whole.history["time"][-rows:], rtol=1e-14)
+    for name in ("kinetic_energy", "strain_energy", "contact_energy"):
+        scale = np.abs(whole.history[name]).max()
+        np.testing.assert_allclose(went_on.history[name], whole.history[name][-rows:], rtol=0, atol=1e-11 * scale)
+    assert went_on.solver["energy_drift"] < 1e-2 and went_on.history["work"][0] == 0.0
+
+
+def test_a_folder_can_start_from_itself(ended, tmp_path):
+    """With --force: its checkpoint is read before anything is removed; a relative path is one from the scene's file."""
+    folder, before = ended
+    refweb.run(hit(), out=tmp_path / "run")
+    given = hit("run").to_dict()
+    given["solve"]["start"] = "run"
+    (tmp_path / "again.toml").write_text(tomli_w.dumps(given), encoding="utf-8")
+    scene_file = str(tmp_path / "again.toml")
+    assert main(["run", scene_file, "--out", str(tmp_path / "run")]) == 2  # not empty
+    assert files(tmp_path / "run").keys() == files(folder).keys()
+    assert main(["run", scene_file, "--out", str(tmp_path / "run"), "--force"]) == 0
+    went_on = refweb.run(hit(folder))
+    with np.load(tmp_path / "run" / "checkpoint.npz") as checkpoint:
+        np.testing.assert_array_equal(checkpoint["displacements"], went_on.state.x)
+        np.testing.assert_array_equal(checkpoint["velocities"], went_on.state.v)
+    assert refweb.Scene.load(tmp_path / "run" / "scene.toml").solve.start == str(tmp_path / "run")
+    assert not np.array_equal(went_on.state.x, before.state.x)
+
+
+def test_the_last_state_of_statics_is_a_start_as_well(tmp_path):
+    found = refweb.run(scene(solve=refweb.Static()), out=tmp_path / "static")
+    solution = refweb.run(scene(tmp_path / "static"))
+    np.testing.assert_array_equal(first(solution)[0], found.displacement)
+    deflection = np.abs(found.displacement).max()
+    np.testing.assert_allclose(solution.displacement, found.displacement, rtol=0, atol=NEAR * deflection)
+
+
+def test_bodies_are_matched_by_name(ended, tmp_path):
+    """Wherever they stand in the scene; those that the folder does not have, and fixed ones, are as in their tables."""
+    far = ball(name="far", position=(0.0, 0.0, 3.0), velocity=(0.0, 0.5, 0.0))
+    other = ball(name="other", position=(0.0, 0.0, -2.0), velocity=(1.0, 0.0, 0.0))
+    folder = tmp_path / "two"
+    before = refweb.run(hit(bodies=(far, ball())), out=folder)
+    row = {body.name: body.row for body in before.state.system.net.bodies}
+    moved = ball(position=(0.5, 0.5, 0.5), velocity=(9.0, 9.0, 9.0))
+    state = refweb.run(hit(folder, duration=1e-3, bodies=(moved, other, far))).frames[0][1]
+    here = {body.name: body.row for body in state.system.net.bodies}
+    nodes = state.system.net.nodes
+    np.testing.assert_array_equal(state.x[:nodes], before.state.x[:nodes])
+    for name in ("ball", "far"):
+        # The table's position differs, and with it the displacement: one rounding of a position of 3 m.
+        np.testing.assert_allclose(state.position[here[name]], before.state.position[row[name]], rtol=0, atol=5e-16)
+        np.testing.assert_array_equal(state.v[here[name]], before.state.v[row[name]])
+    np.testing.assert_array_equal(state.position[here["other"]], [0.0, 0.0, -2.0])
+    np.testing.assert_array_equal(state.v[here["other"]], [1.0, 0.0, 0.0])
+    fixed = ball(name="far", fixed=True, mass=None, position=(0.0, 0.0, 5.0), velocity=(0.0, 0.0, 0.0))
+    state = refweb.run(hit(folder, duration=1e-3, bodies=(fixed,))).frames[0][1]
+    np.testing.assert_array_equal(state.position[-1], [0.0, 0.0, 5.0])
+    assert not state.v[-1].any()
+
+
+def test_a_velocity_of_the_scene_comes_instead(ended):
+    """Of its nodes; the others go on as they did."""
+    folder, before = ended
+    kick = refweb.Velocity(node="centre", value=(0.0, 0.0, 7.0))
+    centre, changed = before.state.system.net.web.centre, hit(folder, duration=1e-3)
+    state = refweb.run(changed.replace(effects=(*changed.effects, kick))).frames[0][1]
+    expected = before.state.v.copy()
+    expected[centre] = [0.0, 0.0, 7.0]
+    np.testing.assert_array_equal(state.v, expected)
+    np.testing.assert_array_equal(state.x, before.state.x)
+
+
+def rewritten(**changes):
+    """What writes a checkpoint with some arrays changed, or left out where they are None."""
+
+    def write(path):
+        with np.load(path) as checkpoint:
+            arrays = {key: checkpoint[key] for key in checkpoint}
+        for key, change in changes.items():
+            arrays[key] = None if change is None else change(arrays[key])
+        np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
+
+    return write
+
+
+def flipped(path):
+    """One bit of the stored numbers is wrong; the archive has a checksum of them."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def not_a_number(array):
+    array[3, 1] = np.nan
+    return array
+
+
+SPOILT = {
+    "gone": (lambda path: path.unlink(), "checkpoint.npz cannot be read: No such file"),
+    "a folder": (lambda path: (path.unlink(), path.mkdir()), "checkpoint.npz cannot be read: Is a directory"),
+    "empty": (lambda path: path.write_bytes(b""), "checkpoint.npz is not what a run of refweb writes"),
+    "cut short": (lambda path: path.write_bytes(path.read_bytes()[:-30]), "is not what a run of refweb writes"),
+    "half": (lambda path: path.write_bytes(path.read_bytes()[:700]), "is not what a run of refweb writes"),
+    "a bit": (flipped, "is not what a run of refweb writes"),
+    "text": (lambda path: path.write_text("positions = 3"), "is not what a run of refweb writes"),
+    "an array": (lambda path: np.save(path.open("wb"), np.zeros((3, 3))), "is not what a run of refweb writes"),
+    "without velocities": (rewritten(velocities=None), "is not what a run of refweb writes"),
+    "without bodies": (rewritten(bodies=lambda names: names[:0]), "holds 22 nodes, must be those of this scene, 21"),
+    "too few": (rewritten(velocities=lambda v: v[:-1]), "not three for each node"),
+    "flat": (rewritten(positions=lambda x: x[:, :2]), "not three for each node"),
+    "one number": (rewritten(positions=lambda x: np.float64(3.0)), "not three for each node"),
+    "texts": (rewritten(velocities=lambda v: v.astype(str)), "not three for each node"),
+    "not finite": (rewritten(velocities=not_a_number), "holds numbers that are not finite"),
+}
+
+
+@pytest.mark.parametrize("case", SPOILT)
+def test_spoilt_checkpoints_are_refused(ended, tmp_path, capsys, case):
+    spoil, message = SPOILT[case]
+    folder = tmp_path / "first"
+    folder.mkdir()
+    (folder / "checkpoint.npz").write_bytes((ended[0] / "checkpoint.npz").read_bytes())
+    spoil(folder / "checkpoint.npz")
+    (tmp_path / "next.toml").write_text(tomli_w.dumps(hit(folder).to_dict()), encoding="utf-8")
+    for command in (["run", "--out", str(tmp_path / "out")], ["check"]):
+        assert main([command[0], str(tmp_path / "next.toml"), *command[1:]]) == 2
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1 and "[solve] start = " in err and message in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["first", "next.toml"]
+
+
+@pytest.mark.parametrize(
+    "changes, nodes",
+    [
+        (dict(cable=cable(subdivide=2)), 45),
+        (dict(web=refweb.Window(mesh="square", rows=5, columns=4, side=0.2)), 26),
+    ],
+)
+def test_another_net_is_refused(ended, tmp_path, changes, nodes):
+    folder, _ = ended
+    with pytest.raises(refweb.InputError, match="same web, order and subdivide") as error:
+        refweb.run(hit(folder, **changes), out=tmp_path / "out")
+    assert f"holds 21 nodes, must be those of this scene, {nodes}" in str(error.value)
+    assert not (tmp_path / "out").exists()
