@@ -65,6 +65,11 @@ class RigidBody:
         return self.radius + float(np.linalg.norm(self.core))
 
 
+def row_names(bodies):
+    """Names of the rows behind those of the nodes: of bodies, and of their rotations, with a dot."""
+    return [body.name for body in bodies] + [f"{body.name}.spin" for body in bodies if body.spin is not None]
+
+
 def surface(body, centre):
     """Surface of a body as points (n, 3) [m] and triangles (t, 3), outward: a ring is a thin tube."""
     if body.kind == RING:

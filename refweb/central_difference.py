@@ -149,6 +149,8 @@ class CentralDifference:
                 '[solve] mass = "consistent" must be "lumped" with central-difference: an explicit step divides each '
                 'force by one mass, and a matrix would have to be solved; use method = "cvode"'
             )
+        if system.constraints:
+            raise InputError('[[link]] needs method = "ida": central-difference does not hold lengths')
         bare = np.flatnonzero((net.mass <= 0.0) & free.any(axis=1))
         if len(bare):
             raise InputError(
@@ -333,7 +335,7 @@ class CentralDifference:
                 if change.max(initial=-np.inf) > most:
                     most, of, cell = change.max(), family, int(change.argmax())
         if of.cells.shape[1] > 1:
-            place = f"line {system.net.line[cell % len(system.net.line)]}"
+            place = f"line {system.net.line[np.isin(system.net.cells, of.cells[cell]).sum(axis=1).argmax()]}"
         else:
             place = self.system.row_name(of.cells[cell, 0])
         smaller = f"step_size than {self.step_size:g}" if self.step_size else f"safety than {self.safety:g}"

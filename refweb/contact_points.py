@@ -23,17 +23,17 @@ from .shapes import SPHERE, depth
 
 RADIUS, PENALTY, AWAY = 0, 1, 2
 """Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
-GROWTH, CORE, AXES, LOSS, FRICTION, SLIP = 0, 1, 4, 13, 14, 15
-"""Columns behind the vectors: radius of growth and half sizes of the core [m], rows of the axes, damping [s/m],
-coefficient of friction and the slip velocity of its regularisation [m/s]."""
+KIND, POWER, GROWTH, CORE, AXES, LOSS, FRICTION, SLIP = 0, 1, 2, 3, 6, 15, 16, 17
+"""Columns behind the vectors: kind of the shape, exponent p, radius of growth and half sizes of the core [m], rows of
+the axes, damping [s/m], coefficient of friction and the slip velocity of its regularisation [m/s]."""
 SAMPLES = 8
 """Places on a curved element from which Newton's method may start to its nearest point."""
 PLACES = 3
 """Largest number of contacts of an element."""
 
 
-def numbers(body, cells, points, stiffness, damping=0.0, friction=0.0, slip=1.0):
-    """Data of general contact of elements with a body, shape (cells, columns).
+def numbers(body, cells, points, stiffness, exponent, damping, friction, slip_velocity):
+    """Data of the contact of elements with a body, shape (cells, columns).
 
     Parameters
     ----------
@@ -43,13 +43,13 @@ def numbers(body, cells, points, stiffness, damping=0.0, friction=0.0, slip=1.0)
         Rows along each element.
     points : ndarray, shape (rows, 3)
         Reference positions [m].
-    stiffness, damping, friction, slip : float
-        See `refweb.effects.contact.Contact`.
+    stiffness, exponent, damping, friction, slip_velocity : float
+        Of the penalty [N/m^p], [1], and of `refweb.rubbing`, [s/m], [1], [m/s].
     """
     away = (points[cells] - points[body.row]).reshape(len(cells), -1)
-    axes = np.ravel(body.axes)
-    tail = [body.radius, *body.core, *axes, damping, friction, slip]
-    return np.column_stack([np.tile([body.extent, stiffness], (len(cells), 1)), away, np.tile(tail, (len(cells), 1))])
+    tail = [body.kind, exponent, body.radius, *body.core, *np.ravel(body.axes), damping, friction, slip_velocity]
+    head, tail = (np.tile(part, (len(cells), 1)) for part in ([body.extent, stiffness], tail))
+    return np.column_stack([head, away, tail])
 
 
 @kernel()
@@ -178,12 +178,13 @@ def from_axes(data, c, nodes, q):
 
 
 @kernel()
-def within(kind, x, cells, data, c, nodes, functions, place):
+def within(x, cells, data, c, nodes, functions, place):
     """p, p', p'' along the body's axes at a place of cell c, then depth, its gradient and its Hessian."""
     p, d, e = point(x, cells, data, c, nodes, functions, place)
     p, d, e = along_axes(data, c, nodes, p), along_axes(data, c, nodes, d), along_axes(data, c, nodes, e)
-    at = AWAY + 3 * nodes + GROWTH
-    deep, g, bend = depth(kind, p[0], p[1], p[2], data[c, at], data[c, at + 1], data[c, at + 2], data[c, at + 3])
+    at = AWAY + 3 * nodes
+    core = data[c, at + CORE], data[c, at + CORE + 1], data[c, at + CORE + 2]
+    deep, g, bend = depth(int(data[c, at + KIND]), p[0], p[1], p[2], data[c, at + GROWTH], core[0], core[1], core[2])
     return p, d, e, deep, g, bend
 
 
@@ -198,51 +199,52 @@ def bent(bend, p):
 
 
 @kernel()
-def window(kind, place, inner):
-    """(W, W', W'') of a contact; 1 where it does not fade."""
-    if kind == SPHERE or not inner:
+def window(data, c, nodes, place, inner):
+    """(W, W', W'') of a contact; 1 at an end, and of a sphere."""
+    if not inner or data[c, AWAY + 3 * nodes + KIND] == SPHERE:
         return 1.0, 0.0, 0.0
     return 4.0 * place * (1.0 - place), 4.0 - 8.0 * place, -8.0
 
 
 @kernel()
-def rise(kind, power, place, d, e, radius, deep, g, bend):
+def rise(data, c, nodes, place, d, e, deep, g, bend):
     """What vanishes at the deepest place of an element, positive before it, and its slope.
 
     W' δ + (p + 1) W δ', or where nothing is touched δ'; of a sphere the rate of −½ |w|², which is linear.
     """
-    slope, curve = dot(g, d), dot(d, bent(bend, d)) + dot(g, e)
-    if kind == SPHERE:
-        return (radius - deep) * slope, (radius - deep) * curve - slope * slope
+    at, slope, curve = AWAY + 3 * nodes, dot(g, d), dot(d, bent(bend, d)) + dot(g, e)
+    if data[c, at + KIND] == SPHERE:
+        away = data[c, at + GROWTH] - deep
+        return away * slope, away * curve - slope * slope
     if deep <= 0.0:
         return slope, curve
-    w, w1, w2 = window(kind, place, True)
+    power, (w, w1, w2) = data[c, at + POWER], window(data, c, nodes, place, True)
     return w1 * deep + (power + 1.0) * w * slope, w2 * deep + (power + 2.0) * w1 * slope + (power + 1.0) * w * curve
 
 
 @kernel()
-def deepest(kind, power, x, cells, data, c, nodes, functions):
+def deepest(x, cells, data, c, nodes, functions):
     """(place within cell c, depth there) of the contact between its ends; of a sphere, that with the whole of it."""
-    low, high, place, radius = 0.0, 1.0, 0.5, data[c, AWAY + 3 * nodes + GROWTH]
+    low, high, place, at = 0.0, 1.0, 0.5, AWAY + 3 * nodes
     if nodes > 2:
         most = -math.inf
         for n in range(SAMPLES + 1):
-            deep = within(kind, x, cells, data, c, nodes, functions, n / SAMPLES)[3]
-            felt = deep * window(kind, n / SAMPLES, True)[0] ** (1.0 / (power + 1.0)) if deep > 0.0 else deep
-            if felt > most:
+            deep = within(x, cells, data, c, nodes, functions, n / SAMPLES)[3]
+            faded = window(data, c, nodes, n / SAMPLES, True)[0] ** (1.0 / (data[c, at + POWER] + 1.0))
+            if (felt := faded * deep if deep > 0.0 else deep) > most:
                 most, place = felt, n / SAMPLES
         low, high = max(place - 1.0 / SAMPLES, 0.0), min(place + 1.0 / SAMPLES, 1.0)
-    if kind == SPHERE:
+    if data[c, at + KIND] == SPHERE:
         for end in (low, high):
-            _, d, _, deep, g, _ = within(kind, x, cells, data, c, nodes, functions, end)
+            _, d, _, deep, g, _ = within(x, cells, data, c, nodes, functions, end)
             if (end == 0.0 and dot(g, d) <= 0.0) or (end == 1.0 and dot(g, d) >= 0.0):
                 return end, deep
     for _ in range(100):  # Newton's method, by bisection where it leaves the bracket
-        _, d, e, deep, g, bend = within(kind, x, cells, data, c, nodes, functions, place)
+        _, d, e, deep, g, bend = within(x, cells, data, c, nodes, functions, place)
         slope = dot(g, d)
         if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
             return place, deep  # concave: nowhere deep enough
-        value, curve = rise(kind, power, place, d, e, radius, deep, g, bend)
+        value, curve = rise(data, c, nodes, place, d, e, deep, g, bend)
         if value > 0.0:
             low = place
         else:
@@ -253,45 +255,45 @@ def deepest(kind, power, x, cells, data, c, nodes, functions):
         moved, place = abs(step - place), step
         if moved <= 1e-15:
             break
-    return place, within(kind, x, cells, data, c, nodes, functions, place)[3]
+    return place, within(x, cells, data, c, nodes, functions, place)[3]
 
 
 @kernel()
-def contacts(kind, power, x, cells, data, first, pieces, nodes, functions, found):
+def contacts(x, cells, data, first, pieces, nodes, functions, found):
     """Write (cell, place, whether the place may move) of each contact of a line to ``found``; return their number."""
     count, best = 0, 0.0
     for c in range(first, first + pieces):
         if far(x, cells, data, c, nodes):
             continue
-        if kind == SPHERE:
-            place, deep = deepest(kind, power, x, cells, data, c, nodes, functions)
+        place, deep = deepest(x, cells, data, c, nodes, functions)
+        inner = 0.0 < place < 1.0
+        if data[c, AWAY + 3 * nodes + KIND] == SPHERE:
             if deep > best:
                 best, count = deep, 1
-                found[0, 0], found[0, 1], found[0, 2] = c, place, 1.0 if 0.0 < place < 1.0 else 0.0
+                found[0, 0], found[0, 1], found[0, 2] = c, place, inner
             continue
-        for end in range(2):
-            if within(kind, x, cells, data, c, nodes, functions, float(end))[3] > 0.0:
-                found[count, 0], found[count, 1], found[count, 2] = c, end, 0.0
-                count += 1
-        place, deep = deepest(kind, power, x, cells, data, c, nodes, functions)
-        if deep > 0.0:
+        if deep > 0.0 and inner:
             found[count, 0], found[count, 1], found[count, 2] = c, place, 1.0
             count += 1
+        for end in range(2):
+            if within(x, cells, data, c, nodes, functions, float(end))[3] > 0.0:
+                found[count, 0], found[count, 1], found[count, 2] = c, end, 0.0
+                count += 1
     return count
 
 
 @kernel()
-def moves(kind, power, place, inner, nodes, functions, d, e, radius, deep, g, bend, z):
+def moves(data, c, nodes, functions, place, inner, d, e, deep, g, bend, z):
     """Write by how much the place of a contact moves with each node, along the body's axes, to ``z (nodes + 1, 3)``.
 
     The last row is of the body; all are zero unless ``inner``.
     """
     z[:] = 0.0
-    curve = rise(kind, power, place, d, e, radius, deep, g, bend)[1]
+    curve = rise(data, c, nodes, place, d, e, deep, g, bend)[1]
     if not inner or not curve < 0.0:
         return
-    w, w1, _ = window(kind, place, True)
-    own, turned = radius - deep if kind == SPHERE else (power + 1.0) * w, bent(bend, d)
+    (w, w1, _), at, turned = window(data, c, nodes, place, True), AWAY + 3 * nodes, bent(bend, d)
+    own = (data[c, at + POWER] + 1.0) * w if data[c, at + KIND] != SPHERE else data[c, at + GROWTH] - deep
     for a in range(nodes + 1):
         value, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
         for k in range(3):

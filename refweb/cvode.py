@@ -26,7 +26,7 @@ LINEAR_SOLVERS = {
     "dense": "LU of the whole Jacobian",
     "fixed-point": "none: corrector iterations only, for steps that an explicit method could take",
 }
-DENSE = 60
+DENSE = 80
 """Unknown displacements up to which a dense factorization is the fastest."""
 SHORT = 0.5
 """γω of a step up to which corrector iterations are cheaper without any factorization."""
@@ -46,7 +46,8 @@ class Cvode(Implicit):
     max_order : int, optional
         Highest order, by default 2 for BDF and 12 for Adams.
     linear_solver : {"auto", "block", "sparse", "dense", "fixed-point"}
-        How linear systems are solved, see `LINEAR_SOLVERS`; "auto" chooses by size and family.
+        How linear systems are solved, see `LINEAR_SOLVERS`; "auto" is "dense" for at most `DENSE` unknowns, else
+        "block", with a factorization only where a step is longer than corrector iterations alone can take.
 
     Attributes
     ----------
@@ -63,6 +64,8 @@ class Cvode(Implicit):
 
     def __init__(self, system, *observed, family="bdf", max_order=None, linear_solver="auto", **tolerances):
         refuse_massless(system, self.method)
+        if system.constraints:
+            raise InputError('[[link]] needs method = "ida": cvode does not hold lengths')
         super().__init__(system, *observed, **tolerances)
         self.family = family
         self.max_order = max_order or {"bdf": 2, "adams": 12}[family]
@@ -90,7 +93,10 @@ class Cvode(Implicit):
             return name, f"{name}, as asked for: {LINEAR_SOLVERS[name]}"
         if self.unknowns <= DENSE:
             return "dense", f"dense, for {self.unknowns} unknowns, at most {DENSE}: {LINEAR_SOLVERS['dense']}"
-        return "block", f"block, for {self.unknowns} unknowns, more than {DENSE}: {LINEAR_SOLVERS['block']}"
+        choice = f"block, for {self.unknowns} unknowns, more than {DENSE}: {LINEAR_SOLVERS['block']}"
+        if self.system.net.spread is None:
+            choice += f"; none where a step is short, γω ≤ {SHORT:g}"
+        return "block", choice
 
     def _times_mass(self, v):
         return self._mass_matrix @ v if self._consistent else self._mass * v
@@ -109,10 +115,12 @@ class Cvode(Implicit):
     def _right_side(self, t, y, yp):
         n = self.unknowns
         self.stats["nfev"] += 1
-        force = self.system.force(t, *self._state(t, y))
-        self._seen = t, force
+        rows = self.system.force(t, *self._state(t, y))
+        force = rows.ravel()[self.system.free]
+        if not np.isfinite(force @ force):
+            self._wrong = t, rows
         yp[:n] = y[n:]
-        yp[n:] = self._over_mass(force.ravel()[self.system.free])
+        yp[n:] = self._over_mass(force)
 
     def _tangent(self, t, y):
         """Values of K, and of C or None, at a state."""

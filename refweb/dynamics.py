@@ -65,17 +65,15 @@ def probe_of(observable, system):
 def started(system, x=None):
     """What a reader has to know of a start at displacement x: jumps of motion, and bodies inside of the web."""
     before = np.zeros((system.rows, 3)) if x is None else x
-    now, energy = before.copy(), {}
+    now = before.copy()
     system.drive(0.0, now)
-    for family in system.families:
-        if family.internal:
-            energy[family.name] = system.energy_of(family, 0.0, now)
+    inner = [(family.name, system.energy_of(family, 0.0, now)) for family in system.families if family.internal]
     moved = np.flatnonzero((now != before).any(axis=1))
     if len(moved):
-        stored = sum(map(sum, energy.values()))
+        stored = sum(energy.sum() for _, energy in inner)
         yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    pushed = energy.get("contact", np.zeros(1))
-    if pushed.max() > 0.0:
+    pushed = np.concatenate([np.zeros(0), *(energy for name, energy in inner if name == "contact")])
+    if pushed.max(initial=0.0) > 0.0:
         line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
         yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
 

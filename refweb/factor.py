@@ -47,3 +47,10 @@ class Factor:
         if not self.pattern.size:
             return 0
         return int(np.count_nonzero(~(self._solver.factors()[1] > 0.0)))
+
+
+def weak_pivot(solver):
+    """Index of the first pivot of a `qdldl.Solver` that is not positive, None if all are."""
+    _, pivots, order = solver.factors()
+    bad = np.flatnonzero(~(pivots > 0.0))
+    return int(order[bad[0]]) if len(bad) else None

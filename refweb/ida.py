@@ -1,14 +1,17 @@
-"""Implicit dynamics by IDA of SUNDIALS, in residual form: with massless nodes and rigid links.
+"""Implicit dynamics by IDA of SUNDIALS, in residual form: with nodes without mass, and with rigid links.
 
 The unknowns are displacements x, velocities v of what has mass, and two multipliers λ, μ of each link:
 
     x' − v + Gᵀμ = 0        M v' − f(t, x, v) + Gᵀλ = 0        g(x) = 0        G v = 0,        G = ∂g/∂x
 
-In this form of Gear, Gupta and Leimkuhler [1]_ links are of index 2 and do not drift: lengths and their rates are both
-among the equations, and μ is 0 but for the error of a step. The error test leaves the multipliers out.
+In this form of Gear, Gupta and Leimkuhler [1]_ links are of index 2: lengths and their rates are both among the
+equations, and μ is 0 but for the error of a step. The error test leaves the multipliers out. The states of a step
+satisfy g = 0 and G v = 0 to about rtol, however long the run; what is observed is the nearest state that does so to
+rounding, with the forces that links have there.
 
-A node without mass has no velocity among the unknowns: its equation is 0 = f, of index 1, and its velocity is x'.
-MASSLESS_STUDY
+A node without mass has no velocity among the unknowns: its equation is 0 = f, of index 1, and its velocity is x'. To
+keep v and x' − v = 0 as well, of index 2, takes as many steps for the same error, with v in the error test or without.
+A node that nothing holds any more ends the run.
 
 A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacements leaves, where there are no links,
 
@@ -27,17 +30,14 @@ from __future__ import annotations
 import numpy as np
 
 from .cvode import DENSE, LINEAR_SOLVERS, _Symmetric, _Unsymmetric
-from .effects import Constraint
 from .errors import SolverError
 from .implicit import Implicit, _Stopped, scales
 from .inputs import InputError
+from .links import Links
+from .massless import REMEDY, Massless
 
 UNTESTED = 1e30
 """Absolute tolerance of multipliers, which takes them out of the error test."""
-WEAK = 1e-12
-"""Share of the largest entry on the diagonal that a pivot has to exceed."""
-STRETCH = 1e-6
-"""Largest relative error of a link's length in the state that a run is to start from."""
 
 
 class Ida(Implicit):
@@ -72,11 +72,11 @@ class Ida(Implicit):
         mass = np.repeat(system.net.mass, 3)[system.free]
         self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
         self._M = system.pattern.matrix(system.mass())
-        self._massless = _Massless(system.pattern, self._bare) if len(self._bare) else None
-        self._links = _Links(system, self._heavy, self._M) if system.constraints else None
-        self._count = len(self._links.pairs.cells) if self._links else 0
+        self._massless = Massless(system, self._bare) if len(self._bare) else None
+        self._links = Links(system) if system.constraints else None
+        self._count = len(self._links) if self._links else 0
         self.linear_solver, self.choice = self._chosen(linear_solver)
-        self._product = self._adrift = None
+        self._product, self._exact, self._adrift = None, False, (0.0, None)
 
     def _chosen(self, name):
         if name == "block" and self._links:
@@ -113,10 +113,11 @@ class Ida(Implicit):
         x, v = self._state(t, y, yp)
         n, heavy, bare = self.unknowns, self._heavy, self._bare
         force = self.system.force(t, x, v)
+        self._seen = t, force
         rate, (_, own, multipliers, corrections) = self._parts(yp)[0], self._parts(y)
         if self._links:
             pairs = self._links.pairs
-            force -= pairs.pull(x, multipliers)
+            force = force - pairs.pull(x, multipliers)
             rate = rate + pairs.pull(x, corrections).ravel()[self.system.free]
             r[n + len(heavy) :] = np.concatenate([pairs.excess(x), pairs.speed(x, v)])
         slope = np.zeros(n)
@@ -131,8 +132,7 @@ class Ida(Implicit):
         self._at_state = t, x, v
         K = self.system.stiffness(t, x, v)
         if self._massless:
-            weak = self._massless.weak(K)
-            self._adrift = None if weak is None else (t, self.system.row_name(self.system.free[weak] // 3))
+            self._adrift = t, self._massless.adrift(K)
         return K, self.system.damping(t, x, v)
 
     # Block elimination
@@ -142,7 +142,7 @@ class Ida(Implicit):
         system = self.system
         K, C = self._tangent(t, y, yp)
         self._K, self._C = system.pattern.matrix(K), None if C is None else system.pattern.matrix(C)
-        self._factored, self._true = c, self._adrift is None
+        self._factored, self._true = c, self._adrift[1] is None
         rest = self._M.data if C is None else self._M.data + C / c
         self.stats["nlu"] += 1
         if not system.symmetric:
@@ -159,7 +159,8 @@ class Ida(Implicit):
 
     def _precondition(self, t, y, yp, res, r, z, c, delta):
         n, heavy, bare = self.unknowns, self._heavy, self._bare
-        if self._product is not None and c == self._factored and self._true:
+        self._exact = c == self._factored and self._true
+        if self._product is not None and self._exact:
             z[:] = self._product  # r is J times it, and this inverts just that
             self._product = None
             return
@@ -172,6 +173,8 @@ class Ida(Implicit):
     def _jacobian_times(self, t, y, yp, res, u, Ju, c):
         n, heavy, bare = self.unknowns, self._heavy, self._bare
         self._product = u.copy()
+        if self._exact:
+            return  # what it would be, the preconditioner takes away again
         velocity, slope = c * u[:n], np.zeros(n)
         velocity[heavy], slope[heavy] = u[n:], c * u[n:]
         balance = self._M @ slope + self._K @ u[:n]
@@ -242,51 +245,14 @@ class Ida(Implicit):
         v = system.initial_velocity() if v is None else v.copy()
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        if self._massless:
-            self._settle(x, v)
         if self._links:
+            self._links.refuse_stretched(x)
             self._links.hold(x, v)
+        if self._massless:
+            self._massless.settle(x, v, *scales(system))
         run = super().start(x, v)
-        run.constraint_drift = np.zeros(2)
+        run.constraint_drift = self._drift = np.zeros(2)
         return run
-
-    def _settle(self, x, v):
-        """Write positions and velocities of the nodes without mass into x and v."""
-        system, massless, at = self.system, self._massless, self.system.free[self._bare]
-        near, fast = scales(system)
-        force = system.force(0.0, x, v).ravel()[at]
-        for _ in range(50):
-            if (weak := massless.weak(system.stiffness(0.0, x, v))) is not None:
-                raise InputError(
-                    f"{system.row_name(system.free[weak] // 3)} has no position at t = 0: it has no mass, and no "
-                    "tension holds it; give density > 0, a [[point_mass]] or a prestrain"
-                )
-            step, y = massless.solve(force), x.copy()
-            for _ in range(30):
-                y.ravel()[at] = x.ravel()[at] + step
-                found = system.force(0.0, y, v).ravel()[at]
-                if np.linalg.norm(found) < np.linalg.norm(force) or np.abs(step).max() < 1e-9 * near:
-                    break
-                step *= 0.5
-            x[:], force = y, found
-            if np.abs(step).max() < 1e-7 * near:
-                break
-        else:
-            node = system.row_name(at[np.abs(force).argmax()] // 3)
-            raise SolverError(
-                f"no equilibrium of nodes without mass at t = 0: a force of {abs(force).max():.3g} N at {node}"
-            )
-        h = 1e-4 * near / max(np.abs(v).max(), fast)
-        now, soon, later = (self._ahead(k * h, x, v).ravel()[at] for k in range(3))
-        massless.weak(system.stiffness(0.0, x, v))
-        v.ravel()[at] = massless.solve((4.0 * soon - 3.0 * now - later) / (2.0 * h))
-
-    def _ahead(self, h, x, v):
-        """Forces a time h later, when all that has mass has moved on with its velocity."""
-        y, at = x + h * v, self.system.free[self._bare]
-        y.ravel()[at] = x.ravel()[at]
-        self.system.drive(h, y)
-        return self.system.force(h, y, v)
 
     def _begin(self, t, x, v):
         from scipy.sparse.linalg import splu
@@ -294,11 +260,13 @@ class Ida(Implicit):
 
         n, heavy, count = self.unknowns, self._heavy, self._count
         rows = self._state(t, np.concatenate([x, v[heavy]]), np.concatenate([v, v[heavy]]))
-        force = self.system.force(t, *rows).ravel()[self.system.free][heavy]
+        force = self.system.force(t, *rows)
         if self._links:
-            slope, multipliers = self._links.solve(rows[0], force, -self._links.pairs.turning(rows[1]))
+            slope, multipliers = self._links.start(*rows, force)
         else:
-            slope, multipliers = splu(self._M[heavy][:, heavy].tocsc()).solve(force), np.zeros(0)
+            slope, multipliers = force.ravel()[self.system.free[heavy]], np.zeros(0)
+            if len(heavy):
+                slope = splu(self._M[heavy][:, heavy].tocsc()).solve(slope)
         algebraic = np.concatenate([self._bare, n + len(heavy) + np.arange(2 * count)])
         self._solver = IDA(
             self._residual,
@@ -314,25 +282,51 @@ class Ida(Implicit):
 
     # A solver's steps
 
-    def _advance(self, stop, last):
+    def _advance(self, stop, end):
         try:
-            found = self._check(self._solver.step(last, "onestep", float(stop) if np.isfinite(stop) else None))
+            found = self._check(self._solver.step(end, "onestep", float(stop) if np.isfinite(stop) else None))
         except _Stopped:
-            if self._adrift is None:
-                raise
-            self._lost()
-        if self._massless:
-            self._tangent(found.t, found.y, found.yp)
-            if self._adrift:
-                self._lost()
+            self._refuse_adrift()
+            raise
+        if self._massless or self._links:
+            self._inspect(found.t, found.y, found.yp)
         return float(found.t)
 
-    def _lost(self):
+    def _inspect(self, t, y, yp):
+        """Look at the end of a step: whether nodes without mass have a position, and how far links are off."""
+        x, v = self._state(t, y, yp)
+        if self._links:
+            self._drift[:] = np.maximum(self._drift, self._links.drift(x, v))
+        if self._massless:
+            tension = self.system.forces(t, x, v)[1][0][self._massless.around, 0]
+            if self._adrift[1] or not tension.min() > 0.0:
+                self._tangent(t, y, yp)
+            self._refuse_adrift()
+
+    def _refuse_adrift(self):
         t, name = self._adrift
-        raise SolverError(
-            f"{name} has lost its position at t = {t:.6g} s: it has no mass, and no tension holds it any more; give "
-            "density > 0, a [[point_mass]] or more prestrain"
-        ) from None
+        if name:
+            raise SolverError(
+                f"{name} has lost its position by t = {t:.6g} s: it has no mass, and no tension holds it any more; "
+                f"{REMEDY}"
+            ) from None
+
+    def figures(self, run):
+        """What a run has spent, and the `constraint_drift` of its steps: of lengths [1], and of their rates [m/s]."""
+        drift = {"constraint_drift": run.constraint_drift.tolist()} if self._links else {}
+        return {**super().figures(run), **drift}
+
+    def _at(self, t):
+        x, v = super()._at(t)
+        if self._links:
+            self._links.hold(x, v)
+        return x, v
+
+    def _forces(self, t, x, v):
+        force, out = super()._forces(t, x, v)
+        if self._links:
+            force += self._links.force(x, v, force)
+        return force, out
 
     def _interpolated(self, t):
         found = self._check(self._solver.step(t, "normal", None))
@@ -342,144 +336,3 @@ class Ida(Implicit):
         if result.status < 0:
             raise _Stopped(result.message)
         return result
-
-
-def _weak(solver):
-    """Index of the first pivot of an LDLᵀ factorization that is not positive, None if all are."""
-    _, pivots, order = solver.factors()
-    bad = np.flatnonzero(~(pivots > 0.0))
-    return int(order[bad[0]]) if len(bad) else None
-
-
-class _Massless:
-    """The block of the tangent that belongs to nodes without mass, its diagonal lowered by `WEAK`."""
-
-    def __init__(self, pattern, bare):
-        number = np.full(pattern.size, -1)
-        number[bare] = np.arange(len(bare))
-        row, col = number[pattern.indices], number[np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))]
-        self._bare, self._upper = bare, np.flatnonzero((row >= 0) & (row <= col))
-        self._diagonal = np.flatnonzero((row == col)[self._upper])
-        indptr = np.searchsorted(col[self._upper], np.arange(len(bare) + 1))
-        self._structure = row[self._upper].astype(np.int32), indptr.astype(np.int32)
-        self._solver = None
-
-    def weak(self, K):
-        """Factorize; an unknown that nothing holds, None if all are held."""
-        from qdldl import Solver
-        from scipy.sparse import csc_matrix
-
-        values = K[self._upper]
-        values[self._diagonal] -= WEAK * np.abs(values[self._diagonal]).max()
-        self._matrix = csc_matrix((values, *self._structure))
-        if self._solver is None:
-            self._solver = Solver(self._matrix, upper=True)
-        else:
-            self._solver.update(self._matrix, upper=True)
-        found = _weak(self._solver)
-        return None if found is None else self._bare[found]
-
-    def solve(self, b):
-        """Solution of the block as it was factorized."""
-        return self._solver.solve(b)
-
-
-class _Links:
-    """All links of a system, and the equations M a + Gᵀλ = f, G a = b that hold them, in what has mass and is free.
-
-    Attributes
-    ----------
-    pairs : refweb.effects.Constraint
-        The links, one after another.
-    """
-
-    def __init__(self, system, heavy, M):
-        given = system.constraints
-        cells, data = (np.vstack([getattr(one, name) for one in given]) for name in ("cells", "data"))
-        self.pairs = Constraint(cells=cells, data=data)
-        table = np.repeat(np.arange(len(given)), [len(one.cells) for one in given]) + 1
-        self._names = [f"[[link]] {i} of nodes {a} and {b}" for i, (a, b) in zip(table, cells, strict=True)]
-        self._refuse(system)
-        self._M, self._at = M[heavy][:, heavy].tocsc(), system.free[heavy]
-        number = np.full(3 * system.rows, -1)
-        number[self._at] = np.arange(len(heavy))
-        unknown = number[3 * cells[:, :, None] + np.arange(3)]  # of (link, end, axis)
-        moving = unknown >= 0
-        self._link, end, self._axis = np.nonzero(moving)
-        self._unknown, self._sign = unknown[moving], 2.0 * end - 1.0
-        other = np.full(unknown.shape, -1)
-        other[moving] = np.arange(len(self._link))
-        self._other = other[:, ::-1][moving]
-        self._both = np.flatnonzero(self._other >= 0)
-        self._refuse_redundant(np.zeros((system.rows, 3)))
-
-    def _refuse(self, system):
-        free = ~system.supported
-        driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)])
-        for name, pair in zip(self._names, self.pairs.cells, strict=True):
-            if not free[pair].any():
-                raise InputError(f"{name}: both are supported, so that it holds nothing: leave it out")
-            for node in pair[np.isin(pair, driven)]:
-                raise InputError(
-                    f"{name}: node {node} moves by [[motion]], whose jumps of velocity no rigid link can follow: link "
-                    "to a free node, tied to it by a line"
-                )
-            for node in pair[(system.net.mass[pair] <= 0.0) & free[pair].any(axis=1)]:
-                raise InputError(f"{name}: node {node} has no mass: give density > 0 or a [[point_mass]]")
-
-    def _refuse_redundant(self, x):
-        from qdldl import Solver
-        from scipy.sparse import csc_matrix, eye_array, triu
-
-        G = self._gradient(x)
-        coupling = G @ (G / self._M.diagonal()).T
-        coupling = coupling - WEAK * abs(coupling).max() * eye_array(len(self._names))
-        if (weak := _weak(Solver(csc_matrix(triu(coupling)), upper=True))) is not None:
-            raise InputError(
-                f"{self._names[weak]}: the other links and the supports hold that distance already, so that its force is "
-                "not determined: leave it out"
-            )
-
-    def _gradient(self, x):
-        from scipy.sparse import csr_array
-
-        parts = (self._entries(x), (self._link, self._unknown))
-        return csr_array(parts, shape=(len(self._names), len(self._at)))
-
-    def _entries(self, x):
-        """∂g/∂x of the ends that move."""
-        return self._sign * self.pairs.direction(x)[self._link, self._axis]
-
-    def places(self, position, velocity, first):
-        """Rows and columns of what links add to J; λ and μ stand from column ``first`` on."""
-        x, v, force = position[self._unknown], velocity[self._unknown], first + self._link
-        rate, both = force + len(self._names), self._both
-        own, across = (v, x), (v[both], x[self._other[both]])
-        return [(v, force), own, across, (x, rate), (force, x), (rate, v), (rate, x)]
-
-    def values(self, x, v, multipliers):
-        """Values of what links add to J."""
-        G, length = self._entries(x), self.pairs.length[self._link]
-        turn = multipliers[self._link] / length
-        rate = self._sign * self.pairs.between(v)[self._link, self._axis] / length
-        return [G, turn, -turn[self._both], G, G, G, rate]
-
-    def solve(self, x, f, b):
-        """a and λ of M a + Gᵀλ = f, G a = b."""
-        from scipy.sparse import block_array
-        from scipy.sparse.linalg import splu
-
-        G = self._gradient(x)
-        found = splu(block_array([[self._M, G.T], [G, None]], format="csc")).solve(np.concatenate([f, b]))
-        return found[: len(f)], found[len(f) :]
-
-    def hold(self, x, v):
-        """Move x and v to the nearest state that keeps the lengths, as mass weighs distance."""
-        none = np.zeros(len(self._at))
-        off = self.pairs.excess(x) / self.pairs.length
-        worst = int(np.abs(off).argmax())
-        if not abs(off[worst]) < STRETCH:
-            raise InputError(f"{self._names[worst]}: the start has it stretched by {off[worst]:.3g} of its length")
-        for _ in range(2):
-            x.ravel()[self._at] += self.solve(x, none, -self.pairs.excess(x))[0]
-        v.ravel()[self._at] += self.solve(x, none, -self.pairs.speed(x, v))[0]

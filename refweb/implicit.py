@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import io
+import os
 import re
 import warnings
 from dataclasses import dataclass, field, replace
@@ -25,7 +26,7 @@ from .probes import PLACE
 from .stepping import LEVEL, SIDE, SLOT, STOP, TIME, book_energies, ended_by, no_energy, passes
 
 TRAVEL = 0.2
-"""Largest share of a body's radius that anything may move in a step, so that nothing passes through."""
+"""Largest share of a body's thickness that anything may move in a step, so that nothing passes through."""
 UNEVEN = 1e-3
 """Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
 HALVINGS = 8
@@ -125,8 +126,8 @@ class Implicit:
         self._held, self._fixed = system.supported, np.flatnonzero(system.supported)
         times = [t for part in (*families, *system.drives, *system.line_drives) for t in part.times]
         self._breaks = np.unique(np.array(times, dtype=float))
-        self._radius = min((body.radius for body in system.net.bodies), default=np.inf)
-        self._seen = 0.0, np.zeros((0, 3))  # time and force [N] of the solver's last evaluation
+        self._thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
+        self._wrong = None  # time and force of an evaluation of this step that is not finite
 
     # What a solver brings
 
@@ -159,7 +160,7 @@ class Implicit:
         signs, count = self._signs, len(self._probes)
         none, book = np.zeros(len(signs)), np.zeros(len(system.families) + 1)
         run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy(), book)
-        force, out = system.forces(0.0, x, v)
+        force, out = self._forces(0.0, x, v)
         where = np.full(2, PLACE)
         for i, (probe, rows, data) in enumerate(self._arrays):
             run.peaks[i] = probe(0.0, x, v, force, out[0], rows, data, where)
@@ -174,8 +175,7 @@ class Implicit:
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.energy, run.largest = own.sum(), np.abs(own).sum()
         run.rates = self._rates(*self._sample_of(0.0, x, v))
-        with self._reported(run), warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Custom sparse Jacobian approximation will be ignored")
+        with self._reported(run), _quiet():
             self._begin(0.0, x.ravel()[system.free], v.ravel()[system.free])
         self._unready = self.linear_solver == "sparse"
         if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
@@ -215,20 +215,22 @@ class Implicit:
         stop, ahead = np.inf, self._breaks[self._breaks > run.time * (1.0 + 1e-12)]
         if len(ahead):
             stop = ahead[0]
-        if np.isfinite(self._radius):
-            speed = 2.0 * np.sqrt((run.v**2).sum(axis=1).max())
-            stop = min(stop, run.time + TRAVEL * self._radius / speed) if speed > 0.0 else stop
+        if np.isfinite(self._thickness):
+            moving = run.v[: self.system.rows - self.system.net.spins]
+            speed = 2.0 * np.sqrt((moving**2).sum(axis=1).max())
+            stop = min(stop, run.time + TRAVEL * self._thickness / speed) if speed > 0.0 else stop
         if stop - run.time < 1e-12 * end:
             stop = run.time + 1e-12 * end
+        self._wrong = None
         with self._reported(run):
             reached = self._advance(stop, end)
             if reached == run.reached:  # SUNDIALS first returns the end of the step that it was last asked inside of
                 reached = self._advance(stop, end)
+            if not reached > run.reached:
+                raise _Stopped("no step is long enough to change the time")
         if self._unready:
             self._unready = False
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(self._solver))
-        if not reached > run.reached:
-            raise SolverError(f"{self.method} makes no step at t = {run.time:.6g} s: raise rtol = {self.rtol:g}")
         run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
 
     def _at(self, t):
@@ -299,12 +301,16 @@ class Implicit:
         """The run at a state within a piece."""
         return replace(run, time=t, x=x, v=v, book=self._booked(run, rates, end, t)[0])
 
+    def _forces(self, t, x, v):
+        """Force on every row [N], and what each family observes."""
+        return self.system.forces(t, x, v)
+
     def _sample(self, t):
         return self._sample_of(t, *self._at(t))
 
     def _sample_of(self, t, x, v):
         """Time, displacement, velocity, force, what the lines show, and the power of each family, last of motion."""
-        force, out = self.system.forces(t, x, v)
+        force, out = self._forces(t, x, v)
         self._refuse_endless(t, force)
         power, driven = np.zeros(len(out) + 1), self._driven
         for i, column in self._powered:
@@ -387,7 +393,7 @@ class Implicit:
 
     def _fill(self, row, run, before):
         system, where = self.system, np.zeros(2, dtype=np.int64)
-        force, out = system.forces(run.time, run.x, run.v)
+        force, out = self._forces(run.time, run.x, run.v)
         total = self._energies(run)
         values = [p(run.time, run.x, run.v, force, out[0], r, d, where) for p, r, d in self._arrays]
         moving = np.where(self._held, 0.0, system.momentum(run.v))
@@ -411,7 +417,8 @@ class Implicit:
             with contextlib.redirect_stdout(said):
                 yield
         except _Stopped as stop:
-            self._refuse_endless(*self._seen)
+            if self._wrong is not None:
+                self._refuse_endless(*self._wrong)
             reason = re.sub(r"\[\w+, Error: (-?\d+)\]", "", said.getvalue())
             reason = " ".join(reason.split()) or str(stop)
             x, v = run.x, run.v
@@ -427,6 +434,24 @@ class Implicit:
 
 class _Stopped(Exception):
     """A solver of SUNDIALS gave up."""
+
+
+@contextlib.contextmanager
+def _quiet():
+    """Make a solver that writes no warnings to the terminal: what counts is in the message of its failure."""
+    names = ("SUNLOGGER_WARNING_FILENAME", "SUNLOGGER_ERROR_FILENAME")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, os.devnull))
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Custom sparse Jacobian approximation will be ignored")
+            yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def scales(system):

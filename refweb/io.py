@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from .bodies import sphere
+from .bodies import row_names, surface
 from .inputs import InputError, short
 
 OWN = re.compile(
@@ -110,7 +110,7 @@ def write_body(path, body, state):
     """Write the surface of a body as VTU, at its current position."""
     import meshio
 
-    points, triangles = sphere(state.position[body.row], body.radius)
+    points, triangles = surface(body, state.position[body.row])
     data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
     point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
     mesh = meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
@@ -236,12 +236,12 @@ class Folder:
         write_frame(self.path / name, state, shape)
         self._listed.append((time, 0, name))
         for part, body in enumerate(state.system.net.bodies, start=1):
-            surface = f"frames/{body.name}_{number:06d}.vtu"
-            write_body(self.path / surface, body, state)
-            self._listed.append((time, part, surface))
+            name = f"frames/{body.name}_{number:06d}.vtu"
+            write_body(self.path / name, body, state)
+            self._listed.append((time, part, name))
         net = state.system.net
         arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
-        arrays |= {"supported": state.system.supported, "bodies": np.array([b.name for b in net.bodies], dtype=str)}
+        arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
         write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self._list_frames()
 

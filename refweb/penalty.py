@@ -18,9 +18,12 @@ import numpy as np
 from .compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from .contact_points import (
     AWAY,
+    CORE,
     GROWTH,
+    KIND,
     PENALTY,
     PLACES,
+    POWER,
     bent,
     contacts,
     deepest,
@@ -35,19 +38,19 @@ from .contact_points import (
 from .shapes import SPHERE
 
 SPREAD = 2.5
-"""Bound on the row sums of the stiffness of an element's contacts, both ends and the one between, over k p δ^(p − 1)."""
+"""Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
 
 
 @kernel()
-def raised(deep, halves):
-    """δ^p of a depth δ > 0, p = halves/2 being 1 or 1.5."""
-    return deep if halves == 2 else deep * math.sqrt(deep)
+def raised(data, c, nodes, deep):
+    """δ^p of a depth δ > 0, p being 1 or 1.5."""
+    return deep if data[c, AWAY + 3 * nodes + POWER] == 1.0 else deep * math.sqrt(deep)
 
 
 @kernel()
-def lowered(deep, halves):
+def lowered(data, c, nodes, deep):
     """p δ^(p − 1)."""
-    return 1.0 if halves == 2 else 1.5 * math.sqrt(deep)
+    return 1.0 if data[c, AWAY + 3 * nodes + POWER] == 1.0 else 1.5 * math.sqrt(deep)
 
 
 @kernel()
@@ -66,8 +69,8 @@ def turn(blocks, c, rows, data, nodes, q):
 @kernel()
 def thickness(data, c, nodes):
     """Least distance from the middle of the body to its surface [m]."""
-    at = AWAY + 3 * nodes + GROWTH
-    return data[c, at] + min(data[c, at + 1], data[c, at + 2], data[c, at + 3])
+    at = AWAY + 3 * nodes
+    return data[c, at + GROWTH] + min(data[c, at + CORE], data[c, at + CORE + 1], data[c, at + CORE + 2])
 
 
 @kernel()
@@ -85,15 +88,16 @@ def lightness(mass, cells, c, nodes):
 
 
 @kernel()
-def foreseen(kind, power, reach, speed, x, mass, cells, data, c, nodes, functions):
+def foreseen(share_of, reach, speed, x, mass, cells, data, c, nodes, functions):
     """(depth that a cell may come to [m], length of its slope there [m]); a depth of 0 where it stays out of reach.
 
-    It comes no deeper than ``reach`` allows, and the energy of what meets at this speed.
+    It goes no deeper than ``reach`` and the energy of what meets at this speed allow, and by no more than a share of
+    the body's thickness.
     """
     own, body = 0.0, mass[cells[c, nodes]]
-    place, deep = deepest(kind, power, x, cells, data, c, nodes, functions)
-    first = within(kind, x, cells, data, c, nodes, functions, 0.0)[3]
-    last = within(kind, x, cells, data, c, nodes, functions, 1.0)[3]
+    place, deep = deepest(x, cells, data, c, nodes, functions)
+    first = within(x, cells, data, c, nodes, functions, 0.0)[3]
+    last = within(x, cells, data, c, nodes, functions, 1.0)[3]
     _, d, _ = point(x, cells, data, c, nodes, functions, place)
     length = math.sqrt(dot(d, d))
     deep = max(deep, first, last)
@@ -102,23 +106,20 @@ def foreseen(kind, power, reach, speed, x, mass, cells, data, c, nodes, function
         return 0.0, length
     for a in range(nodes):
         own += mass[cells[c, a]]
-    more = min(0.5 * reach, thickness(data, c, nodes))
+    more = min(0.5 * reach, share_of * thickness(data, c, nodes))
     if speed > 0.0:
         own = own * body / (own + body) if body > 0.0 else own
-        more = min(more, (0.5 * (power + 1.0) * own * speed * speed / data[c, PENALTY]) ** (1.0 / (power + 1.0)))
+        power = data[c, AWAY + 3 * nodes + POWER] + 1.0
+        more = min(more, (0.5 * power * own * speed * speed / data[c, PENALTY]) ** (1.0 / power))
     return max(deep, 0.0) + more, length
 
 
 @functools.cache
-def kernels(kind, halves, pieces, nodes, functions):
+def kernels(pieces, nodes, functions):
     """Force, energy, stiffness and bound kernels.
 
     Parameters
     ----------
-    kind : int
-        Kind of the bodies' shape, see `refweb.shapes`.
-    halves : int
-        Twice the exponent p: 2 or 3.
     pieces : int
         Elements per line: so many cells follow each other.
     nodes : int
@@ -126,17 +127,16 @@ def kernels(kind, halves, pieces, nodes, functions):
     functions : tuple of float
         Coefficients of the element's functions, by power of ξ, then by node in the order along the line.
     """
-    power = 0.5 * halves
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         found = np.empty((PLACES * pieces, 3))
         out[:, 0] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(kind, power, x, cells, data, first, pieces, nodes, functions, found)):
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                _, _, _, deep, g, _ = within(kind, x, cells, data, c, nodes, functions, place)
-                push = data[c, PENALTY] * window(kind, place, inner)[0] * raised(deep, halves)
+                _, _, _, deep, g, _ = within(x, cells, data, c, nodes, functions, place)
+                push = data[c, PENALTY] * window(data, c, nodes, place, inner)[0] * raised(data, c, nodes, deep)
                 out[c, 0] += push
                 g = from_axes(data, c, nodes, g)
                 for k in range(3):
@@ -149,25 +149,26 @@ def kernels(kind, halves, pieces, nodes, functions):
         found = np.empty((PLACES * pieces, 3))
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(kind, power, x, cells, data, first, pieces, nodes, functions, found)):
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                deep = within(kind, x, cells, data, c, nodes, functions, place)[3]
-                stored = data[c, PENALTY] / (power + 1.0) * raised(deep, halves) * deep
-                out[c] += window(kind, place, inner)[0] * stored
+                deep = within(x, cells, data, c, nodes, functions, place)[3]
+                stored = (
+                    data[c, PENALTY] / (data[c, AWAY + 3 * nodes + POWER] + 1.0) * raised(data, c, nodes, deep) * deep
+                )
+                out[c] += window(data, c, nodes, place, inner)[0] * stored
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         found, z, q = np.empty((PLACES * pieces, 3)), np.empty((nodes + 1, 3)), np.empty((3, 3))
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(kind, power, x, cells, data, first, pieces, nodes, functions, found)):
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                _, d, e, deep, g, bend = within(kind, x, cells, data, c, nodes, functions, place)
-                radius = data[c, AWAY + 3 * nodes + GROWTH]
-                moves(kind, power, place, inner and not definite, nodes, functions, d, e, radius, deep, g, bend, z)
-                w, w1, _ = window(kind, place, inner)
-                steep = data[c, PENALTY] * w * lowered(deep, halves)
-                push = data[c, PENALTY] * raised(deep, halves)
+                _, d, e, deep, g, bend = within(x, cells, data, c, nodes, functions, place)
+                moves(data, c, nodes, functions, place, inner and not definite, d, e, deep, g, bend, z)
+                w, w1, _ = window(data, c, nodes, place, inner)
+                steep = data[c, PENALTY] * w * lowered(data, c, nodes, deep)
+                push = data[c, PENALTY] * raised(data, c, nodes, deep)
                 across = w1 * push + steep * dot(g, d)
                 turned, push = bent(bend, d), w * push
                 matrix = ((bend[0], bend[1], bend[2]), (bend[1], bend[3], bend[4]), (bend[2], bend[4], bend[5]))
@@ -187,15 +188,15 @@ def kernels(kind, halves, pieces, nodes, functions):
     def bound(reach, speed, x, mass, rates, cells, data):
         scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
         for c in range(cells.shape[0]):
-            deep, length = foreseen(kind, power, reach, speed, x, mass, cells, data, c, nodes, functions)
+            deep, length = foreseen(1.0, reach, speed, x, mass, cells, data, c, nodes, functions)
             if deep <= 0.0:
                 continue
-            steep = scale * data[c, PENALTY] * lowered(deep, halves)
+            steep = scale * data[c, PENALTY] * lowered(data, c, nodes, deep)
             delta = lightness(mass, cells, c, nodes)
             b, thick, own = cells[c, nodes], thickness(data, c, nodes), SPREAD * steep
-            if kind == SPHERE:  # a line turns under a push that slides along it
+            if data[c, AWAY + 3 * nodes + KIND] == SPHERE:  # a line turns under a push that slides along it
                 tilt = scale * deep / length if length > 0.0 else 0.0
-                own = steep * (1.0 + tilt + 2.0 * tilt * (1.0 + thick / length))
+                own = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
             body = own * (1.0 + 1.0 / delta) if delta > 0.0 else own
             rates[b] = max(rates[b] + body, (10.0 * speed / thick) ** 2 * mass[b])
             for a in range(nodes):  # nothing passes through between two steps, of a tenth of the body at half the bound

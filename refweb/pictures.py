@@ -125,9 +125,9 @@ def _target(out, default, endings=None):
 
 
 def _field(shot, name):
-    """The field to show: the one asked for, else stress, else the first."""
+    """The field to show: the one asked for, else a mode's shape, else stress, else the first."""
     if name is None:
-        name = "stress" if "stress" in shot.fields or not shot.fields else next(iter(shot.fields))
+        name = next((known for known in ("shape", "stress", *shot.fields) if known in shot.fields), "stress")
     if name not in shot.fields:
         raise InputError(f'field = "{name}": no such field, {nearest(name, shot.fields)}')
     return name
@@ -146,7 +146,8 @@ def _heading(folder):
     title = str(run.get("scene") or Path(folder).resolve().name)
     status = run.get("status", "solved")
     note = "" if status == "solved" else f"  —  run {status}"
-    return title[:100], "step {:g}" if kind == "static" else "t = {:.6g} s", note
+    clock = "mode {:g}" if run.get("kind") == "modes" else "step {:g}" if kind == "static" else "t = {:.6g} s"
+    return title[:100], clock, note
 
 
 def _figures(reel, field, pins, heading, size):

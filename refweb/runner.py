@@ -53,7 +53,7 @@ def run(scene, out=None, force=False, progress=None, announce=None):
     system = scene.build()
     if announce is not None:
         announce(scene, system)
-    solution = Solution(scene, web=web_of(system), versions=_versions())
+    solution = Solution(scene, web=web_of(system), versions=versions())
     solution.warnings += _notices(scene, system)
     follower = follower_of(scene, system, solution)
     solution.columns = follower.columns
@@ -183,7 +183,7 @@ def web_of(system):
     }
 
 
-def _versions():
+def versions():
     names = ("numpy", "scipy", "scikit-fem", "numba", "meshio", "qdldl")
     own = {"refweb": __version__, "python": sys.version.split()[0]}
     return {**own, **{name: importlib.metadata.version(name) for name in names}}

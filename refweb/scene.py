@@ -275,7 +275,7 @@ class Scene:
             found = _in(name, net.find, table.nodes, "nodes")
             supported[np.ix_(found, table.components)] = True
         acting, count = [Elasticity()], {}
-        for effect in self.effects:
+        for effect in sorted(self.effects, key=lambda effect: table_of(effect) != "body"):  # others act on bodies
             key = table_of(effect)
             count[key] = count.get(key, 0) + 1
             acting.append(_Named(f"[[{key}]] {count[key]}" if key in LISTS else f"[{key}]", effect))
@@ -283,6 +283,8 @@ class Scene:
                 raise InputError(f"[{key}] stands {count[key]} times: a scene has one")
         system = System(net, acting, supported)
         _distinct_motions(system)
+        if system.constraints:
+            self._check_links()
         system.initial_velocity()
         own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
         columns = dict.fromkeys(own, "a column of its own")
@@ -295,6 +297,13 @@ class Scene:
         for i, event in enumerate(self.event):
             _in(f"[[event]] {i + 1}", self._check_event, event, i, system)
         return system
+
+    def _check_links(self):
+        if self.solve.method != "ida":
+            here = f'kind = "{self.solve.kind}" and method = "{self.solve.method}"'
+            raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = "ida", not {here}')
+        if self.solve.start == "equilibrium":
+            raise InputError('[solve] start = "equilibrium" must be "web" or a result folder with [[link]]')
 
     def _check_event(self, event, number, system):
         if event.name in (names := [e.name for e in self.event])[:number]:

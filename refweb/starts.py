@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .bodies import row_names
 from .inputs import InputError, short
 
 
@@ -59,7 +60,9 @@ def stored(system, folder):
         )
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
-    pairs = [(body.row, row[body.name]) for body in net.bodies if body.name in row and not body.fixed]
+    own = zip(row_names(net.bodies), range(net.nodes, system.rows), strict=True)
+    held = [body.name for body in net.bodies if body.fixed]
+    pairs = [(here, row[name]) for name, here in own if name in row and name not in held]
     here, there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
     reference = positions - displacements
     same = np.isclose(reference[there], net.points[here], rtol=0, atol=1e-15 * np.abs(positions).max(initial=0.0))

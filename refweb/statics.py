@@ -21,6 +21,7 @@ import numpy as np
 from . import certificate, follower_loads, spin_limit
 from .errors import SolverError
 from .factor import Factor
+from .inputs import InputError
 from .interior import InteriorPoint
 from .laws import LINEAR, TENSION_ONLY
 from .lines import AXIAL_STIFFNESS
@@ -68,10 +69,13 @@ class Equilibrium:
 
 
 def check_supported(system, t):
-    """Refuse a load that no support carries, and a frame that turns too fast."""
-    outer = sum(system.force_of(f, t, np.zeros((system.rows, 3))) for f in system.families if not f.internal)
+    """Refuse a load that no support carries, a frame that turns too fast, and links."""
+    if system.constraints:
+        raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
+    still = np.zeros((system.rows, 3))
+    outer = sum((system.force_of(f, t, still) for f in system.families if not f.internal), start=still)
     for rows, axis in system.loose:
-        resultant = np.sum(outer[rows, axis]) if np.ndim(outer) else 0.0
+        resultant = np.sum(outer[rows, axis])
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
             remedy = "support one of them"

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .bodies import row_names
 from .effects import Constraint, Drive, Family, LineDrive
 from .lines import LENGTH
 from .pattern import Pattern
@@ -104,6 +105,8 @@ class System:
                 effect.start(self.net, self.supported, v)
         for body in self.net.bodies:
             v[body.row] = body.velocity
+            if body.spin is not None:
+                v[body.spin] = body.angular_velocity
         return v
 
     @property
@@ -216,7 +219,7 @@ class System:
 
     def row_name(self, row):
         """How a message calls a row: a node by its number, a body by its name."""
-        return f"node {row}" if row < self.net.nodes else f'body "{self.net.bodies[row - self.net.nodes].name}"'
+        return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
     def energy_of(self, family, t, x):
         """Energy of each cell of one family [J]."""

@@ -14,7 +14,7 @@ from .io import Folder, check_folder
 from .laws import LINEAR
 from .lines import SMOOTHING
 from .observables import Result
-from .runner import _versions, web_of
+from .runner import versions, web_of
 from .scene import Scene, in_file
 from .solution import SOLVER, Solution, as_history
 from .spectrum import STRAIN, spectrum
@@ -129,7 +129,7 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
         rest = _at_rest(system)
     if announce is not None:
         announce(scene, system)
-    found = Modes(scene, web=web_of(system), versions=_versions(), columns=COLUMNS)
+    found = Modes(scene, web=web_of(system), versions=versions(), columns=COLUMNS)
     tell = progress or (lambda text, share: None)
     try:
         _follow(found, rest, number, tell)

@@ -15,7 +15,11 @@ import pytest
 import refweb
 
 LAYERS = [
-    ["inputs", "errors", "compiled", "bodies"],
+    ["inputs", "errors", "compiled"],
+    ["shapes"],
+    ["contact_points", "bodies"],
+    ["penalty"],
+    ["rubbing"],
     ["laws", "time_tables", "probes", "webs"],
     ["lattices", "single_cable", "given_webs", "cables", "settings"],
     ["elements"],
@@ -28,12 +32,13 @@ LAYERS = [
     + ["effects.velocity", "effects.body", "effects.contact"]
     + ["effects.damping", "effects.bending"]
     + ["effects.frame", "effects.pressure", "effects.thrust"]
-    + ["effects.reel", "effects.temperature"],
+    + ["effects.reel", "effects.temperature", "effects.link"],
     ["system"],
-    ["certificate", "interior", "spectrum", "spin_limit", "follower_loads"],
+    ["certificate", "interior", "spectrum", "spin_limit", "follower_loads", "massless", "links"],
     ["statics", "central_difference"],
     ["implicit"],
     ["cvode"],
+    ["ida"],
     ["relaxation"],
     ["state"],
     ["observables"],

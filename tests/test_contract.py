@@ -22,6 +22,7 @@ from refweb import lines
 from refweb.central_difference import CentralDifference
 from refweb.effects import Drive
 from refweb.inputs import InputError
+from refweb.shapes import SPHERE
 from refweb.system import System
 
 EXAMPLES = {
@@ -37,8 +38,22 @@ EXAMPLES = {
     "Body": [
         dict(name="ball", radius=0.3, mass=0.5, position=(0.6, 0.3, 0.2), velocity=(1.0, 2.0, 3.0)),
         dict(name="wall", radius=0.4, position=(0.2, 0.9, -0.1), fixed=True),
+        dict(name="hoop", shape="ring", radius=0.3, normal=(0.1, 1.0, 0.2), mass=0.5, position=(0.5, 0.2, 0.25)),
+        dict(name="chest", shape="box", size=(0.6, 0.5, 0.7), axes=[(3.0, 1.0, 0.0), (-1.0, 3.0, 0.0)], rounding=0.2)
+        | dict(position=(0.9, 0.7, -0.2), fixed=True),
+        dict(name="drum", shape="cylinder", radius=0.3, length=0.8, axis=(1.0, -1.0, 0.2), rounding=0.2)
+        | dict(position=(0.2, 0.7, -0.15), fixed=True),
     ],
-    "Contact": [dict(stiffness=1e3), dict(stiffness=1e2, bodies=dict(wall=dict(stiffness=1e4)))],
+    "Contact": [
+        dict(stiffness=1e3),
+        dict(stiffness=1e2, bodies=dict(wall=dict(stiffness=1e4))),
+        dict(stiffness=1e3, exponent=1.5),
+        dict(stiffness=1e3, damping=0.3),
+        dict(stiffness=1e3, exponent=1.5, damping=0.1, slip_velocity=2.0, bodies=dict(ball=dict(friction=0.4))),
+        dict(stiffness=1e3, friction=0.4, slip_velocity=0.5),
+        dict(stiffness=1e3),
+        dict(stiffness=1e3, exponent=1.5, damping=0.1, friction=0.4, slip_velocity=2.0),
+    ],
     "Frame": [dict(angular_velocity=(1.0, -2.0, 3.0))],
     "Pressure": [
         dict(lines="all", normal=(1.0, 2.0, -2.0), value=30.0),
@@ -51,6 +66,7 @@ EXAMPLES = {
     ],
     "Damping": [dict(time=0.02), dict(rate=3.0)],
     "Bending": [dict(stiffness=2.0)],
+    "Link": [dict(nodes=[0, 4]), dict(nodes=[5, 4, 2, 3])],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
         dict(lines="all", factor=[(0.5, 1.0), (0.9, 1.1)]),
@@ -89,9 +105,9 @@ def example(name, i):
 
 
 def make(name, i, law):
-    """(net, system of one effect); a contact has two bodies to touch, with ends of lines and with their middles."""
+    """(net, system of one effect); a contact has bodies to touch, with ends of lines and with their middles."""
     net = skew_net(law, pieces=3 if name == "Bending" else 1)  # no line of it continues another
-    bodies = [example("Body", 0), example("Body", 1)] if name == "Contact" else []
+    bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name == "Contact" else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
 
@@ -116,6 +132,8 @@ def test_effect(name, i, law, seed):
     net, system = make(name, i, law)
     if system.drives:
         return drive(net, system)
+    if system.constraints:
+        return constraint(net, system, seed)
     if system.line_drives:
         return line_drive(name, i, law, seed)
     assert system.families
@@ -168,10 +186,15 @@ def check_family(net, system, family, seed):
         assert family.book == "work" or out[:, family.power].max() <= 0.0
 
     if family.internal:
-        position = net.points + x
+        position, moment = net.points + x, len(net.points) - net.spins
         size = np.abs(force).sum()
-        assert np.abs(force.sum(axis=0)).max() <= 1e-14 * size
-        assert np.abs(np.cross(position, force).sum(axis=0)).max() <= 1e-14 * size
+        assert np.abs(force[:moment].sum(axis=0)).max() <= 1e-14 * size
+        felt = [body for body in net.bodies if body.row in family.cells]
+        if any(body.kind != SPHERE for body in felt):
+            return  # bodies with axes, which do not turn
+        moments = np.vstack([np.cross(position, force)[:moment], force[moment:]])
+        if family.damping is None or all(body.spin is not None for body in felt):  # else the supports have a moment
+            assert np.abs(moments.sum(axis=0)).max() <= 1e-14 * size
         turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
         turn *= np.linalg.det(turn)
         moved = position @ turn.T + [3.0, -2.0, 1.0] - net.points
@@ -309,6 +332,28 @@ def drive(net, system):
             system.drive(t + h, there)
             np.testing.assert_allclose(there, here + h * v, atol=1e-15)
         assert not np.delete(here, driven.cells[:, 0], axis=0).any()
+
+
+def constraint(net, system, seed):
+    """Lengths, their two derivatives in time, and forces that do no work on what keeps them."""
+    (links,) = system.constraints
+    x, v = state(net, seed)
+    ends = net.points[links.cells]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    np.testing.assert_allclose(links.length, length, rtol=1e-15)
+    assert not links.excess(np.zeros_like(x)).any()
+    ends = (net.points + x)[links.cells]
+    now = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    np.testing.assert_allclose(links.excess(x), (now**2 - length**2) / (2.0 * length), atol=1e-15)
+    for h in (1.0, 1e-2):  # g is quadratic, so that its Taylor series ends
+        series = links.excess(x) + h * links.speed(x, v) + 0.5 * h * h * links.turning(v)
+        np.testing.assert_allclose(links.excess(x + h * v), series, atol=1e-14)
+    multipliers = np.random.default_rng(seed).standard_normal(len(length))
+    force = links.pull(x, multipliers)
+    np.testing.assert_allclose(np.sum(force * v), multipliers @ links.speed(x, v), rtol=1e-13)
+    size = np.abs(force).sum()
+    assert np.abs(force.sum(axis=0)).max() <= 1e-15 * size
+    assert np.abs(np.cross(net.points + x, force).sum(axis=0)).max() <= 1e-15 * size
 
 
 def line_drive(name, i, law, seed):

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from refweb.laws import Law
+from refweb.laws import LINEAR, SMOOTH, TENSION_ONLY, Law, above_floor, curvature
 
 mpmath.mp.dps = 60
 STRAINS = np.concatenate([s * np.logspace(-15, 0, 31) for s in (1, -1)] + [[0.0]])
@@ -49,6 +49,23 @@ def test_floor_is_the_limit_under_compression():
         alpha = (-e0 + mpmath.sqrt(e0 * e0 + 4 * n * n)) / 2
         assert abs(law.floor(7e7, slackness, smoothing) - 7e7 * alpha) <= 1e-14 * 7e7 * alpha
         assert law.stress(-1.0, 7e7, slackness, smoothing) >= -law.floor(7e7, slackness, smoothing)
+
+
+@pytest.mark.parametrize("smoothing", SMOOTHINGS)
+@pytest.mark.parametrize("slackness", SLACKNESSES)
+def test_curvature_and_height_above_the_floor(slackness, smoothing):
+    """d²σ/dε² = E (1 − s²/r²)/2r and σ + αE = E (s + r)/2, both without cancellation."""
+    n = mpmath.mpf(smoothing)
+    for strain in STRAINS[::3]:
+        s = mpmath.mpf(float(strain)) - mpmath.mpf(slackness)
+        r = mpmath.sqrt(s * s + 4 * n * n)
+        second = (1 - s * s / (r * r)) / (2 * r) if r else 0
+        assert abs(curvature(SMOOTH, strain, 3.0, slackness, smoothing) - 3 * second) <= 1e-14 * 3 * second
+        height = 3 * (s + r) / 2
+        assert abs(above_floor(SMOOTH, strain, 3.0, slackness, smoothing) - height) <= 1e-14 * height
+        assert curvature(TENSION_ONLY, strain, 3.0, 0.0, 0.0) == curvature(LINEAR, strain, 3.0, 0.0, 0.0) == 0.0
+        assert above_floor(TENSION_ONLY, strain, 3.0, 0.0, 0.0) == max(3.0 * strain, 0.0)
+        assert above_floor(LINEAR, strain, 3.0, 0.0, 0.0) == np.inf
 
 
 def test_tension_only_is_the_limit_of_the_smooth_law_and_linear_is_two_sided():

@@ -1,124 +1,28 @@
-"""Frictionless penalty contact of lines with rigid spheres.
+"""Penalty contact of lines with rigid bodies, with damping and friction where asked for.
 
-The penalty acts once per line of the web, at the line's point nearest the centre: with its distance d and the radius R
-the energy is ½ k (R − d)₊², shared by the nodes as the functions N of the element have it at that point. Contact is
-thus the same however finely a line is divided. With p the vector from the centre to that point, ξ its place on the
-element and m = ∂(p·p')/∂q, p' = ∂p/∂ξ, the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
+The penalty acts once per line of the web, at the line's point nearest the centre of a sphere: with its distance d and
+the radius R the energy is ½ k (R − d)₊², shared by the nodes as the functions N of the element have it at that point.
+Contact is thus the same however finely a line is divided. With p the vector from the centre to that point, ξ its place
+on the element and m = ∂(p·p')/∂q, p' = ∂p/∂ξ, the Hessian of ½ d² is BᵀB − m mᵀ/(|p'|² + p·p'') while 0 < ξ < 1.
+
+The kernels here are those of spheres alone. Other shapes, which touch a line wherever it lies on them, and other
+exponents are in `refweb.penalty`, damping and friction in `refweb.rubbing`.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import penalty, rubbing
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..inputs import InputError, Table, field, nearest, real
+from ..contact_points import AWAY, PENALTY, RADIUS, closest, dot, numbers, point, share, touched
+from ..inputs import InputError, Table, field, nearest, real, shown
+from ..shapes import SPHERE
 from . import Family
-
-# Columns of data; behind them stand the vectors from the centre to the cell's nodes in the web's position.
-RADIUS, PENALTY, AWAY = 0, 1, 2
-SAMPLES = 8
-"""Places on a curved element from which Newton's method may start to its nearest point."""
-
-
-@kernel()
-def point(x, cells, data, c, nodes, functions, place):
-    """p, p' and p'' at a place of cell c, from the centre."""
-    b = cells[c, nodes]
-    p0 = p1 = p2 = d0 = d1 = d2 = e0 = e1 = e2 = 0.0
-    for n in range(nodes - 1, -1, -1):
-        c0 = c1 = c2 = 0.0
-        for a in range(nodes):
-            i, weight, at = cells[c, a], functions[n * nodes + a], AWAY + 3 * a
-            c0 += weight * (data[c, at] + x[i, 0] - x[b, 0])
-            c1 += weight * (data[c, at + 1] + x[i, 1] - x[b, 1])
-            c2 += weight * (data[c, at + 2] + x[i, 2] - x[b, 2])
-        e0, e1, e2 = e0 * place + 2.0 * d0, e1 * place + 2.0 * d1, e2 * place + 2.0 * d2
-        d0, d1, d2 = d0 * place + p0, d1 * place + p1, d2 * place + p2
-        p0, p1, p2 = p0 * place + c0, p1 * place + c1, p2 * place + c2
-    return (p0, p1, p2), (d0, d1, d2), (e0, e1, e2)
-
-
-@kernel()
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel()
-def closest(x, cells, data, c, nodes, functions):
-    """(place of the point of cell c nearest the centre, its squared distance)."""
-    place = 0.0
-    if nodes == 2:
-        p, d, _ = point(x, cells, data, c, nodes, functions, 0.0)
-        square = dot(d, d)
-        if square > 0.0:
-            place = min(max(-dot(p, d) / square, 0.0), 1.0)
-    else:
-        best = math.inf
-        for n in range(SAMPLES + 1):
-            p, d, _ = point(x, cells, data, c, nodes, functions, n / SAMPLES)
-            if dot(p, p) < best:
-                best, place = dot(p, p), n / SAMPLES
-        low, high = max(place - 1.0 / SAMPLES, 0.0), min(place + 1.0 / SAMPLES, 1.0)
-        for _ in range(60):  # Newton on p·p', by bisection where it leaves the bracket
-            p, d, e = point(x, cells, data, c, nodes, functions, place)
-            slope, bent = dot(p, d), dot(d, d) + dot(p, e)
-            if slope > 0.0:
-                high = place
-            else:
-                low = place
-            step = place - slope / bent if bent > 0.0 else -1.0
-            if not low <= step <= high:
-                step = 0.5 * (low + high)
-            moved, place = abs(step - place), step
-            if moved <= 1e-15:
-                break
-    p, _, _ = point(x, cells, data, c, nodes, functions, place)
-    return place, dot(p, p)
-
-
-@kernel()
-def shape(a, nodes, functions, place):
-    """(N, N') of node a."""
-    value = slope = 0.0
-    for n in range(nodes - 1, -1, -1):
-        slope = slope * place + value
-        value = value * place + functions[n * nodes + a]
-    return value, slope
-
-
-@kernel()
-def far(x, cells, data, c, nodes):
-    """Whether the whole of cell c is certainly out of reach: its first node is, by more than twice its length."""
-    b, first, length = cells[c, nodes], 0.0, 0.0
-    for k in range(3):
-        here = data[c, AWAY + k] + x[cells[c, 0], k] - x[b, k]
-        first += here * here
-    for a in range(1, nodes):
-        line = 0.0
-        for k in range(3):
-            at = AWAY + 3 * a + k
-            along = data[c, at] - data[c, at - 3] + x[cells[c, a], k] - x[cells[c, a - 1], k]
-            line += along * along
-        length = line if nodes == 2 else length + 2.0 * math.sqrt(line)
-    if nodes > 2:
-        length = length * length
-    return first > 2.0 * (data[c, RADIUS] * data[c, RADIUS] + length)  # then |first| > radius + length
-
-
-@kernel()
-def touched(x, cells, data, first, pieces, nodes, functions):
-    """(cell of a line's cells that is nearest the centre, place, squared distance); −1 where nothing touches."""
-    nearest, where, best = -1, 0.0, math.inf
-    for c in range(first, first + pieces):
-        if not far(x, cells, data, c, nodes):
-            place, square = closest(x, cells, data, c, nodes, functions)
-            if square < best:
-                nearest, where, best = c, place, square
-    return (nearest if best < data[first, RADIUS] ** 2 else -1), where, best
 
 
 @functools.cache
@@ -150,7 +54,7 @@ def kernels(pieces, nodes, functions):
             for k in range(3):
                 pull = push * p[k] / distance
                 for a in range(nodes):
-                    f[cells[c, a], k] += shape(a, nodes, functions, place)[0] * pull
+                    f[cells[c, a], k] += share(a, nodes, functions, place)[0] * pull
                 f[cells[c, nodes], k] -= pull
 
     @kernel(ENERGY)
@@ -166,7 +70,7 @@ def kernels(pieces, nodes, functions):
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         size = 3 * nodes + 3
-        gradient, mixed, share = np.empty(size), np.empty(size), np.empty(nodes + 1)
+        gradient, mixed, shares = np.empty(size), np.empty(size), np.empty(nodes + 1)
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             c, place, square = touched(x, cells, data, first, pieces, nodes, functions)
@@ -175,8 +79,8 @@ def kernels(pieces, nodes, functions):
             p, d, e = point(x, cells, data, c, nodes, functions, place)
             distance, bent = math.sqrt(square), dot(d, d) + dot(p, e)
             for a in range(nodes + 1):
-                value, slope = shape(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
-                share[a] = value
+                value, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+                shares[a] = value
                 for k in range(3):
                     gradient[3 * a + k] = value * p[k] / distance
                     mixed[3 * a + k] = value * d[k] + slope * p[k]
@@ -189,7 +93,7 @@ def kernels(pieces, nodes, functions):
                     if inside:
                         value += curved * mixed[r] * mixed[s] / bent
                     if r % 3 == s % 3:
-                        value -= curved * share[r // 3] * share[s // 3]
+                        value -= curved * shares[r // 3] * shares[s // 3]
                     blocks[c, r, s] = value
 
     @kernel(BOUND)
@@ -237,11 +141,21 @@ def kernels(pieces, nodes, functions):
     return force, energy, stiffness, bound
 
 
+def _exponent(name, value):
+    if isinstance(value, bool) or value not in (1, 1.5):
+        raise InputError(f"{name} = {shown(value)} must be 1 or 1.5")
+    return float(value)
+
+
 @dataclass(frozen=True, kw_only=True)
 class BodyContact(Table):
-    """What differs for one body."""
+    """What differs for one body; the keys are those of `Contact`."""
 
-    stiffness: float = real(above=0, unit="N/m")
+    stiffness: float | None = real(None, above=0, unit="N/m")
+    exponent: float | None = field(_exponent, None)
+    damping: float | None = real(None, at_least=0, unit="s/m")
+    friction: float | None = real(None, at_least=0)
+    slip_velocity: float | None = real(None, above=0, unit="m/s")
 
 
 def _bodies(name, value):
@@ -257,36 +171,82 @@ class Contact(Table):
     Parameters
     ----------
     stiffness : float
-        Penalty stiffness of each line's contact [N/m].
+        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent.
+    exponent : {1, 1.5}
+        p of the push k δ^p at the depth δ.
+    damping : float
+        d of Hunt and Crossley [s/m]: a push of k δ^p (1 + d δ̇), never a pull. A body that comes with a small velocity
+        v is thrown back with 1 − 2/3 d v of it.
+    friction : float
+        Coefficient of friction μ. Free bodies that are spheres or rings are turned by it.
+    slip_velocity : float
+        Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous.
     bodies : dict of str to BodyContact
-        Stiffness that differs for a body.
+        What differs for a body.
     """
 
     stiffness: float = real(above=0, unit="N/m")
+    exponent: float = field(_exponent, 1.0)
+    damping: float = real(0.0, at_least=0, unit="s/m")
+    friction: float = real(0.0, at_least=0)
+    slip_velocity: float = real(1e-3, above=0, unit="m/s")
     bodies: dict = field(_bodies, factory=dict)
 
+    def _of(self, body, key):
+        own = getattr(self.bodies.get(body.name), key, None)
+        return getattr(self, key) if own is None else own
+
+    def extend(self, net):
+        """The net with a row of rotation for each free body that friction turns."""
+        turned = [body.name for body in net.bodies if not body.fixed and self._of(body, "friction") > 0.0]
+        for body in net.bodies:
+            if any(body.angular_velocity) and body.name not in turned:
+                raise InputError(f'friction = 0 of body "{body.name}", which turns: friction > 0 alone feels it')
+        rows = {name: len(net.points) + i for i, name in enumerate(turned)}
+        return replace(
+            net,
+            points=np.vstack([net.points, np.zeros((len(turned), 3))]),
+            mass=np.concatenate([net.mass, [body.inertia for body in net.bodies if body.name in turned]]),
+            bodies=tuple(replace(body, spin=rows.get(body.name)) for body in net.bodies),
+            spins=net.spins + len(turned),
+        )
+
     def on(self, net):
-        """The family of all pairs of a line and a body; ``out`` is the contact force [N]."""
+        """The families of all pairs of a line and a body, of one kind each; ``out`` is the contact force [N], or the
+        power of what is lost [W]."""
         names = [body.name for body in net.bodies]
         if not names:
             raise InputError("there is no [[body]] that the web could touch: add one")
         for name in self.bodies:
             if name not in names:
                 raise InputError(f'bodies."{name}" is no body, {nearest(name, names)}')
-        along = net.cells[:, net.along]
-        nodes = along.shape[1]
         functions = np.linalg.inv(np.vander(np.sort(net.places), increasing=True))
-        force, energy, stiffness, bound = kernels(net.subdivide, nodes, tuple(functions.ravel().tolist()))
-        cells, data = [], []
+        element = net.subdivide, net.order + 1, tuple(functions.ravel().tolist())
+        pressed, rubbed = {}, {}
         for body in net.bodies:
-            own = self.bodies.get(body.name, self).stiffness
-            relative = (net.points[along] - net.points[body.row]).reshape(len(along), -1)
-            cells.append(np.column_stack([along, np.full(len(along), body.row)]))
-            data.append(np.column_stack([np.full((len(along), 2), (body.radius, own)), relative]))
+            plain = body.kind == SPHERE and self._of(body, "exponent") == 1.0
+            pressed.setdefault(plain, []).append(body)
+            if self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0:
+                rubbed.setdefault(int(body.spin is not None), []).append(body)
+        families = [self._pressed(net, element, plain, bodies) for plain, bodies in pressed.items()]
+        return families + [self._rubbed(net, element, spins, bodies) for spins, bodies in rubbed.items()]
+
+    def _numbers(self, net, bodies, spins=0):
+        """Cells and data of every element with each of some bodies, ``spins`` of 1 with their rotations."""
+        along = net.cells[:, net.along]
+        keys = ("stiffness", "exponent", "damping", "friction", "slip_velocity")
+        rows = [[body.row, body.spin][: 1 + spins] for body in bodies]
+        cells = [np.hstack([along, np.tile(row, (len(along), 1))]) for row in rows]
+        data = [numbers(body, along, net.points, *(self._of(body, key) for key in keys)) for body in bodies]
+        return np.ascontiguousarray(np.vstack(cells), dtype=np.int32), np.ascontiguousarray(np.vstack(data))
+
+    def _pressed(self, net, element, plain, bodies):
+        force, energy, stiffness, bound = (kernels if plain else penalty.kernels)(*element)
+        cells, data = self._numbers(net, bodies)
         return Family(
             name="contact",
-            cells=np.ascontiguousarray(np.vstack(cells), dtype=np.int32),
-            data=np.ascontiguousarray(np.vstack(data)),
+            cells=cells,
+            data=np.ascontiguousarray(data[:, : AWAY + 3 * element[1]]) if plain else data,
             force=force,
             energy=energy,
             stiffness=stiffness,
@@ -294,4 +254,25 @@ class Contact(Table):
             book="contact_energy",
             observed=1,
             internal=True,
+        )
+
+    def _rubbed(self, net, element, spins, bodies):
+        force, stiffness, bound, damping, damping_bound = rubbing.kernels(*element, spins)
+        cells, data = self._numbers(net, bodies, spins)
+        return Family(
+            name="contact",
+            cells=cells,
+            data=data,
+            force=force,
+            energy=None,
+            stiffness=stiffness,
+            bound=bound,
+            book="dissipated_energy",
+            observed=1,
+            power=0,
+            damping=damping,
+            damping_bound=damping_bound,
+            internal=True,
+            symmetric=False,
+            at_rest=False,
         )

@@ -11,7 +11,8 @@ with p = dx/dξ, l = |p| and t = p/l a quadrature point has
     damping of (a, b)       w dN_a/dξ dN_b/dξ (∂N/∂ε̇)/L t⊗t
     stiffness of (a, b)     w dN_a/dξ dN_b/dξ [(∂N/∂ε)/L t⊗t + (N/l)(I − t⊗t) + (∂N/∂ε̇)/(L l) t⊗(v' − (t·v') t)]
 
-and the power −w L N ε̇ ≤ 0. Where a line of a law without smoothing snaps taut, its force jumps.
+and the power −w L N ε̇ ≤ 0. Natural lengths that change add nothing to ε̇. Where a line of a law without smoothing snaps
+taut, its force jumps, and central differences are of order 1 across it.
 """
 
 from __future__ import annotations
@@ -32,28 +33,31 @@ TIME = REFERENCE + 4
 
 
 @kernel()
-def stretching(x, v, cells, data, c, q, nodes, gradients):
-    """(dx/dξ, 1/|dx/dξ| or 0, ε, dv/dξ, ε̇) at quadrature point q of cell c."""
-    p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, gradients)
+def gradient(v, cells, c, q, nodes, gradients):
+    """dv/dξ at quadrature point q of cell c."""
     v0 = v1 = v2 = 0.0
     for a in range(nodes):
         row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]
         v0 += d * v[row, 0]
         v1 += d * v[row, 1]
         v2 += d * v[row, 2]
-    rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / data[c, LENGTH]
-    return (p0, p1, p2), inverse, e, (v0, v1, v2), rate
+    return v0, v1, v2
 
 
 @kernel()
-def viscous(law, e, rate, data, c):
-    """(N, ∂N/∂ε, ∂N/∂ε̇) of cell c [N, N, N s]."""
-    axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, TIME]
+def viscous(law, e, rate, time, axial, slack, smooth):
+    """N [N]."""
+    pull, least = time * rate * tangent(law, e, axial, slack, smooth), -above_floor(law, e, axial, slack, smooth)
+    return max(pull, least)
+
+
+@kernel()
+def slopes(law, e, rate, time, axial, slack, smooth):
+    """(∂N/∂ε [N], ∂N/∂ε̇ [N s])."""
     slope = tangent(law, e, axial, slack, smooth)
-    pull, least = time * slope * rate, -above_floor(law, e, axial, slack, smooth)
-    if pull < least:
-        return least, -slope, 0.0
-    return pull, time * rate * curvature(law, e, axial, slack, smooth), time * slope
+    if time * rate * slope < -above_floor(law, e, axial, slack, smooth):
+        return -slope, 0.0
+    return time * rate * curvature(law, e, axial, slack, smooth), time * slope
 
 
 @functools.cache
@@ -77,9 +81,11 @@ def kernels(law, gradients, weights):
         for c in range(cells.shape[0]):
             largest = power = 0.0
             for q in range(points):
-                p, inverse, e, _, rate = stretching(x, v, cells, data, c, q, nodes, flat)
-                pull, _, _ = viscous(law, e, rate, data, c)
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+                v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
+                rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / data[c, LENGTH]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
+                pull = viscous(law, e, rate, data[c, TIME], axial, slack, smooth)
                 tension = pull + prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if q == 0 or tension > largest:
                     largest = tension
@@ -87,9 +93,9 @@ def kernels(law, gradients, weights):
                 s = weights[q] * pull * inverse
                 for a in range(nodes):
                     row, d = np.uint64(cells[c, a]), s * flat[q * nodes + a]
-                    f[row, 0] -= d * p[0]
-                    f[row, 1] -= d * p[1]
-                    f[row, 2] -= d * p[2]
+                    f[row, 0] -= d * p0
+                    f[row, 1] -= d * p1
+                    f[row, 2] -= d * p2
             out[c, 0] = largest
             out[c, 2] = power
 
@@ -99,30 +105,35 @@ def kernels(law, gradients, weights):
         if definite:
             return
         for c in range(cells.shape[0]):
+            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, TIME]
             for q in range(points):
-                p, inverse, e, w, rate = stretching(x, v, cells, data, c, q, nodes, flat)
-                pull, by_strain, by_rate = viscous(law, e, rate, data, c)
-                natural, across = data[c, LENGTH], weights[q] * pull * inverse
-                along, turn = weights[q] * by_strain / natural, weights[q] * by_rate * inverse / natural
-                speed = rate * natural
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+                w = gradient(v, cells, c, q, nodes, flat)
+                p, speed = (p0 * inverse, p1 * inverse, p2 * inverse), (p0 * w[0] + p1 * w[1] + p2 * w[2]) * inverse
+                rate, share = speed / data[c, LENGTH], weights[q] / data[c, LENGTH]
+                by_strain, by_rate = slopes(law, e, rate, time, axial, slack, smooth)
+                across = weights[q] * viscous(law, e, rate, time, axial, slack, smooth) * inverse
+                along, turn = share * by_strain - across, share * by_rate * inverse
                 for i in range(3):
                     for j in range(3):
-                        ti, tj = p[i] * inverse, p[j] * inverse
-                        value = (along - across) * ti * tj + turn * ti * (w[j] - speed * tj)
+                        value = p[i] * (along * p[j] + turn * (w[j] - speed * p[j]))
                         if i == j:
                             value += across
                         for a in range(nodes):
                             for b in range(nodes):
-                                d = flat[q * nodes + a] * flat[q * nodes + b]
-                                blocks[c, 3 * a + i, 3 * b + j] += d * value
+                                blocks[c, 3 * a + i, 3 * b + j] += flat[q * nodes + a] * flat[q * nodes + b] * value
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
+            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, TIME]
             for q in range(points):
-                p, inverse, e, _, rate = stretching(x, v, cells, data, c, q, nodes, flat)
-                along = weights[q] * viscous(law, e, rate, data, c)[2] / data[c, LENGTH] * inverse * inverse
+                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+                w = gradient(v, cells, c, q, nodes, flat)
+                p = (p0 * inverse, p1 * inverse, p2 * inverse)
+                rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / data[c, LENGTH]
+                along = weights[q] / data[c, LENGTH] * slopes(law, e, rate, time, axial, slack, smooth)[1]
                 for a in range(nodes):
                     for b in range(nodes):
                         d = along * flat[q * nodes + a] * flat[q * nodes + b]

@@ -1,0 +1,333 @@
+"""Bending: cantilever, elastica, buckling and vibration of a chain with torsion springs, and where it has springs."""
+
+from dataclasses import replace
+
+import mpmath
+import nets
+import numpy as np
+import pytest
+import scipy.linalg
+from nets import skew_cable, skew_web
+from scipy.optimize import brentq
+
+import refweb
+from refweb import lines
+from refweb.central_difference import CentralDifference
+from refweb.cvode import Cvode
+from refweb.effects.bending import Bending, springs
+from refweb.ida import Ida
+from refweb.inputs import InputError
+from refweb.system import System
+
+
+def slope(errors, steps):
+    return np.polyfit(np.log(steps), np.log(errors), 1)[0]
+
+
+def chain(count, length=1.0, start=0.0, **web):
+    """Elements along x that have a length together."""
+    points = [[start + length * i / count, 0.0, 0.0] for i in range(count + 1)]
+    return refweb.Inline(points=points, lines=[[i, i + 1] for i in range(count)], **web)
+
+
+def bar(axial=1e6, **cable):
+    return refweb.Cable(**{**dict(law="linear", modulus=axial, area=1.0, density=1.0), **cable})
+
+
+def cantilever(count, load, axial=1e6, **static):
+    """A beam of B = 1 and length 1, of ``count`` elements and a half, clamped by a supported element."""
+    size = 1.0 / (count + 0.5)
+    scene = refweb.Scene(
+        web=chain(count + 1, size * (count + 1), -0.5 * size, supports=[0, 1]),
+        cable=bar(axial),
+        effects=[refweb.Bending(stiffness=1.0), refweb.Load(node=count + 1, force=(0.0, 0.0, load))],
+        solve=refweb.Static(**static),
+        observe=[refweb.Observe(name="bent", quantity="bending_energy")],
+    )
+    solution = refweb.run(scene)
+    assert solution.status == "solved"
+    return solution
+
+
+def test_cantilever_under_a_small_load():
+    """Springs of k = B/h at distances m h from the tip turn by P m h/k each: w = P h³/B Σ m² = PL³/3B − O(h²)."""
+    load, errors = 1e-6, []
+    counts = np.array([4, 8, 16, 32])
+    for count in counts:
+        solution, size = cantilever(count, load), 1.0 / (count + 0.5)
+        deflection = solution.displacement[-1, 2]
+        squares = count * (count + 1) * (2 * count + 1) / 6
+        np.testing.assert_allclose(deflection, load * size**3 * squares, rtol=1e-9)  # less what is of order load²
+        np.testing.assert_allclose(solution.results["bent"].value, 0.5 * load * deflection, rtol=1e-9)
+        errors.append(abs(deflection - load / 3.0))
+    assert abs(slope(errors, 1.0 / (counts + 0.5)) - 2.0) < 1e-3
+
+
+def test_relaxation_finds_the_same():
+    pair = [cantilever(3, 1.0, axial=1e2, method=method).displacement for method in ("newton", "relaxation")]
+    np.testing.assert_allclose(*pair, atol=1e-7)  # residuals are below 1e-9 of the largest force, flexibilities below 1
+
+
+def elastica(load):
+    """(deflection, height of the tip) of a cantilever of B = L = 1 under a tip load.
+
+    K. E. Bisshopp, D. C. Drucker, "Large deflection of cantilever beams", Q. Appl. Math. 3 (1945) 272–275.
+    """
+
+    def modulus(tip):
+        k = mpmath.sqrt((1 + mpmath.sin(tip)) / 2)
+        return k * k, mpmath.asin(1 / (k * mpmath.sqrt(2)))
+
+    def excess(tip):
+        m, phi = modulus(tip)
+        return float(mpmath.ellipk(m) - mpmath.ellipf(phi, m) - mpmath.sqrt(load))
+
+    tip = brentq(excess, 1e-6, np.pi / 2 - 1e-9, xtol=1e-14)
+    m, phi = modulus(tip)
+    deflection = 1 - 2 / mpmath.sqrt(load) * (mpmath.ellipe(m) - mpmath.ellipe(phi, m))
+    return float(deflection), float(mpmath.sqrt(2 * mpmath.sin(tip) / load))
+
+
+@pytest.mark.parametrize("load, table", [(1.0, (0.30172, 0.05643)), (10.0, (0.81061, 0.55500))])
+def test_elastica(load, table):
+    """Table I of K. Mattiasson, Int. J. Numer. Meth. Eng. 17 (1981) 145–153, and order 2 towards it."""
+    deflection, height = elastica(load)
+    np.testing.assert_allclose([deflection, 1.0 - height], table, atol=6e-6)
+    counts, errors = np.array([8, 16, 32]), []
+    for count in counts:
+        tip = cantilever(count, load).positions[-1]
+        errors.append(np.hypot(tip[2] - deflection, tip[0] - height))
+    assert abs(slope(errors, 1.0 / (counts + 0.5)) - 2.0) < 0.1 and errors[-1] < 1e-3
+
+
+@pytest.mark.parametrize("count", [2, 3, 10])
+def test_buckling(count):
+    """A column with hinged ends: P w_j = k θ_j with θ = −Δ²w/a has w_j = sin(πj/n) at P = 4 (k/a) sin²(π/2n).
+
+    k = B/L holds the natural length, a = L (1 − P/EA) is compressed. Between P (1 − 1e-6) and P (1 + 1e-6) the straight
+    column loses its stability: the smallest pivot changes sign.
+    """
+    axial = 1e3
+    euler = 4.0 * count**2 * np.sin(np.pi / (2 * count)) ** 2
+    critical = 0.5 * axial * (1.0 - np.sqrt(1.0 - 4.0 * euler / axial))
+    for load, sign in [(critical * (1.0 - 1e-6), 1), (critical * (1.0 + 1e-6), -1)]:
+        scene = refweb.Scene(
+            web=chain(count, supports=[]),
+            cable=bar(axial),
+            support=[refweb.Supports(nodes=[0]), refweb.Supports(nodes=[count], components=["y", "z"])],
+            effects=[refweb.Bending(stiffness=1.0), refweb.Load(node=count, force=(-load, 0.0, 0.0))],
+            solve=refweb.Static(),
+        )
+        assert refweb.run(scene).solver["smallest_pivot"] == sign
+
+
+def beam(count):
+    """A simply supported beam of B = μ = L = 1, its frequency by the difference formula, and its first mode."""
+    system = nets.system(chain(count, supports=[0, count]).web(), bar(1e3), [Bending(stiffness=1.0)], False)
+    omega = 4.0 * count**2 * np.sin(np.pi / (2 * count)) ** 2
+    return system, omega, np.sin(np.pi * np.arange(count + 1) / count)[:, None] * [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("method", [Cvode, Ida])
+def test_frequency_by_implicit_steps(method):
+    system, omega, shape = beam(8)
+    small, end = 1e-6, 2.3 * np.pi / omega
+    solver = method(system, rtol=1e-7, atol_position=1e-7 * small / omega, atol_velocity=1e-7 * small)
+    run = solver.start(v=small * shape)
+    solver.rows(run, [end])
+    # BDF of order 2 leaves a few hundred times its tolerance after a period.
+    np.testing.assert_allclose(run.x, small / omega * np.sin(omega * end) * shape, atol=3e-4 * small / omega)
+    assert run.drift < 1e-4
+
+
+def test_frequency():
+    """Of order 2 in the step towards that of the chain, 4 (k/m a²)^½ sin²(π/2n), and in the element to π² √(B/μ)/L²."""
+    small = 1e-6
+    system, omega, shape = beam(8)
+    safeties, errors, drifts, end = (0.8, 0.4, 0.2, 0.1), [], [], 2.3 * np.pi / omega
+    for safety in safeties:
+        solver = CentralDifference(system, safety=safety)
+        run = solver.start(v=small * shape)
+        solver.rows(run, [end])
+        errors.append(np.abs(run.x - small / omega * np.sin(omega * end) * shape).max())
+        drifts.append(run.drift)
+    assert abs(slope(errors, safeties) - 2.0) < 0.05 and abs(slope(drifts, safeties) - 2.0) < 0.05
+    counts, errors, end = np.array([12, 24, 48]), [], 0.75
+    for count in counts:
+        system, _, shape = beam(count)
+        solver = CentralDifference(system, safety=0.2)
+        run = solver.start(v=small * shape)
+        solver.rows(run, [end])
+        errors.append(np.abs(run.x - small / np.pi**2 * np.sin(np.pi**2 * end) * shape).max())
+    assert abs(slope(errors, 1.0 / counts) - 2.0) < 0.05
+
+
+def test_bound_of_a_straight_chain():
+    """2/ω with m ω² = 4 EA/a + 16 B/a³ at the nodes whose neighbours have springs too."""
+    count, axial = 10, 1e3
+    bound = CentralDifference(beam(count)[0]).bound()
+    stiffness = 4.0 * axial * count + 16.0 * count**3
+    np.testing.assert_allclose(bound, 2.0 / np.sqrt(stiffness * count), rtol=1e-12)
+
+
+def skew_system(seed, pieces=3, size=0.1):
+    """A branching net of divided lines, in a state with turns of up to two rad."""
+    net = lines.build(skew_web(), replace(skew_cable("linear"), subdivide=pieces))
+    rng = np.random.default_rng(seed)
+    net = replace(net, mass=10.0 ** rng.uniform(-3, 0, len(net.mass)))
+    system = System(net, [Bending(stiffness=2.0)], np.zeros((len(net.points), 3), dtype=bool))
+    return system, size * rng.standard_normal(net.points.shape)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.02, 0.1, 0.3])
+def test_bound_bounds(size):
+    for seed in range(5):
+        system, x = skew_system(seed, size=size)
+        K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+        largest = scipy.linalg.eigvalsh(K, np.diag(np.repeat(system.net.mass, 3)))[-1]
+        assert CentralDifference(system).bound(x, reach=0.0) <= 2.0 / np.sqrt(largest) * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-8, 1e-3, 0.0316, 0.0317, 0.5, 1.6, 2.5, 3.1, 3.1415])
+def test_tangent_at_every_angle(angle):
+    """Energy and its first two derivatives along a line, against mpmath."""
+    net = lines.build(chain(2, 2.0, supports=[]).web(), bar())
+    system = System(net, [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool))
+    turned = np.array([[0.0, 0.0, 0.0], [0.7, 0.0, 0.0], [0.7 + 1.3 * np.cos(angle), 0.0, 1.3 * np.sin(angle)]])
+    x, rng = turned - net.points, np.random.default_rng(7)
+    d = rng.standard_normal((3, 3))
+
+    def energy(h):
+        p = [
+            [mpmath.mpf(float(net.points[i, k])) + float(x[i, k]) + h * float(d[i, k]) for k in range(3)]
+            for i in (0, 1, 2)
+        ]
+        a, b = ([p[i + 1][k] - p[i][k] for k in range(3)] for i in (0, 1))
+        n = [a[k - 2] * b[k - 1] - a[k - 1] * b[k - 2] for k in range(3)]
+        sine, cosine = mpmath.sqrt(sum(c * c for c in n)), sum(u * w for u, w in zip(a, b, strict=True))
+        return mpmath.mpf(3) / 2 * mpmath.atan2(sine, cosine) ** 2
+
+    with mpmath.workdps(40):
+        value, first, second = (float(mpmath.diff(energy, 0, n, h=mpmath.mpf("1e-12"))) for n in (0, 1, 2))
+    K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+    # Rounding of the turned positions, which the reference has as well, is 1e-16; near a fold it is over sin θ.
+    folded = 1.0 / max(np.sin(angle), 0.1)
+    np.testing.assert_allclose(system.energy(0.0, x), value, rtol=1e-14, atol=1e-30)
+    np.testing.assert_allclose(-(system.force(0.0, x) * d).sum(), first, rtol=1e-13 * folded, atol=1e-15)
+    np.testing.assert_allclose(d.ravel() @ K @ d.ravel(), second, rtol=1e-12 * folded**2)
+    np.testing.assert_allclose(K, K.T, atol=1e-13 * np.abs(K).max())
+
+
+def test_a_fold_is_finite():
+    """½ (B/L̄) π² where a line is folded back onto itself, or an element has no length; forces B π/(L̄ |a|) beside it."""
+    net = lines.build(chain(2, 2.0, supports=[]).web(), bar())
+    system = System(net, [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool))
+    fold = np.array([[0.0] * 3, [0.0] * 3, [-1.5, 0.0, 0.0]])
+    np.testing.assert_allclose(system.energy(0.0, fold), 1.5 * np.pi**2, rtol=1e-15)
+    beside = fold + [[0.0] * 3, [0.0] * 3, [0.0, 1e-9, 0.0]]
+    np.testing.assert_allclose(system.force(0.0, beside)[0], [0.0, -3.0 * np.pi, 0.0], atol=1e-6)
+    np.testing.assert_allclose(system.force(0.0, beside)[2], [0.0, 6.0 * np.pi, 0.0], atol=1e-6)
+    for x in (fold, np.array([[1.0, 0.0, 0.0], [0.0] * 3, [0.0] * 3])):
+        for definite in (False, True):
+            assert np.isfinite(system.stiffness(0.0, x, definite=definite)).all()
+        assert np.isfinite(system.force(0.0, x)).all() and np.isfinite(system.energy(0.0, x))
+
+
+def test_tiny_deflections_keep_their_digits():
+    """(k/L²) (1, −2, 1) of the force at a deflection of 1e-17 m, where positions of a metre end at 1e-16."""
+    net = lines.build(chain(2, 2.0, supports=[]).web(), bar())
+    system = System(net, [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool))
+    x = np.zeros((3, 3))
+    x[1, 2] = 1e-17
+    np.testing.assert_allclose(system.force(0.0, x)[:, 2], 6e-17 * np.array([1.0, -2.0, 1.0]), rtol=1e-14)
+
+
+@pytest.mark.parametrize("mesh, through", [("square", 2), ("triangle", 3)])
+@pytest.mark.parametrize("pieces", [1, 3])
+def test_springs_of_webs(mesh, through, pieces):
+    """Lines run on through every node that has all of its lines, and within each divided line."""
+    web = refweb.Window(mesh=mesh, rows=6, columns=6, side=0.2).web()
+    net = lines.build(web, refweb.Cable(modulus=7e7, area=1e-4, density=1.0, subdivide=pieces))
+    rows, elements = springs(net)
+    inner = np.bincount(rows[:, 1], minlength=len(net.points))
+    full = np.bincount(web.lines.ravel()) == 2 * through
+    assert full.sum() > 10 and (inner[: len(web.points)][full] == through).all()
+    assert (inner[len(web.points) :] == 1).all() and inner[len(web.points) :].size == (pieces - 1) * len(web.lines)
+    ends = np.sort(net.cells[elements].reshape(-1, 4), axis=1)
+    assert all(set(e) == set(r) for e, r in zip(ends.tolist(), rows.tolist(), strict=True))
+    straight = rows[full[np.minimum(rows[:, 1], len(full) - 1)] | (rows[:, 1] >= len(full))]
+    a, b = (net.points[straight[:, i + 1]] - net.points[straight[:, i]] for i in (0, 1))
+    assert np.abs(np.cross(a, b)).max() < 1e-15
+
+
+def ring(count):
+    angle = 2.0 * np.pi * np.arange(count) / count
+    points = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)]).tolist()
+    return refweb.Inline(points=points, lines=[[i, (i + 1) % count] for i in range(count)], supports=[])
+
+
+def star(*degrees):
+    """Lines from node 0 at angles from −x: the first ends there."""
+    angles = np.radians(degrees)
+    points = [[0.0, 0.0, 0.0], *np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles]).tolist()]
+    return refweb.Inline(points=points, lines=[[0, i + 1] for i in range(len(degrees))], supports=[])
+
+
+@pytest.mark.parametrize(
+    "web, expected",
+    [
+        (ring(12), 12),  # 30° exactly
+        (star(180.0, 15.0, -15.0), {(1, 2), (1, 3)}),  # a fork: each branch continues the stem
+        (star(180.0, 5.0, -20.0), {(1, 2), (1, 3)}),
+        (star(180.0, 0.0, 190.0, 10.0), {(1, 2), (3, 4)}),  # two lines that cross at 10°
+        (star(180.0, 31.0, 0.0), {(1, 3)}),
+    ],
+)
+def test_every_end_takes_the_line_that_continues_it_best(web, expected):
+    rows, _ = springs(lines.build(web.web(), bar()))
+    if isinstance(expected, int):
+        assert len(rows) == expected
+    else:
+        assert {tuple(sorted(pair)) for pair in rows[:, [0, 2]].tolist()} == expected and len(rows) == len(expected)
+
+
+def test_stiffness_is_over_the_mean_length():
+    points = [[0, 0, 0], [1, 0, 0], [4, 0, 0]]
+    web = refweb.Inline(points=points, lines=[[0, 1], [1, 2]], natural_length=[1.5, 2.5], supports=[])
+    (family,) = System(lines.build(web.web(), bar()), [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool)).families
+    np.testing.assert_array_equal(family.data[:, 0], [1.5])
+
+
+def test_free_beam_keeps_momentum_and_energy():
+    """Bent far and thrown, as a rod of many springs: book of order 2, angular momentum kept."""
+    web, rng = chain(8, supports=[]).web(), np.random.default_rng(3)
+    held = np.zeros((9, 3), dtype=bool)
+    system = nets.system(web, bar(100.0), [Bending(stiffness=0.1)], False, held)
+    angle = np.linspace(0.0, 1.5 * np.pi, 9)[:, None]
+    x = np.hstack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle]) / (1.5 * np.pi) - web.points
+    v, mass = rng.standard_normal((9, 3)), system.net.mass[:, None]
+    drifts, safeties = [], (0.2, 0.1, 0.05, 0.025)
+    for safety in safeties:
+        solver = CentralDifference(system, safety=safety)
+        run = solver.start(x, v)
+        solver.rows(run, np.linspace(0.0, 0.5, 11)[1:])
+        before, after = (np.cross(web.points + u, mass * w).sum(axis=0) for u, w in ((x, v), (run.x, run.v)))
+        np.testing.assert_allclose(after, before, atol=1e-12)
+        drifts.append(run.drift)
+    assert abs(slope(drifts, safeties) - 2.0) < 0.1
+
+
+def test_refusals():
+    square = refweb.Window(mesh="square", rows=4, columns=4, side=0.2)
+    hexagon = refweb.Window(mesh="hexagon", rows=4, columns=4, side=0.2)
+    cable = refweb.Cable(modulus=7e7, area=1e-4, density=1.0)
+    scene = refweb.Scene(web=hexagon, cable=cable, effects=[Bending(stiffness=1.0)])
+    with pytest.raises(InputError, match=r"\[bending\] stiffness = 1 bends nothing: no line .* subdivide > 1"):
+        scene.build()
+    scene.replace(cable=replace(cable, subdivide=2)).build()
+    with pytest.raises(
+        InputError, match=r"\[bending\] stiffness = 1 needs \[cable\] order = 1, not 2: .*subdivide = 2"
+    ):
+        scene.replace(web=square, cable=replace(cable, order=2)).build()
+    with pytest.raises(InputError, match=r"stiffness = 0.0 must be > 0 \[N·m²\]"):
+        Bending(stiffness=0)
