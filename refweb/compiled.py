@@ -18,7 +18,9 @@ all its digits, which it loses when positions are the unknowns.
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
 
 Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at
-the file a function stands in, and would go on using a kernel whose law, in another file, has changed.
+the file a function stands in, and would go on using a kernel whose law, in another file, has changed. It also finds the
+machine code of kernels in typed lists by name: kernels of one factory, which differ in the numbers that they capture,
+are named after these.
 """
 
 from __future__ import annotations
@@ -81,6 +83,14 @@ def _compile(decorator, function):
         numba.config.CACHE_DIR = default
 
 
+def _named(function):
+    """A function whose name tells apart what it captures."""
+    if function.__closure__:
+        captured = repr([cell.cell_contents for cell in function.__closure__])
+        function.__qualname__ += "_" + hashlib.sha256(captured.encode()).hexdigest()[:16]
+    return function
+
+
 def kernel(signature=None, **options):
     """Compile a function, at once where a signature is given, and keep its machine code on disk.
 
@@ -88,7 +98,7 @@ def kernel(signature=None, **options):
     """
     arguments = () if signature is None else (signature,)
     options = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
-    return lambda function: _compile(numba.njit(*arguments, **options), function)
+    return lambda function: _compile(numba.njit(*arguments, **options), _named(function))
 
 
 def ufunc(signatures):

@@ -127,7 +127,7 @@ class Implicit:
         times = [t for part in (*families, *system.drives, *system.line_drives) for t in part.times]
         self._breaks = np.unique(np.array(times, dtype=float))
         self._thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
-        self._wrong = None  # time and force of an evaluation of this step that is not finite
+        self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a solver brings
 

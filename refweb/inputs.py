@@ -35,7 +35,10 @@ def nearest(name, known):
     """The part of a message that helps with an unknown name: the nearest valid one, else all of them."""
     known = [str(k) for k in known]
     close = _close(name, known)
-    return f'did you mean "{close}"?' if close else "known: " + ", ".join(known)
+    if close:
+        return f'did you mean "{close}"?'
+    listed = ", ".join(known)
+    return "known: " + (listed if len(listed) <= 150 else listed[:150].rpartition(", ")[0] + ", ...")
 
 
 def _close(name, known):

@@ -37,6 +37,8 @@ from .contact_points import (
 )
 from .shapes import SPHERE
 
+SHALLOW = 0.01
+"""By how much a contact of a body is taken to deepen at most where that costs much, over the body's thickness."""
 SPREAD = 2.5
 """Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
 
@@ -88,11 +90,11 @@ def lightness(mass, cells, c, nodes):
 
 
 @kernel()
-def foreseen(share_of, reach, speed, x, mass, cells, data, c, nodes, functions):
+def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
     """(depth that a cell may come to [m], length of its slope there [m]); a depth of 0 where it stays out of reach.
 
-    It goes no deeper than ``reach`` and the energy of what meets at this speed allow, and by no more than a share of
-    the body's thickness.
+    It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, no more than
+    `SHALLOW` thicknesses, and not beyond twice the depth at which it already is.
     """
     own, body = 0.0, mass[cells[c, nodes]]
     place, deep = deepest(x, cells, data, c, nodes, functions)
@@ -106,7 +108,9 @@ def foreseen(share_of, reach, speed, x, mass, cells, data, c, nodes, functions):
         return 0.0, length
     for a in range(nodes):
         own += mass[cells[c, a]]
-    more = min(0.5 * reach, share_of * thickness(data, c, nodes))
+    more = min(0.5 * reach, thickness(data, c, nodes))
+    if not careful:
+        more = min(more, SHALLOW * thickness(data, c, nodes), deep if deep > 0.0 else math.inf)
     if speed > 0.0:
         own = own * body / (own + body) if body > 0.0 else own
         power = data[c, AWAY + 3 * nodes + POWER] + 1.0
@@ -188,7 +192,7 @@ def kernels(pieces, nodes, functions):
     def bound(reach, speed, x, mass, rates, cells, data):
         scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
         for c in range(cells.shape[0]):
-            deep, length = foreseen(1.0, reach, speed, x, mass, cells, data, c, nodes, functions)
+            deep, length = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
             if deep <= 0.0:
                 continue
             steep = scale * data[c, PENALTY] * lowered(data, c, nodes, deep)

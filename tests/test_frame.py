@@ -228,9 +228,10 @@ SOLVERS = {
     "ida": (Ida, dict(linear_solver="dense")),
     "ida block": (Ida, dict(linear_solver="block")),
 }
-TOLERANCE = 1e-8
-"""Relative tolerance of SUNDIALS here; what is left at the end is below `LEFT`, from all steps together."""
-LEFT = 1e-4
+TOLERANCE = 1e-6
+"""Relative tolerance of SUNDIALS here."""
+LEFT = 1e-3
+"""Error of all steps together: a thousand of 1e-6 at most, of BDF mostly of one sign."""
 
 
 def free_particles():
@@ -267,6 +268,7 @@ def test_free_particle(solver):
     system, v, path = free_particles()
     method, options = SOLVERS[solver]
     x, _, run = at_time(system, 1.0, method, v=v, rtol=TOLERANCE, **options)
+    assert np.abs(x).max() > 1.0
     np.testing.assert_allclose(x, path(1.0), rtol=0, atol=LEFT)
     assert run.drift < LEFT
 
@@ -329,13 +331,13 @@ def test_spinning_web_with_consistent_mass(solver):
     method, options = SOLVERS[solver]
     for frame in (True, False):
         system, v, axis = wheel(3.0, frame, consistent=True)
-        x, _, run = at_time(system, end, method, v=v, rtol=1e-6, **options)
+        x, _, run = at_time(system, end, method, v=v, rtol=TOLERANCE, **options)
         assert run.drift < LEFT
         found.append(x if frame else seen_from_the_frame(system, x, axis, end))
     np.testing.assert_allclose(found[0], found[1], rtol=0, atol=LEFT * np.abs(x).max())
     system, v, _ = wheel(3.0, True)
-    lumped, _, _ = at_time(system, end, method, v=v, rtol=1e-6, **options)
-    assert np.abs(lumped - found[0]).max() > 10.0 * LEFT * np.abs(x).max()  # the other mass makes another motion
+    lumped, _, _ = at_time(system, end, method, v=v, rtol=TOLERANCE, **options)
+    assert np.abs(lumped - found[0]).max() > 3.0 * LEFT * np.abs(x).max()  # the other mass makes another motion
 
 
 def test_preconditioner_inverts_the_whole_jacobian():

@@ -102,7 +102,7 @@ def kernels(law, gradients, weights):
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         blocks[:] = 0.0
-        if definite:
+        if definite:  # nothing of it is
             return
         for c in range(cells.shape[0]):
             axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, TIME]
@@ -143,6 +143,8 @@ def kernels(law, gradients, weights):
 
     @kernel(BOUND)
     def damping_bound(reach, speed, x, mass, rates, cells, data):
+        # The stiffness has no bound of its own: in a step that this bound allows it is below that of the law unless
+        # nodes move faster than sound, but at the kink of a smoothed law, which such a step passes at once.
         for c in range(cells.shape[0]):
             most = data[c, TIME] * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
             for q in range(points):

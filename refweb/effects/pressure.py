@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..compiled import BOUND, FORCE, STIFFNESS, kernel
-from ..inputs import InputError, Table, field, node_number, numbers_list, real, rows, shown, vector
+from ..inputs import InputError, Table, field, nearest, node_number, numbers_list, real, rows, shown, vector
 from ..lines import REFERENCE
 from ..time_tables import factor, factor_at
 from . import Family
@@ -158,7 +158,8 @@ class Pressure(Table):
         if isinstance(self.lines, str):
             found = np.flatnonzero(np.array(web.groups) == self.lines)
             if not len(found):
-                raise InputError(f'lines = {shown(self.lines)} must be "all", a group of the web or a list of numbers')
+                known = ("all", *sorted(set(web.groups) - {""}))
+                raise InputError(f"lines = {shown(self.lines)} names no lines, {nearest(self.lines, known)}")
             return found
         for line in self.lines:
             if line >= count:

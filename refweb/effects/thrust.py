@@ -114,7 +114,7 @@ class Thrust(Table):
             raise InputError(f"line = {self.line} must be 0 … {count - 1}")
         ends = net.web.lines[self.line]
         if found[0] not in ends:
-            raise InputError(f"node = {shown(self.node)} is no end of line {self.line}, {ends[0]} or {ends[1]}")
+            raise InputError(f"node = {shown(self.node)} must be an end of line {self.line}, {ends[0]} or {ends[1]}")
         second = int(found[0] == ends[1])
         cell = np.flatnonzero(net.line == self.line)[-second]
         place, sign = float(second), 1.0 - 2.0 * second
