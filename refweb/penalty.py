@@ -93,8 +93,8 @@ def lightness(mass, cells, c, nodes):
 def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
     """(depth that a cell may come to [m], length of its slope there [m]); a depth of 0 where it stays out of reach.
 
-    It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, no more than
-    `SHALLOW` thicknesses, and not beyond twice the depth at which it already is.
+    It goes no deeper than ``reach`` and the energy of what meets at this speed allow. Unless ``careful`` one side of
+    that stands still, and it goes no more than `SHALLOW` thicknesses deeper nor beyond twice its depth.
     """
     own, body = 0.0, mass[cells[c, nodes]]
     place, deep = deepest(x, cells, data, c, nodes, functions)
@@ -103,16 +103,17 @@ def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
     _, d, _ = point(x, cells, data, c, nodes, functions, place)
     length = math.sqrt(dot(d, d))
     deep = max(deep, first, last)
-    most = 0.5 * (first + last + length) if nodes == 2 else max(first, last) + float(nodes) * length
-    if max(deep, most) + reach <= 0.0:
+    nearest = 0.5 * (first + last + length) if nodes == 2 else max(first, last) + float(nodes) * length
+    if max(deep, nearest) + reach <= 0.0:
         return 0.0, length
     for a in range(nodes):
         own += mass[cells[c, a]]
+    own = own * body / (own + body) if body > 0.0 else own
     more = min(0.5 * reach, thickness(data, c, nodes))
     if not careful:
         more = min(more, SHALLOW * thickness(data, c, nodes), deep if deep > 0.0 else math.inf)
+        speed *= 0.5
     if speed > 0.0:
-        own = own * body / (own + body) if body > 0.0 else own
         power = data[c, AWAY + 3 * nodes + POWER] + 1.0
         more = min(more, (0.5 * power * own * speed * speed / data[c, PENALTY]) ** (1.0 / power))
     return max(deep, 0.0) + more, length

@@ -40,7 +40,7 @@ class Static(Table):
     load_steps : sequence of float
         Values of t.
     mass : {"lumped", "consistent"}
-        The weight is the same with either; the modes at the equilibrium are not.
+        The weight is the same with either; the modes at the equilibrium and the centrifugal forces are not.
     """
 
     kind: str = choice("static", default="static")

@@ -79,6 +79,6 @@ def check_speed(system, t):
         low, high = (middle, high) if stands(middle) else (low, middle)
     (speed,) = {np.linalg.norm(family.data[0, :3]) for family in system.families if family.name == FRAME}
     raise SolverError(
-        f"no equilibrium: [frame] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where centrifugal "
-        "forces outgrow the tension of any stretch: lower angular_velocity or the masses, or raise modulus × area"
+        f"no equilibrium: [frame] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
+        "centrifugal forces outgrow any tension: lower angular_velocity or the masses, or raise modulus × area"
     )

@@ -6,10 +6,12 @@ that leaves as the iteration converges. It resists relative motion, not motion, 
 shape of a loaded membrane. On the square web of 1677 nodes under 1 N the shift τG takes 7 or 8 factorizations from
 flat for every smoothing from 1e-2 to 0, where a shift of the diagonal takes 15 or 16. A line search on the energy makes
 every step a descent. Lines under compression make K indefinite: K itself is used where its shifted pivots are positive,
-its positive semidefinite part where they are not.
+its positive semidefinite part where they are not. In a frame that turns τ grows instead until they are: there the part
+that is left out would be most of K. Forces without a potential have an LU and a search of their own, see
+`refweb.follower_loads`.
 
-An equilibrium exists unless the net can be carried off: a part of the net without support in a direction in which the
-forces on it do not balance. `check_supported` proves that before anything is solved.
+An equilibrium exists unless the net can be carried off, a part of it without support in a direction in which the forces
+on it do not balance, or turns too fast, see `refweb.spin_limit`. `check_supported` looks before anything is solved.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def test_consistent_mass_feels_the_position_between_nodes():
 
 def refused_at(system, solve=statics.solve):
     """The limit that the refusal names [rad/s]."""
-    with pytest.raises(refweb.SolverError, match=r"\[frame\] turns at .* rad/s, must be below .*lower angular_velocity") as e:
+    with pytest.raises(refweb.SolverError, match=r"\[frame\] turns at .*must be below .* lower angular_velocity") as e:
         list(solve(system, [1.0]))
     return float(str(e.value).split("must be below ")[1].split(" rad/s")[0])
 
@@ -177,7 +177,7 @@ def test_free_net_turns_steadily(mesh, law):
 
 def test_free_net_off_the_axis_is_carried_off():
     system = free_net("triangle", 10.0)
-    with pytest.raises(refweb.SolverError, match=r"carried off along y .* its centre of mass is on the axis of \[frame\]"):
+    with pytest.raises(refweb.SolverError, match=r"carried off along y .* centre of mass is on the axis of \[frame\]"):
         list(statics.solve(system, [1.0]))
 
 

@@ -180,7 +180,8 @@ class Contact(Table):
     friction : float
         Coefficient of friction μ. Free bodies that are spheres or rings are turned by it.
     slip_velocity : float
-        Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous.
+        Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Steps of an
+        explicit method are in proportion to it where friction rules them.
     bodies : dict of str to BodyContact
         What differs for a body.
     """
@@ -189,7 +190,7 @@ class Contact(Table):
     exponent: float = field(_exponent, 1.0)
     damping: float = real(0.0, at_least=0, unit="s/m")
     friction: float = real(0.0, at_least=0)
-    slip_velocity: float = real(1e-3, above=0, unit="m/s")
+    slip_velocity: float = real(1e-2, above=0, unit="m/s")
     bodies: dict = field(_bodies, factory=dict)
 
     def _of(self, body, key):
