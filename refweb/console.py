@@ -66,7 +66,10 @@ def before(scene, system):
         how += "load steps " + ", ".join(f"{s:g}" for s in solve.load_steps[:8])
         how += ", ..." if len(solve.load_steps) > 8 else ""
     else:
-        step = f"safety {solve.safety:g}" if solve.step_size is None else f"step {solve.step_size:g} s"
+        if solve.method != "central-difference":
+            step = f"rtol {solve.rtol:g}"
+        else:
+            step = f"safety {solve.safety:g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
     _box(
         scene.title,

@@ -28,7 +28,7 @@ LINEAR_SOLVERS = {
 }
 DENSE = 80
 """Unknown displacements up to which a dense factorization is the fastest."""
-SHORT = 0.5
+SHORT = 0.7
 """γω of a step up to which corrector iterations are cheaper without any factorization."""
 RENEWED = 50
 """Evaluations of forces after which ω is looked at anew."""

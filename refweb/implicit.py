@@ -23,10 +23,12 @@ from .compiled import ENERGY, INDICES, MATRIX, VECTOR, typed_list
 from .errors import SolverError
 from .inputs import InputError
 from .probes import PLACE
-from .stepping import LEVEL, SIDE, SLOT, STOP, TIME, book_energies, ended_by, no_energy, passes
+from .stepping import LEVEL, MOST, SIDE, SLOT, STOP, TIME, book_energies, ended_by, no_energy, passes
 
 TRAVEL = 0.2
 """Largest share of a body's thickness that anything may move in a step, so that nothing passes through."""
+PATIENCE = 1000
+"""Number of steps, one after another, of which a row would take more than `MOST`; at a start they are short, and grow."""
 UNEVEN = 1e-3
 """Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
 HALVINGS = 8
@@ -65,6 +67,7 @@ class Course:
     reached: float = 0.0
     step: float = 0.0
     nsteps: int = 0
+    short: int = 0
     energy: float = 0.0
     largest: float = 0.0
     worst: float = 0.0
@@ -232,6 +235,12 @@ class Implicit:
             self._unready = False
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(self._solver))
         run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
+        run.short = run.short + 1 if run.step * MOST < end - run.time else 0
+        if run.short > PATIENCE:
+            raise SolverError(
+                f"the steps at t = {run.time:.6g} s are {run.step:.3g} s, more than {MOST:g} to the next row: raise "
+                f"rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
+            )
 
     def _at(self, t):
         """Displacement and velocity of all rows at a time within the last step."""
@@ -284,7 +293,7 @@ class Implicit:
         """Whether powers change too much within a piece, as where damped lines go slack in a long step."""
         start, middle, last = (rate[0] for rate in rates[:3])
         apart = (end - run.time) * np.abs(start - 2.0 * middle + last).sum() / 12.0
-        return apart > UNEVEN * max(run.largest, 0.5 * (v * self.system.momentum(v)).sum())
+        return apart > UNEVEN * run.largest and apart > UNEVEN * 0.5 * (v * self.system.momentum(v)).sum()
 
     def _booked(self, run, rates, end, t):
         """Work, and impulse of the supports, at time t of a piece, by the parabola through its three rates."""

@@ -37,8 +37,9 @@ from .contact_points import (
 )
 from .shapes import SPHERE
 
-SHALLOW = 0.01
-"""By how much a contact of a body is taken to deepen at most where that costs much, over the body's thickness."""
+SHALLOW = 0.05
+"""Share of the depth that a contact may come to which losses reckon with before it is there: a step that has to do with
+more is iterated for longer, and the next bound knows."""
 SPREAD = 2.5
 """Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
 
@@ -93,8 +94,8 @@ def lightness(mass, cells, c, nodes):
 def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
     """(depth that a cell may come to [m], length of its slope there [m]); a depth of 0 where it stays out of reach.
 
-    It goes no deeper than ``reach`` and the energy of what meets at this speed allow. Unless ``careful`` one side of
-    that stands still, and it goes no more than `SHALLOW` thicknesses deeper nor beyond twice its depth.
+    It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, only by
+    `SHALLOW` of that, and not beyond twice the depth that it already has.
     """
     own, body = 0.0, mass[cells[c, nodes]]
     place, deep = deepest(x, cells, data, c, nodes, functions)
@@ -110,12 +111,11 @@ def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
         own += mass[cells[c, a]]
     own = own * body / (own + body) if body > 0.0 else own
     more = min(0.5 * reach, thickness(data, c, nodes))
-    if not careful:
-        more = min(more, SHALLOW * thickness(data, c, nodes), deep if deep > 0.0 else math.inf)
-        speed *= 0.5
     if speed > 0.0:
         power = data[c, AWAY + 3 * nodes + POWER] + 1.0
         more = min(more, (0.5 * power * own * speed * speed / data[c, PENALTY]) ** (1.0 / power))
+    if not careful:
+        more = min(SHALLOW * more, deep if deep > 0.0 else math.inf)
     return max(deep, 0.0) + more, length
 
 

@@ -1,7 +1,7 @@
 """The angular speed at and above which a net that turns has no stable equilibrium.
 
 Far out every tension law is linear: a net that is stretched without limit has the potential ½ Σ (EA/L) |d|² of the
-vectors d of its lines, less terms that grow with d alone, and the centrifugal potential is −½ Σ m |Ω × r|². The least Ω
+vectors d of its lines, less terms that grow no faster than |d|, and the centrifugal one, −½ Σ m |Ω × r|². The least Ω
 at which their sum is not positive definite,
 
     A y = Ω² C y,      A of unit tensions EA/L,   C of masses across the axis,
