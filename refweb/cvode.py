@@ -117,7 +117,7 @@ class Cvode(Implicit):
         self.stats["nfev"] += 1
         rows = self.system.force(t, *self._state(t, y))
         force = rows.ravel()[self.system.free]
-        if self._wrong is None and not np.isfinite(force @ force):
+        if self._wrong is None and not np.isfinite(force.sum()):
             self._wrong = t, rows
         yp[:n] = y[n:]
         yp[n:] = self._over_mass(force)
