@@ -58,6 +58,8 @@ def shown(value):
     """A value as a message shows it: short, on one line, texts in quotes."""
     if isinstance(value, str):
         return f'"{short(value)}"'
+    if isinstance(value, bool):
+        return str(value).lower()
     try:
         return short(str(value))
     except (ValueError, RecursionError):  # a number of thousands of digits, lists in lists in lists

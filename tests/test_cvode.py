@@ -97,8 +97,8 @@ def slope(tolerances, found):
     return np.polyfit(np.log(tolerances), np.log(found), 1)[0]
 
 
-# Error against tolerance. A method of order p keeps the error C h^(p + 1) of a step at the tolerance, and its error over
-# a time is of the size h^p: the power of the tolerance is p/(p + 1), up to 1 where the order follows from the error.
+# Error against tolerance. A method of order p keeps the error C h^(p + 1) of a step at the tolerance, and its error
+# over a time is of the size h^p: the power of the tolerance is p/(p + 1), up to 1 where the order follows from the error.
 # Steps change by factors of 1.5 and more or not at all, which moves a single error by as much to the power p, and over
 # three decades the power by up to 0.1; orders that change move it as well.
 POWERS = {("bdf", 1): (0.4, 0.6), ("bdf", 2): (0.57, 0.77), ("adams", 2): (0.57, 0.77), ("adams", 12): (0.6, 1.2)}
@@ -122,8 +122,8 @@ def test_error_falls_with_the_tolerance(family, highest, linear_solver, order, c
 def test_lines_that_go_slack(law):
     """A slack web that is thrown: lines push by the smooth law's floor, or snap taut at kinks.
 
-    Errors fall with the tolerance by less than where nothing is slack: a kink costs the step it lies in its order. Where
-    lines push the matrix is not definite, and the block elimination drops what is negative.
+    Errors fall with the tolerance by less than where nothing is slack: a kink costs the step it lies in its order.
+    Where lines push the matrix is not definite, and the block elimination drops what is negative.
     """
     changes = dict(prestrain=-0.002, law=law) | (dict(smoothing=1e-3) if law == "smooth" else {})
     system = small(size=3, **changes)
@@ -451,7 +451,7 @@ def drifting(effects):
 @pytest.mark.parametrize("family", ["bdf", "adams"])
 @pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9])
 def test_a_short_pulse_is_felt(family, width):
-    """A triangle of force at 0.3 s, a thousandth to a billionth of the steps around it: v = ½Fw/m, x = v (t − 0.3 s)."""
+    """A triangle of force at 0.3 s, 1e-3 to 1e-9 of the steps around it: v = ½Fw/m, x = v (t − 0.3 s)."""
     force, at, end = np.array([2.0, -1.0, 3.0]) / width, 0.3, 1.0
     quiet = [(0.0, 0.0), (at - 0.5 * width, 0.0)]
     pulse = refweb.Load(node=1, force=force, factor=[*quiet, (at, 1.0), (at + 0.5 * width, 0.0)])
@@ -472,8 +472,8 @@ def test_a_short_pulse_is_felt(family, width):
 def test_a_body_does_not_pass_between_two_steps(family, speed):
     """A ball flies past a line that is held at both ends, near enough to be pushed aside by ∫ k (R − d) b/d dt.
 
-    With the distance b of its way from the line, s = √(R² − b²), that is k b/v (2 R asinh(s/b) − 2 s) while it is hardly
-    turned. A step that is bounded by the error alone would be as long as the whole flight.
+    With the distance b of its way from the line, s = √(R² − b²), that is k b/v (2 R asinh(s/b) − 2 s) while it is
+    hardly turned. A step that is bounded by the error alone would be as long as the whole flight.
     """
     radius, off, mass, stiffness = 0.01, 0.004, 1e-3, 1e-3 * speed**2
     web = refweb.Inline(points=[[0, -1, 0], [0, 1, 0]], lines=[[0, 1]], supports=[0, 1])

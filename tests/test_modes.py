@@ -223,7 +223,8 @@ def test_free_tetrahedron_of_bars(count):
     expected = np.repeat([1.0, 2.0, 4.0], np.array([2, 3, 1]) * count)
     found = refweb.modes(scene, 50)
     assert found.spectra[0].zero == 6 * count and found.spectra[0].unstable == 0
-    assert_within(found, hertz(stiffness / 0.5 * expected)[:50], relative=1e-12)
+    # Frequencies of forty directions each: how well a cluster is solved changes with the order of sums in BLAS.
+    assert_within(found, hertz(stiffness / 0.5 * expected)[:50], relative=1e-9)
     assert any(f"{6 * count} directions have no stiffness" in text for text in found.warnings)
 
 
