@@ -98,9 +98,9 @@ def slope(tolerances, found):
 
 
 # Error against tolerance. A method of order p keeps the error C h^(p + 1) of a step at the tolerance, and its error
-# over a time is of the size h^p: the power of the tolerance is p/(p + 1), up to 1 where the order follows from the error.
-# Steps change by factors of 1.5 and more or not at all, which moves a single error by as much to the power p, and over
-# three decades the power by up to 0.1; orders that change move it as well.
+# over a time is of the size h^p: the power of the tolerance is p/(p + 1), up to 1 where the order follows from the
+# error. Steps change by factors of 1.5 and more or not at all, which moves a single error by as much to the power p,
+# and over three decades the power by up to 0.1; orders that change move it as well.
 POWERS = {("bdf", 1): (0.4, 0.6), ("bdf", 2): (0.57, 0.77), ("adams", 2): (0.57, 0.77), ("adams", 12): (0.6, 1.2)}
 TOLERANCES = {1: (1e-2, 1e-3, 1e-4), 2: (1e-3, 1e-4, 1e-5, 1e-6), 12: (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)}
 CASES = [("bdf", 1, "dense", 1, False)]
@@ -696,49 +696,3 @@ def test_a_node_without_mass():
 def test_consistent_mass_has_no_sparse_jacobian():
     with pytest.raises(refweb.InputError, match='"sparse" must be "block" or "dense" with mass = "consistent"'):
         Cvode(small(consistent=True), linear_solver="sparse")
-
-
-# The paper's web
-
-
-def by_central_differences(system, steps, end, node):
-    """Displacement of a node from two runs, of which the second halves the steps of the first, and from both."""
-    found = []
-    for count in (steps, 2 * steps):
-        solver = CentralDifference(system, step_size=end / count * (1.0 + 1e-12))
-        run = solver.start()
-        solver.rows(run, [end])
-        assert run.nsteps == count
-        found.append(run.x[node, 2])
-    return (4.0 * found[1] - found[0]) / 3.0
-
-
-def digits(web, end, steps):
-    """Digits that three methods share in the displacement of a thrown point mass; the least of the pairs.
-
-    Central differences are extrapolated from two step sizes; Adams methods have the tolerance 1e-10, DOP853 1e-12.
-    """
-    given = refweb.Scene(
-        web=web,
-        cable=cable(law="smooth", smoothing=1e-4),
-        effects=[refweb.PointMass(node="centre", mass=1.0), refweb.Velocity(node="centre", value=(0.0, 0.0, 1.0))],
-        solve=refweb.Dynamic(duration=end),
-    )
-    system = given.build()
-    node = system.net.web.centre
-    _, run, _ = ran(system, [end], rtol=1e-10, family="adams")
-    x, _ = exact(system, system.initial_velocity(), end)
-    found = np.array([by_central_differences(system, steps, end, node), run.x[node, 2], rows_of(system, x)[node, 2]])
-    apart = max(abs(found[i] - found[j]) for i in range(3) for j in range(i))
-    assert abs(found[0]) > 1e-2
-    return -np.log10(apart / abs(found[0]))
-
-
-def test_nine_digits_of_a_small_web():
-    assert digits(refweb.Window(mesh="square", rows=8, columns=8, side=0.0646), 0.05, 8000) >= 9.0
-
-
-@pytest.mark.slow
-def test_nine_digits_of_the_square_web():
-    """1 kg at 1 m/s at the centre of the paper's square web, after 0.25 s."""
-    assert digits(refweb.Paper(mesh="square", cable_length=201.4), 0.25, 12000) >= 9.0

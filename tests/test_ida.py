@@ -407,21 +407,25 @@ def test_no_links_in_an_equilibrium_to_start_from():
         refweb.Scene.from_dict({**SCENE, "solve": {**solve, "start": "equilibrium"}}).build()
 
 
-# Stiff cases
+# Stiff cases, by IDA and by CVODE
+
+METHODS = [Ida, Cvode]
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", SOLVERS)
 @pytest.mark.parametrize("law", ["tension-only", "linear"])
-def test_stiff_and_light(name, law):
+def test_stiff_and_light(method, name, law):
     """E = 1e11 Pa and 0.02 kg/m³: the bound of central differences is 2e-8 s, and 2e-3 s are to be seen."""
     web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=10).web()
     system = moving(web, thrown((0.0, 0.0, 1.0), node=5), law=law, modulus=1e11, density=0.02, prestrain=1e-4)
     assert CentralDifference(system).bound() < 1e-7
-    run, _ = ran(Ida(system, rtol=1e-4, linear_solver=name), 2e-3)
+    run, _ = ran(method(system, rtol=1e-4, linear_solver=name), 2e-3)
     assert run.nsteps < 2000 and run.drift < 1e-3
 
 
-def test_an_element_a_thousand_times_shorter():
+@pytest.mark.parametrize("method", METHODS)
+def test_an_element_a_thousand_times_shorter(method):
     """What is thrown moves as without it, but for its length of 1e-3 of an element."""
     points = [[0.1 * i, 0.0, 0.0] for i in range(11)]
     found = []
@@ -432,13 +436,14 @@ def test_an_element_a_thousand_times_shorter():
         effects = [refweb.PointMass(node=5, mass=0.1)]
         effects += [refweb.Velocity(node=[5, 6] if short else 5, value=(0.0, 0.0, 1.0))]
         system = moving(web, effects, density=200.0, prestrain=1e-3)
-        run, _ = ran(Ida(system, rtol=1e-5), 2e-3)
+        run, _ = ran(method(system, rtol=1e-5), 2e-3)
         found.append(run.x[5, 2])
         assert run.drift < 1e-3
     np.testing.assert_allclose(*found, rtol=1e-3)
 
 
-def test_two_nodes_at_one_place():
+@pytest.mark.parametrize("method", METHODS)
+def test_two_nodes_at_one_place(method):
     """A slack line between them is felt when it is taut; before that each goes its own way."""
     points = [[0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]]
     web = refweb.Inline(
@@ -446,7 +451,7 @@ def test_two_nodes_at_one_place():
     ).web()
     effects = [refweb.PointMass(node=[1, 2], mass=1.0), refweb.Velocity(node=1, value=(0.0, 0.0, 1.0))]
     system = moving(web, effects, density=0.0, modulus=7e5)
-    solver = Ida(system, rtol=1e-6)
+    solver = method(system, rtol=1e-6)
     run = solver.start()
     solver.rows(run, [0.09])
     np.testing.assert_allclose(run.x[1:3], [[0.0, 0.0, 0.09], [0.0, 0.0, 0.0]], atol=1e-12)

@@ -1,0 +1,60 @@
+"""How the figures of the report look: one size, one set of colours, and pictures of solutions as PNG."""
+
+from __future__ import annotations
+
+import io
+import pathlib
+import tempfile
+
+import numpy as np
+
+COLOURS = ("#1b5e8c", "#c8553d", "#3c7a4c", "#8a5a9e", "#b58900", "#555555")
+"""Colours of lines, the first for refweb; they differ in lightness as well."""
+REFERENCE = dict(color="#222222", linewidth=1.2)
+"""Style of a closed form; refweb's results are markers on it."""
+
+
+def axes(xlabel, ylabel, columns=1, height=3.6, **options):
+    """A matplotlib figure and its axes, labelled; with several columns a list of axes, whose labels are lists."""
+    from matplotlib.figure import Figure
+
+    page = Figure(figsize=(7.0, height), dpi=160, layout="constrained")
+    found = np.atleast_1d(page.subplots(1, columns, **options))
+    labels = [[label] * columns if isinstance(label, str) else label for label in (xlabel, ylabel)]
+    for one, x, y in zip(found, *labels, strict=True):
+        one.set(xlabel=x, ylabel=y)
+        one.grid(color="#dddddd", linewidth=0.6)
+        one.set_axisbelow(True)
+        one.spines[["top", "right"]].set_visible(False)
+        one.set_prop_cycle(color=COLOURS)
+    return page, (found[0] if columns == 1 else found)
+
+
+def convergence(sizes, curves, order, xlabel, ylabel):
+    """Errors over sizes in logarithms: ``curves`` by name, and a line of the ``order`` that theory gives."""
+    page, plot = axes(xlabel, ylabel)
+    sizes = np.asarray(sizes, dtype=float)
+    for marker, (name, errors) in zip("osD^v", curves.items(), strict=False):
+        plot.loglog(sizes, errors, marker, label=name)
+    start = next(iter(curves.values()))
+    plot.loglog(sizes, start[-1] * (sizes / sizes[-1]) ** order, "--", label=f"order {abs(order):g}", **REFERENCE)
+    plot.legend(frameon=False)
+    return page
+
+
+def picture(solution, field=None):
+    """The picture of a solution that ``refweb picture`` draws, the bytes of a PNG."""
+    from refweb.pictures import picture as drawn
+
+    with tempfile.TemporaryDirectory() as folder:
+        solution.save(pathlib.Path(folder) / "result")
+        return drawn(pathlib.Path(folder) / "result", field=field).read_bytes()
+
+
+def png(drawn):
+    """The bytes of a PNG, of what a `validation.Figure` draws."""
+    if isinstance(drawn, bytes):
+        return drawn
+    page = io.BytesIO()
+    drawn.savefig(page, format="png")
+    return page.getvalue()
