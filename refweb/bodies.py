@@ -122,7 +122,7 @@ def _tube(radius, level=48, sides=8):
     here = np.arange(level * sides).reshape(level, sides)
     after = np.roll(here, -1, axis=1)
     return points.reshape(-1, 3), np.vstack(
-        [t for i in range(level) for t in _band(after[i], here[i], here[(i + 1) % level] - here[i])]
+        [t for i in range(level) for t in _band(here[i], after[i], here[(i + 1) % level] - here[i])]
     )
 
 

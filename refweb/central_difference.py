@@ -17,14 +17,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from .compiled import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
-from .errors import SolverError
+from .errors import OpenBook, SolverError
 from .inputs import InputError
 from .probes import INTEGERS, PLACE, PROBE
 from .stepping import (
+    DRIFT,
     MOST,
     advance,
     book_energies,
     ended_by,
+    event_table,
     no_bound,
     no_energy,
     passes,
@@ -32,13 +34,6 @@ from .stepping import (
     set_lengths,
     step_bound,
 )
-
-DRIFT = 1e-2
-"""Largest energy drift of a run whose result is returned."""
-
-
-class OpenBook(SolverError):
-    """The energy of a run drifted away from the work done on it."""
 
 
 @dataclass(eq=False)
@@ -101,12 +96,6 @@ class Run:
         return float(self.state[5] / self.state[4]) if self.state[4] > 0.0 else 0.0
 
 
-def event_table(events):
-    """Events as rows of numbers, see `refweb.stepping`."""
-    rows = [(slot, level, 0.0, float(rising), float(stop), np.inf) for slot, level, rising, stop in events]
-    return np.array(rows, dtype=float).reshape(len(rows), 6)
-
-
 class CentralDifference:
     """Central differences on one system.
 
@@ -135,26 +124,29 @@ class CentralDifference:
         For curved elements, a consistent mass, a free row without mass, or a step above the bound.
     """
 
+    method, order, stretch = "central-difference", 2, 1.0
+    kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
+
     def __init__(self, system, probes=(), watch=(), events=(), safety=0.5, step_size=None, finer=1.0):
         self.system, self.safety, self.step_size, self.finer = system, safety, step_size, finer
         net, free = system.net, ~system.supported
         if net.order > 1:
             raise InputError(
-                f"[cable] order = {net.order} must be 1 with central-difference: the error of its steps is of order 2, "
-                f"and curved elements ask for more of them; use subdivide = {net.order * net.subdivide}, which has the "
+                f"[cable] order = {net.order} must be 1 with {self.method}: its bound of stability is that of straight "
+                f"elements; use subdivide = {net.order * net.subdivide}, which has the "
                 'same nodes, or method = "cvode"'
             )
         if net.spread is not None:
             raise InputError(
-                '[solve] mass = "consistent" must be "lumped" with central-difference: an explicit step divides each '
+                f'[solve] mass = "consistent" must be "lumped" with {self.method}: an explicit step divides each '
                 'force by one mass, and a matrix would have to be solved; use method = "cvode"'
             )
         if system.constraints:
-            raise InputError('[[link]] needs method = "ida": central-difference does not hold lengths')
+            raise InputError(f'[[link]] needs method = "ida": {self.method} does not hold lengths')
         bare = np.flatnonzero((net.mass <= 0.0) & free.any(axis=1))
         if len(bare):
             raise InputError(
-                f"node {bare[0]} has no mass, which central-difference needs: give density > 0 or a [[point_mass]]"
+                f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
         families, drives = system.families, system.drives
         self._outs = system.outs()
@@ -215,7 +207,7 @@ class CentralDifference:
             signs,
             np.flatnonzero(signs[: len(probes)]),
         )
-        if step_size is not None and step_size > (limit := self.bound()):
+        if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
     def bound(self, x=None, reach=np.inf):
@@ -234,7 +226,7 @@ class CentralDifference:
 
     def figures(self, run):
         """What a run has spent, for ``run.json``."""
-        return dict(nfev=run.nsteps + 1, njev=0, nlu=0)
+        return dict(nfev=len(self.drifts) * run.nsteps + 1, njev=0, nlu=0)
 
     def start(self, x=None, v=None):
         """The `Run` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
@@ -288,9 +280,9 @@ class CentralDifference:
         history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
         step, start, linear = self.step_size or 0.0, run.time, self.system.rows - self.system.net.spins
         done = rows_ahead(
-            ends, self.safety, step, self.finer, DRIFT, run.state, run.saved, linear, *self._masses, self._moving,
-            *self._ends, *self._forces, self._seen, *self._energies, self._bounds, self._dampings, *self._drives,
-            self._corners, *self._peaks(run), self._watch, run.events, history,
+            ends, self.safety * self.stretch, step, self.finer, DRIFT, self.kicks, self.drifts, run.state, run.saved,
+            linear, *self._masses, self._moving, *self._ends, *self._forces, self._seen, *self._energies, self._bounds,
+            self._dampings, *self._drives, self._corners, *self._peaks(run), self._watch, run.events, history,
         )  # fmt: skip
         if done < 0:
             raise SolverError(
@@ -314,8 +306,9 @@ class CentralDifference:
         count, total = round((run.time - before) / h), np.zeros(len(system.families) + 3)
         for step in range(1, count + 1):
             advance(
-                1, h, before + (step - 1) * h, x, v, f, *self._masses, *self._ends, *self._forces, self._seen,
-                *self._drives, *self._peaks(run), *self._energies, self._watch, total, self._events[:0],
+                1, h, before + (step - 1) * h, self.kicks, self.drifts, x, v, f, *self._masses, *self._ends,
+                *self._forces, self._seen, *self._drives, *self._peaks(run), *self._energies, self._watch, total,
+                self._events[:0],
             )  # fmt: skip
             wrong = ~np.isfinite(x + v + f).all(axis=1)
             if wrong.any():

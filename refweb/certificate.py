@@ -24,7 +24,6 @@ import numpy as np
 
 from .effects.elasticity import strains
 from .factor import Factor
-from .laws import TENSION_ONLY
 from .lines import AXIAL_STIFFNESS
 
 
@@ -47,19 +46,8 @@ class Certificate:
     strain_energy: float
 
 
-def dead(system):
-    """True where the only internal forces are the tensions of the lines, and all others are dead loads."""
-    outer = [f for f in system.families if not f.internal]
-    return all(f.stiffness is None and f.energy is not None for f in outer) and len(system.families) == len(outer) + 1
-
-
-def applies(system):
-    """True where the potential is convex and the loads are dead."""
-    return system.net.law.number == TENSION_ONLY and dead(system)
-
-
 def certify(system, equilibrium, factor=None):
-    """The `Certificate` of an equilibrium of a system to which it `applies`; ``factor``, if given, is used again."""
+    """The `Certificate` of an equilibrium of a system that is ``convex``; ``factor``, if given, is used again."""
     net, x, bars = system.net, equilibrium.x, system.net.bars
     system.prepare(equilibrium.step)
     points = len(net.weights)

@@ -66,7 +66,7 @@ def before(scene, system):
         how += "load steps " + ", ".join(f"{s:g}" for s in solve.load_steps[:8])
         how += ", ..." if len(solve.load_steps) > 8 else ""
     else:
-        if solve.method != "central-difference":
+        if solve.rtol is not None:
             step = f"rtol {solve.rtol:g}"
         else:
             step = f"safety {solve.safety:g}" if solve.step_size is None else f"step {solve.step_size:g} s"

@@ -28,8 +28,10 @@ LINEAR_SOLVERS = {
 }
 DENSE = 80
 """Unknown displacements up to which a dense factorization is the fastest."""
-SHORT = 0.7
+SHORT = 1.0
 """γω of a step up to which corrector iterations are cheaper without any factorization."""
+STILL = 1e-3
+"""Displacement by accelerations within a step, over the tolerance, below which nothing has to be solved for."""
 RENEWED = 50
 """Evaluations of forces after which ω is looked at anew."""
 
@@ -134,7 +136,7 @@ class Cvode(Implicit):
     def _set_up(self, t, y, yp, jok, jnew, gamma):
         """Factorize M + γC + γ²K; K and C are kept where CVODE allows."""
         may = self._sparing and not (self._plain and t == self._set_up_at)  # else iterations have not converged
-        known = self._gamma is not None
+        known, self._still = self._gamma is not None, may and self._nothing_moves(yp, gamma)
         self._plain = known and may and self._short(gamma)
         jnew[0] = 0
         if not known or not jok and not (self._plain and self.stats["nfev"] < self._due):
@@ -148,8 +150,14 @@ class Cvode(Implicit):
         if not self._plain:
             self._factorize(gamma)
 
+    def _nothing_moves(self, yp, gamma):
+        """Whether all that accelerations change within a step is far below the tolerance, as before a first contact."""
+        return gamma * gamma * np.abs(yp[self.unknowns :]).max(initial=0.0) <= STILL * self.atol_position
+
     def _short(self, gamma):
-        """Whether corrector iterations converge well without a matrix, by a bound on γ|J|."""
+        """Whether corrector iterations converge well without a matrix, by a bound on γ|J| where anything moves."""
+        if self._still:
+            return True
 
         def largest(values):
             return (np.add.reduceat(np.abs(values), self.system.pattern.indptr[:-1]) / self._mass).max()

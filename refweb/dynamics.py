@@ -8,8 +8,8 @@ import time
 
 import numpy as np
 
-from . import probes, starts
-from .central_difference import CentralDifference, OpenBook
+from . import probes
+from .errors import OpenBook
 from .laws import SMOOTH
 from .observables import LINE, NODAL, TOTAL, Observe, Result
 from .solution import SOLVER
@@ -208,7 +208,7 @@ class Motion:
         self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in self.energies]
         self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
-        self.explicit = scene.solve.method == "central-difference"
+        self.explicit = scene.solve.method in ("central-difference", "explicit")
         self._own = self._hidden()
         self._events = [self._event(event) for event in scene.event]
         self._accuracy = scene.solve.safety if self.explicit else scene.solve.rtol
@@ -216,7 +216,9 @@ class Motion:
         self._columns = self._places()
         self.begin = None, None
         if (folder := scene.start_folder) is not None:
-            self.begin = starts.stored(system, folder)
+            from .starts import stored
+
+            self.begin = stored(system, folder)
         if scene.solve.start != "equilibrium":
             solution.warnings += started(system, self.begin[0])
 
@@ -262,10 +264,14 @@ class Motion:
         ]
         watch = [(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched]
         if self.explicit:
-            finer = math.sqrt(2.0) if twin else 1.0
-            return CentralDifference(
-                self.system, probed, watch, table, safety=accuracy, step_size=solve.step_size, finer=finer
-            )
+            steps = dict(safety=accuracy, step_size=solve.step_size, finer=math.sqrt(2.0) if twin else 1.0)
+            if solve.method == "explicit":
+                from .nystrom import Nystrom
+
+                return Nystrom(self.system, probed, watch, table, order=solve.order, **steps)
+            from .central_difference import CentralDifference
+
+            return CentralDifference(self.system, probed, watch, table, **steps)
         keys = {"max_order": solve.max_order, "linear_solver": solve.linear_solver}
         share = 1.0 / FINER if twin else 1.0
         keys |= {key: share * getattr(solve, key) for key in ("atol_position", "atol_velocity") if getattr(solve, key)}
@@ -326,7 +332,9 @@ class Motion:
         """Run; a run whose energy book is open is repeated with half the step, or a tenth of rtol, twice at most."""
         scene, solution, accuracy = self.scene, self.solution, self._accuracy
         if scene.solve.start == "equilibrium":
-            found = starts.equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
+            from .starts import equilibrium
+
+            found = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
             self.begin = found.x, None
             if found.stats.get("smallest_pivot") == -1:
                 solution.warnings.append(
@@ -354,7 +362,8 @@ class Motion:
             break
         solution.reduced = results
         if other:
-            less = (solution.solver["nsteps"] / ended.nsteps) ** 2 if self.explicit else FINER ** (-2.0 / 3.0)
+            steps = solution.solver["nsteps"] / ended.nsteps
+            less = steps**self._solver.order if self.explicit else FINER ** (-2.0 / 3.0)
             factor = 1.0 / (1.0 - less)
             solution.reduced = with_errors(results, other, factor)
             for found, width, time in zip(solution.events, self._widths, ended.events[:, TIME], strict=True):

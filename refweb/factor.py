@@ -21,9 +21,15 @@ class Factor:
         if not self.pattern.size:
             return
         if self._solver is None:
-            self._solver = qdldl.Solver(self._matrix, upper=True)
-        else:
-            self._solver.update(self._matrix, upper=True)
+            try:
+                self._solver = qdldl.Solver(self._matrix, upper=True)
+                return
+            except RuntimeError:  # a zero pivot, which raises here and not in an update
+                definite = self._matrix.copy()
+                definite.data[:] = 0.0
+                definite.setdiag(1.0)
+                self._solver = qdldl.Solver(definite, upper=True)
+        self._solver.update(self._matrix, upper=True)
 
     def solve(self, b):
         """Solution of A y = b, shape (n,); None where the factorization broke down on a zero pivot.

@@ -14,11 +14,6 @@ from __future__ import annotations
 import numpy as np
 
 
-def act(system):
-    """Whether a force of the system has no potential."""
-    return not system.symmetric or any(family.energy is None for family in system.families)
-
-
 class Lu:
     """LU of matrices of one `refweb.pattern.Pattern`, with the interface of `refweb.factor.Factor`."""
 

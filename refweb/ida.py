@@ -33,8 +33,6 @@ from .cvode import DENSE, LINEAR_SOLVERS, _Symmetric, _Unsymmetric
 from .errors import SolverError
 from .implicit import Implicit, _Stopped, scales
 from .inputs import InputError
-from .links import Links
-from .massless import REMEDY, Massless
 
 UNTESTED = 1e30
 """Absolute tolerance of multipliers, which takes them out of the error test."""
@@ -72,8 +70,15 @@ class Ida(Implicit):
         mass = np.repeat(system.net.mass, 3)[system.free]
         self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
         self._M = system.pattern.matrix(system.mass())
-        self._massless = Massless(system, self._bare) if len(self._bare) else None
-        self._links = Links(system) if system.constraints else None
+        self._massless = self._links = None
+        if len(self._bare):
+            from .massless import Massless
+
+            self._massless = Massless(system, self._bare)
+        if system.constraints:
+            from .links import Links
+
+            self._links = Links(system)
         self._count = len(self._links) if self._links else 0
         self.linear_solver, self.choice = self._chosen(linear_solver)
         self._product, self._exact, self._adrift = None, False, (0.0, None)
@@ -306,6 +311,8 @@ class Ida(Implicit):
     def _refuse_adrift(self):
         t, name = self._adrift
         if name:
+            from .massless import REMEDY
+
             raise SolverError(
                 f"{name} has lost its position by t = {t:.6g} s: it has no mass, and no tension holds it any more; "
                 f"{REMEDY}"

@@ -18,17 +18,29 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .central_difference import DRIFT, OpenBook, event_table
 from .compiled import ENERGY, INDICES, MATRIX, VECTOR, typed_list
-from .errors import SolverError
+from .errors import OpenBook, SolverError
 from .inputs import InputError
 from .probes import PLACE
-from .stepping import LEVEL, MOST, SIDE, SLOT, STOP, TIME, book_energies, ended_by, no_energy, passes
+from .stepping import (
+    DRIFT,
+    LEVEL,
+    MOST,
+    SIDE,
+    SLOT,
+    STOP,
+    TIME,
+    book_energies,
+    ended_by,
+    event_table,
+    no_energy,
+    passes,
+)
 
 TRAVEL = 0.2
 """Largest share of a body's thickness that anything may move in a step, so that nothing passes through."""
 PATIENCE = 1000
-"""Number of steps, one after another, of which a row would take more than `MOST`; at a start they are short, and grow."""
+"""Number of steps in turn of which a row would take more than `MOST`; at a start they are short, and grow."""
 UNEVEN = 1e-3
 """Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
 HALVINGS = 8
@@ -196,7 +208,7 @@ class Implicit:
         Raises
         ------
         OpenBook
-            Where the energy drift exceeds `refweb.central_difference.DRIFT`.
+            Where the energy drift exceeds `refweb.stepping.DRIFT`.
         SolverError
             Where the solver gives up, or a number is not finite.
         """

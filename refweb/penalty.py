@@ -1,6 +1,6 @@
 """Penalty of contact with a body of any shape, as compiled kernels.
 
-Each contact, see `refweb.contact_points`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where that is largest or
+Each contact, see `refweb.shape_contacts`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where that is largest or
 an end of its element, so that the force is that of a fixed place. With the shares N of nodes, −1 of the body, g = ∂δ/∂x
 and the matrix H = ∂²δ/∂x² at the place, and y' = dy/dξ of the line,
 
@@ -16,30 +16,13 @@ import math
 import numpy as np
 
 from .compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from .contact_points import (
-    AWAY,
-    CORE,
-    GROWTH,
-    KIND,
-    PENALTY,
-    PLACES,
-    POWER,
-    bent,
-    contacts,
-    deepest,
-    dot,
-    from_axes,
-    moves,
-    point,
-    share,
-    window,
-    within,
-)
+from .contact_points import AWAY, CORE, GROWTH, KIND, PENALTY, POWER, dot, point, share
+from .shape_contacts import PLACES, bent, contacts, deepest, from_axes, moves, window, within
 from .shapes import SPHERE
 
 SHALLOW = 0.05
-"""Share of the depth that a contact may come to which losses reckon with before it is there: a step that has to do with
-more is iterated for longer, and the next bound knows."""
+"""Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
+step that has to do with more is iterated for longer, and the next bound knows the depth."""
 SPREAD = 2.5
 """Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
 

@@ -1,6 +1,6 @@
 """Losses of contact, by damping and by friction, as compiled kernels.
 
-At a contact, see `refweb.contact_points`, let N₀ = k W δ^p be the push of the penalty, n = −∂δ/∂x the normal, u the
+At a contact, see `refweb.shape_contacts`, let N₀ = k W δ^p be the push of the penalty, n = −∂δ/∂x the normal, u the
 velocity of the line's point relative to the body's, with the rate of depth δ̇ = −n·u and the slip u_t = u + δ̇ n, and
 q = u_t/√(|u_t|² + v_s²). By Hunt and Crossley [1]_ and by Coulomb, regularised,
 
@@ -25,25 +25,9 @@ import math
 import numpy as np
 
 from .compiled import BOUND, FORCE, STIFFNESS, kernel
-from .contact_points import (
-    AWAY,
-    FRICTION,
-    KIND,
-    LOSS,
-    PENALTY,
-    PLACES,
-    SLIP,
-    along_axes,
-    bent,
-    contacts,
-    dot,
-    from_axes,
-    moves,
-    share,
-    window,
-    within,
-)
-from .penalty import foreseen, lightness, lowered, raised, thickness, turn
+from .contact_points import AWAY, FRICTION, KIND, LOSS, PENALTY, SLIP, dot, share
+from .penalty import SHALLOW, foreseen, lightness, lowered, raised, thickness, turn
+from .shape_contacts import PLACES, along_axes, bent, contacts, from_axes, moves, window, within
 from .shapes import RING, SPHERE
 
 
@@ -275,7 +259,7 @@ def kernels(pieces, nodes, functions, spins):
             deep, _ = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions)
             if deep > 0.0:
                 loss, friction = data[c, AWAY + 3 * nodes + LOSS], data[c, AWAY + 3 * nodes + FRICTION]
-                most = loss * speed * (1.0 + friction) + friction
+                most = SHALLOW * loss * speed * (1.0 + friction) + friction
                 spread(
                     most * data[c, PENALTY] * lowered(data, c, nodes, deep), mass, rates, cells, data, c, nodes, spins
                 )
@@ -287,7 +271,7 @@ def kernels(pieces, nodes, functions, spins):
             if deep > 0.0:
                 at = AWAY + 3 * nodes
                 loss, friction = data[c, at + LOSS], data[c, at + FRICTION]
-                most = loss * (1.0 + friction) + friction * (1.0 + loss * speed) / data[c, at + SLIP]
+                most = loss * (1.0 + friction) + friction * (1.0 + SHALLOW * loss * speed) / data[c, at + SLIP]
                 spread(
                     most * data[c, PENALTY] * raised(data, c, nodes, deep), mass, rates, cells, data, c, nodes, spins
                 )

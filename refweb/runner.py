@@ -15,7 +15,6 @@ from .laws import LINEAR
 from .observables import Result
 from .scene import Scene, in_file
 from .solution import SOLVER, Solution, as_history
-from .spin_limit import turns
 from .state import State, floor_remark, strength_remark
 
 
@@ -221,7 +220,7 @@ def _remarks(state, stats, utilisation):
         law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
         reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
         reason += 'law = "tension-only" has no such states'
-        if turns(state.system):
+        if state.system.turns:
             reason = "the web would leave this state by itself; start from a web that is deflected"
         yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
     if stats["slack_nodes"]:

@@ -56,6 +56,7 @@ class Static(Table):
 _TOLERANCES = ("rtol", "atol_position", "atol_velocity")
 OWN = {
     "central-difference": ("safety", "step_size"),
+    "explicit": ("safety", "step_size", "order"),
     "cvode": (*_TOLERANCES, "family", "max_order", "linear_solver"),
     "ida": (*_TOLERANCES, "max_order", "linear_solver"),
 }
@@ -68,14 +69,17 @@ class Dynamic(Table):
 
     Parameters
     ----------
-    method : {"central-difference", "cvode", "ida"}
-        Explicit central differences, or CVODE or IDA of SUNDIALS with steps that follow from the error.
+    method : {"central-difference", "explicit", "cvode", "ida"}
+        Explicit central differences, explicit steps of higher order, or CVODE or IDA of SUNDIALS with steps that follow
+        from the error.
     duration : float
         Time to simulate [s].
     safety : float
-        Of central differences: share of the bound of stability that a step is, 0 < safety ≤ 1; 0.5 by default.
+        Of explicit steps: share of the bound of stability that a step is, 0 < safety ≤ 1; 0.5 by default.
     step_size : float, optional
         Instead: largest step [s]; the step used is the largest below it that divides a history row.
+    order : {4, 6}
+        Of "explicit": order of the steps, 6 by default, see `refweb.nystrom`.
     rtol : float
         Of CVODE and IDA: relative tolerance of displacements and velocities, 1e-6 by default.
     atol_position, atol_velocity : float, optional
@@ -95,10 +99,11 @@ class Dynamic(Table):
     """
 
     kind: str = choice("dynamic", default="dynamic")
-    method: str = choice("central-difference", "cvode", "ida", default="central-difference")
+    method: str = choice("central-difference", "explicit", "cvode", "ida", default="central-difference")
     duration: float = real(above=0, unit="s")
     safety: float | None = real(None, above=0, at_most=1)
     step_size: float | None = real(None, above=0, unit="s")
+    order: int | None = integer(None, at_least=4, at_most=6)
     rtol: float | None = real(None, at_least=1e-13, at_most=0.1)
     atol_position: float | None = real(None, above=0, unit="m")
     atol_velocity: float | None = real(None, above=0, unit="m/s")
@@ -115,7 +120,9 @@ class Dynamic(Table):
                 methods = " or ".join(f'"{name}"' for name, keys in OWN.items() if key in keys)
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning with method = "{self.method}", only with {methods}')
-        defaults = {"safety": 0.5, "rtol": 1e-6, "family": "bdf", "linear_solver": "auto"}
+        if self.order == 5:
+            raise InputError("order = 5 must be 4 or 6")
+        defaults = {"safety": 0.5, "order": 6, "rtol": 1e-6, "family": "bdf", "linear_solver": "auto"}
         defaults["max_order"] = 12 if self.family == "adams" else 2
         for key, value in defaults.items():
             if getattr(self, key) is None and key in OWN[self.method]:

@@ -28,14 +28,9 @@ LOOSE = 1e-10
 """Stiffness that holds each node of a loose part against its translation, over the largest EA/L."""
 
 
-def turns(system):
-    """Whether centrifugal forces act."""
-    return any(family.name == FRAME for family in system.families)
-
-
 def drifting(system):
     """Number of translations of loose parts that centrifugal forces drive away from the axis."""
-    if not (turns(system) and system.loose):
+    if not system.loose:
         return 0
     moves = np.zeros((len(system.free), len(system.loose)))
     for k, places in enumerate(_loose(system)):
@@ -56,8 +51,6 @@ def _centrifugal(system):
 
 def check_speed(system, t):
     """Refuse a frame that turns at the limit or above it, with that limit."""
-    if not turns(system):
-        return
     net, factor = system.net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
     system.prepare(t)

@@ -20,11 +20,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import certificate, follower_loads, spin_limit
 from .errors import SolverError
 from .factor import Factor
 from .inputs import InputError
-from .interior import InteriorPoint
 from .laws import LINEAR, TENSION_ONLY
 from .lines import AXIAL_STIFFNESS
 
@@ -81,13 +79,16 @@ def check_supported(system, t):
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
             remedy = "support one of them"
-            if spin_limit.turns(system):
+            if system.turns:
                 remedy += ", or move the web so that its centre of mass is on the axis of [frame]"
             raise SolverError(
                 f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
                 f"{resultant:.4g} N at step {t:g}, with no support in that direction: {remedy}"
             )
-    spin_limit.check_speed(system, t)
+    if system.turns:
+        from .spin_limit import check_speed
+
+        check_speed(system, t)
 
 
 def force_scale(system, t, x, tension):
@@ -121,13 +122,21 @@ class Newton:
         self.geometric = system.assemble_lines(blocks)
         self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
         self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
-        self.follows = follower_loads.act(system)
-        self.factor = (follower_loads.Lu if self.follows else Factor)(system.pattern)
+        self.follows, self.turns, self.drifting = not system.conservative, system.turns, 0
+        if self.follows:
+            from .follower_loads import Lu
+
+            self.factor = Lu(system.pattern)
+        else:
+            self.factor = Factor(system.pattern)
+        if self.turns:
+            from .spin_limit import drifting
+
+            self.drifting = drifting(system)
         number = np.full(3 * system.rows, -1)
         number[system.free] = np.arange(len(system.free))
         held = np.concatenate([[], *(number[3 * rows + axis] for rows, axis in system.loose)]).astype(int)
         self.loose = system.pattern.diagonal[held]  # places that hold what floats, whose loads balance
-        self.turns, self.drifting = spin_limit.turns(system), spin_limit.drifting(system)
         self.scale = 0.0
 
     def _matrix(self, t, x, shift, definite):
@@ -221,7 +230,9 @@ class Newton:
             compressed = bool((tension < 0.0).any()) and not (self.follows or self.turns)
             p, shift = self._step(t, x, r, shift, compressed, stats)
             if self.follows:
-                x, shift = follower_loads.search(system, self.factor, t, x, p, shift, stats)
+                from .follower_loads import search
+
+                x, shift = search(system, self.factor, t, x, p, shift, stats)
             else:
                 x, energy, shift = self._search(t, x, p, r @ p, energy, shift, stats)
             force, out = system.forces(t, x)
@@ -282,6 +293,8 @@ def _add(stats, other):
 
 def _by_interior_point(newton, t, x, spent):
     """Equilibrium from the central path; the nearer its end, the better Newton's start."""
+    from .interior import InteriorPoint
+
     inner = InteriorPoint(newton.system, t, x, newton.loose)
     for tolerance in (1e-7, 1e-11, 1e-16):
         start = inner.follow(tolerance)
@@ -325,7 +338,7 @@ def solve(system, load_steps, progress=None):
     newton, x = Newton(system, progress), np.zeros((system.rows, 3))
     for k, t in enumerate(load_steps):
         spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-        path = system.net.law.number != LINEAR and certificate.dead(system)
+        path = system.net.law.number != LINEAR and system.dead
         try:
             state = newton.solve(t, x, warm=k > 0, most=25 if path else 400)
         except NotFound as error:
@@ -337,7 +350,9 @@ def solve(system, load_steps, progress=None):
         if not (convex or newton.follows):
             state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
         _add(state.stats, spent)
-        if certificate.applies(system):
+        if system.convex:
+            from . import certificate
+
             state.certificate = certificate.certify(system, state, newton.factor)
         x = state.x
         yield state

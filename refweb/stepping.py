@@ -10,12 +10,20 @@ from .compiled import BOUND, ENERGY, kernel
 from .lines import LENGTH
 from .probes import PLACE
 
+DRIFT = 1e-2
+"""Largest energy drift of a run whose result is returned."""
 MOST = 1e8
 """Largest number of steps of a history row."""
 SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
 """Columns of events: the probe, or behind the probes the sum, whose value passes a level; the side it is on, 1 above
 and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts; whether
 the run ends there; time of the event, infinite before."""
+
+
+def event_table(events):
+    """Events (slot, level, rising, stop) as rows of numbers."""
+    rows = [(slot, level, 0.0, float(rising), float(stop), np.inf) for slot, level, rising, stop in events]
+    return np.array(rows, dtype=float).reshape(len(rows), 6)
 
 
 @kernel()
@@ -58,13 +66,16 @@ def set_lengths(t, lengths, reeled, reeled_lines, line_drives, line_cells, line_
 
 @kernel()
 def advance(
-    count, h, t, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
+    count, h, t, kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
     kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines,
     line_drives, line_cells, line_data, reeled_cells, by_length,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
     energies, energy_outs, watch, total, events,
 ):  # fmt: skip
     """``count`` steps of size h from time t; writes x, v, f, peaks, the book of work and the supports' impulse.
+
+    A step is a kick, a drift and a kick of h times ``kicks`` and ``drifts``; more of them are a method of higher order,
+    for forces that follow from displacement alone.
 
     Forces that depend on velocity see that at the end of the step, which the second kick, thereby implicit, is iterated
     for: kick and kick stay adjoint to each other, and the method of order 2. The iteration contracts with ½ h C/m.
@@ -76,6 +87,8 @@ def advance(
     first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
     before, reaction, motion = np.empty((driven.size, 7)), np.zeros(3), len(kernels)
     power, half = np.zeros(len(kernels)), np.empty((rows if viscous.size else 0, 3))
+    more = drifts.size - 1
+    kick, drift, last_kick = kicks[more] * h, drifts[more] * h, kicks[more + 1] * h
     unused = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     flat_half, flat_unused = half.reshape(-1), unused.reshape(-1)
     for n in range(powers.shape[0]):
@@ -89,15 +102,29 @@ def advance(
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
         now = t + step * h
+        for n in range(more):
+            for k in range(3):
+                impulse[k] += kicks[n] * h * reaction[k]
+                reaction[k] = 0.0
+            for q in range(3 * rows):
+                speed = flat_v[q] + kicks[n] * h * flat_inverse[q] * flat_f[q]
+                flat_v[q] = speed
+                flat_x[q] += drifts[n] * h * speed
+                flat_f[q] = 0.0
+            first(now, x, v, f, first_cells, first_data, lines)
+            for i in still:
+                kernels[i](now, x, v, f, cells[i], data[i], outs[i])
+            for s in range(held.size):
+                reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
         for d in range(driven.size):
             r = driven[d]
             before[d, 6] = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
             for k in range(3):
                 before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
         for q in range(3 * rows):
-            speed = flat_v[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
+            speed = flat_v[q] + kick * flat_inverse[q] * flat_f[q]
             flat_v[q] = speed
-            flat_x[q] += h * speed
+            flat_x[q] += drift * speed
             flat_f[q] = 0.0
         for i in range(len(drives)):
             drives[i](now, x, v, f, drive_cells[i], drive_data[i], drive_outs[i])
@@ -132,7 +159,7 @@ def advance(
                 flat_f[q] += flat_unused[q]
         else:
             for q in range(3 * rows):
-                flat_v[q] += 0.5 * h * flat_inverse[q] * flat_f[q]
+                flat_v[q] += last_kick * flat_inverse[q] * flat_f[q]
         for n in range(powers.shape[0]):
             i, column = powers[n, 0], powers[n, 1]
             if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
@@ -146,12 +173,12 @@ def advance(
             for k in range(3):
                 book[motion] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
         for k in range(3):
-            impulse[k] += 0.5 * h * reaction[k]
+            impulse[k] += kick * reaction[k]
             reaction[k] = 0.0
         for s in range(held.size):
             reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
         for k in range(3):
-            impulse[k] += 0.5 * h * reaction[k]
+            impulse[k] += last_kick * reaction[k]
         for i in followed:
             value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
             if signs[i] * value > signs[i] * peaks[i]:
@@ -213,11 +240,11 @@ def ended_by(events):
 
 @kernel()
 def rows_ahead(
-    ends, safety, step_size, finer, limit, state, saved, linear, mass, inverse, free, held, driven, working, powers,
-    still, viscous, kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives, drive_cells,
-    drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
-    corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
-    watch, events, history,
+    ends, safety, step_size, finer, limit, kicks, drifts, state, saved, linear, mass, inverse, free, held, driven,
+    working, powers, still, viscous, kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives,
+    drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data,
+    reeled_cells, by_length, corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, book,
+    impulse, watch, events, history,
 ):  # fmt: skip
     """Advance to each time of ``ends`` and write a row of ``history`` there.
 
@@ -273,9 +300,9 @@ def rows_ahead(
             h = total[-1] = interval / count
             acting = lengths if changing else lengths[:0]
             taken = advance(
-                count, h, state[0], x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
-                kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting, reeled, reeled_lines,
-                line_drives, line_cells, line_data, reeled_cells, by_length,
+                count, h, state[0], kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still,
+                viscous, kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting, reeled,
+                reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
                 probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
                 energies, energy_outs, watch, total, events,
             )  # fmt: skip

@@ -14,8 +14,8 @@ import numpy as np
 
 from .bodies import row_names
 from .effects import Constraint, Drive, Family, LineDrive
+from .laws import TENSION_ONLY
 from .lines import LENGTH
-from .pattern import Pattern
 
 
 class System:
@@ -47,7 +47,7 @@ class System:
     """
 
     def __init__(self, net, effects, supported):
-        for effect in effects:
+        for effect in sorted(effects, key=lambda effect: hasattr(effect, "on")):  # bodies before what makes them turn
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
         self.net, self.effects = net, effects
@@ -116,6 +116,8 @@ class System:
     @cached_property
     def pattern(self):
         """The fixed `refweb.pattern.Pattern` of the tangent."""
+        from .pattern import Pattern
+
         return Pattern(self.rows, self.free, [f.cells for f in self._stiff])
 
     @cached_property
@@ -252,6 +254,27 @@ class System:
     def symmetric(self):
         """Whether K and C are symmetric."""
         return all(f.symmetric for f in self.families)
+
+    @property
+    def conservative(self):
+        """Whether every force has a potential."""
+        return self.symmetric and all(f.energy is not None for f in self.families)
+
+    @property
+    def dead(self):
+        """Whether the only internal forces are the tensions of the lines, and all others are dead loads."""
+        outer = [f for f in self.families if not f.internal]
+        return all(f.stiffness is None and f.energy is not None for f in outer) and len(self.families) == len(outer) + 1
+
+    @property
+    def convex(self):
+        """Whether the potential is convex and the loads are dead: `refweb.certificate` then bounds errors."""
+        return self.net.law.number == TENSION_ONLY and self.dead
+
+    @property
+    def turns(self):
+        """Whether centrifugal forces act."""
+        return any(family.name == "frame" for family in self.families)
 
     def damping(self, t, x, v):
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity."""

@@ -50,7 +50,7 @@ def slope(errors, steps):
 
 
 @pytest.mark.parametrize("law", ["linear", "tension-only"])
-@pytest.mark.parametrize("share", [0.01, 0.5, 0.99])
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.99])
 def test_arm_with_a_tip_mass(law, share):
     """(EA/L)(l − L) = m Ω² l: l = L/(1 − share²) at a share of the limit √(EA/mL)."""
     speed = share * np.sqrt(EA / 2.0)

@@ -48,7 +48,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 CASES = {
-    "The paper": (),
+    "The paper": (
+        "cable_law",
+        "length_area",
+        "webs_under_load",
+        "webs_hit",
+        "example_1",
+    ),
     "Statics": (
         "two_links",
         "three_cables",
@@ -58,8 +64,16 @@ CASES = {
         "lattice_green",
         "conic_programming",
     ),
-    "Dynamics": (),
-    "Methods": ("cross_validation",),
+    "Dynamics": (
+        "transverse_impact",
+        "pulled_end",
+        "slack_tether",
+        "mass_on_arms",
+        "falling_chain",
+        "spinning_arm",
+        "frequencies",
+        "free_net",
+    ),
 }
 """Parts of the report and the names of their cases, in the order of the report."""
 VERDICTS = ("holds", "does not hold", "holds only when", "cannot be decided")

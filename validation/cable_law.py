@@ -120,17 +120,18 @@ def case(quick):
         Verdict(
             '"When the web segment is compressed, there is hardly resistance" (section 2.2)',
             "holds only when",
-            f"the floor αE is small beside the stresses. With ε0 = 0, α = η: at η = 1e-3 a slack segment pushes with "
-            f"{1e-3 * wide:.0f} kPa, more than the {1e-3 * largest:.1f} kPa that the hexagon web carries anywhere under "
-            f"5 N; at η = 1e-6 with {narrow:.0f} Pa, {100 * narrow / largest:.2g} % of it. The paper does not state η",
+            "the floor αE is small beside the stresses. With ε0 = 0, α = η: at η = 1e-3 a slack segment pushes with "
+            f"{1e-3 * wide:.0f} kPa, more than the {1e-3 * largest:.1f} kPa that the hexagon web carries anywhere "
+            f"under 5 N; at η = 1e-6 with {narrow:.0f} Pa, {100 * narrow / largest:.2g} % of it. The paper does not "
+            "state η",
             wide > largest and narrow < 0.01 * largest,
         ),
         Verdict(
             '"The incompressible property of cable material" (sections 1 and 2.2)',
             "does not hold",
-            f"an incompressible segment would resist any shortening without limit; this law gives way to "
-            f"{-1e-3 * crush[0]:.2f} kPa at ε = −0.01, {-1e-3 * crush[1]:.2f} kPa at −0.5 and {-1e-3 * crush[2]:.2f} kPa "
-            "at −0.999, never more than αE (E = 70 MPa, ε0 = 0, η = 1e-3). Compression-free is meant",
+            "an incompressible segment would resist any shortening without limit; this law gives way to "
+            f"{-1e-3 * crush[0]:.2f} kPa at ε = −0.01, {-1e-3 * crush[1]:.2f} kPa at −0.5 and {-1e-3 * crush[2]:.2f} "
+            "kPa at −0.999, never more than αE (E = 70 MPa, ε0 = 0, η = 1e-3). Compression-free is meant",
             all(-c <= wide for c in crush),
         ),
     ]
@@ -154,7 +155,9 @@ def drawn():
     for one, (name, many, label) in zip(plot, curves, strict=True):
         for colour, numbers in zip(plots.COLOURS, many, strict=False):
             bottom = law.floor(*numbers)
-            one.plot(1e3 * strain, 1e-3 * law.stress(strain, *numbers), color=colour, label=f"{name} = {label(numbers)}")
+            one.plot(
+                1e3 * strain, 1e-3 * law.stress(strain, *numbers), color=colour, label=f"{name} = {label(numbers)}"
+            )
             line = np.maximum(numbers[0] * (strain - numbers[1]), 0.0) - bottom
             one.plot(1e3 * strain, 1e-3 * line, "--", color=colour, linewidth=0.7)
         one.legend(frameon=False, fontsize="small", loc="upper left")

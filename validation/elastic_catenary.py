@@ -126,6 +126,7 @@ def case(quick):
             found = np.array(errors["inclined", order])
             right.loglog(counts, found, mark, label=f"elements of order {order}")
             right.loglog(counts, found[0] * (counts / counts[0]) ** (-2.0 * order), **plots.REFERENCE)
+        plots.ticks(right, [16, 32, 64, 128])
         left.legend(frameon=False, fontsize="small")
         right.legend(frameon=False, fontsize="small")
         return page

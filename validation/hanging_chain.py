@@ -62,7 +62,7 @@ def case(quick):
         joints, tension = polygon(links, drop, modulus * AREA)
         place = solution.positions[:, [0, 2]]
         shapes.append((drop, modulus, place, joints))
-        title = f"drop {drop:g} m, E = {modulus:g} Pa"
+        title = f"drop {drop:g} m, E = {1e-6 * modulus:g} MPa"
         worst = np.abs(place - joints).max()
         # A taut chain is at least as stiff as its H/l on the graph's Laplacian, whose least eigenvalue is 4 sin²(π/2n).
         each = LENGTH / links * (1 + tension.max() / (modulus * AREA))
@@ -82,7 +82,7 @@ def case(quick):
         for drop, modulus, place, joints in shapes:
             if modulus != 7e9:
                 plot.plot(*joints.T, **plots.REFERENCE)
-                plot.plot(*place.T, "o", markersize=3, label=f"E = {modulus:g} Pa, drop {drop:g} m")
+                plot.plot(*place.T, "o", markersize=3, label=f"E = {1e-6 * modulus:g} MPa, drop {drop:g} m")
         plot.legend(frameon=False, loc="upper center")
         return page
 

@@ -53,7 +53,7 @@ CHOICES = {
 """Linear solvers that are compared, by family and tolerance."""
 NEAR = 1.3
 """Largest ratio of ``auto`` to the best."""
-REPEATS = 2
+REPEATS = 3
 
 
 def ran(solver, end):

@@ -95,10 +95,10 @@ def case(quick):
                                          ["w T/F a", "w(0, 0) − w(1, 1), in F a/T"], columns=2)  # fmt: skip
         along = np.arange(-middle, middle + 1)
         left.plot(along, exact[middle], **plots.REFERENCE)
-        left.plot(along, w[middle], "o", markersize=4, label="through the load")
+        left.plot(along, w[middle], "o", markersize=4, label="at the load")
         left.plot(along, exact[middle // 2], **plots.REFERENCE)
-        left.plot(along, w[middle // 2], "s", markersize=4, label="half-way to the rim")
-        left.legend(frameon=False, fontsize="small")
+        left.plot(along, w[middle // 2], "s", markersize=4, label="half-way")
+        left.legend(frameon=False, fontsize="small", loc="upper left")
         right.plot(sizes, diagonal, "o")
         right.axhline(1 / np.pi, **plots.REFERENCE)
         return page

@@ -5,8 +5,8 @@ counted, beside closed forms. With mesh area A and side s, the paper's for trian
 
     meshes 3N² − 3N + 1      lines 9N² − 3N      s² = 2A/(3√3)      L/S = s (9N² − 3N)/[(3N² − 3N + 1) A]
 
-In each ring k of hexagons there are 6k around the one in the middle; 6 (3N² − 3N + 1) sides are counted twice but for
-the 12N − 6 of the frame. The square formulas stand in the paper for the hexagons as well (section 3.1.3).
+Ring k around the one in the middle has 6k hexagons; of their 6 (3N² − 3N + 1) sides all are shared by two but the
+12N − 6 of the frame. The square formulas stand in the paper for the hexagons as well (section 3.1.3).
 
 Counts of the three webs of figures 11 to 13 are judged by Euler's formula, nodes − lines + meshes = 1 for what hangs
 together in a plane.
@@ -24,6 +24,8 @@ EPS = np.finfo(float).eps
 AREA = 0.01
 LIMITS = {"triangle": 3**0.75, "square": 2.0, "hexagon": 3**0.25 * sqrt(2.0)}
 """√A L/S of endless webs, as the paper prints them."""
+PAPER = (45, 40, 3554, 5165)
+"""Rows, columns, nodes and lines of the hexagon web that `refweb.Paper` makes."""
 INRADIUS = {"triangle": 3**-0.75, "square": 0.5, "hexagon": sqrt(sqrt(3.0) / 6.0)}
 """Radius of the circle within a mesh, over √A."""
 
@@ -70,7 +72,9 @@ def case(quick):
     rows, ratios, constants = [], {}, {"triangle": 1 / 3, "square": 1 / 2, "hexagon": 2 / 3}
     for mesh, limit in LIMITS.items():
         found, exact = ([of(mesh, n) for n in sizes] for of in (counted, closed))
-        worst = max(abs(a / b - 1) for one, two in zip(found, exact, strict=True) for a, b in zip(one, two, strict=True))
+        worst = max(
+            abs(a / b - 1) for one, two in zip(found, exact, strict=True) for a, b in zip(one, two, strict=True)
+        )
         source, reason = "closed form", "rounding of the positions, at most N of them from end to end"
         text = f"{mesh}: meshes, length and ratio for N = 1 … {sizes[-1]}, largest relative error"
         rows.append(Row(text, worst, 0.0, source, 8 * EPS * sizes[-1], reason, scale=1))
@@ -93,7 +97,6 @@ def case(quick):
     webs = {mesh: refweb.Paper(mesh=mesh, cable_length=201.4).web() for mesh in LIMITS}
     size = {mesh: (len(web.points), len(web.lines)) for mesh, web in webs.items()}
     windows = windows_of(1778)
-    fitting = [one for one in windows if one[2] == 3554]
     euler = 2014 - 755 + 1
     sectors = euler + len(webs["triangle"].rim)
     verdicts = [
@@ -106,50 +109,55 @@ def case(quick):
         Verdict(
             "Section 3.1.3: a hexagon web has (2N − 1)² meshes and 4N (2N − 1) √A of cable",
             "does not hold",
-            f"these are the square's formulas. At N = 2, seven hexagons touch and have {two[1] / sqrt(AREA):.3f} √A of "
-            f"cable in 30 sides; the formulas say {copied[0]} and {copied[1]} √A. Their own limit is {endless:.4f}, not "
-            "the 1.86 that the section goes on to state, which is the right one",
+            f"these are the square's formulas. At N = 2, seven hexagons touch and have {two[1] / sqrt(AREA):.3f} √A "
+            f"of cable in 30 sides; the formulas say {copied[0]} and {copied[1]} √A. Their own limit is "
+            f"{endless:.4f}, not the 1.86 that the section goes on to state, which is the right one",
             two[0] == 7 == counted("hexagon", 2)[0] and copied == (9, 24) and abs(endless - 2) < 1e-5,
         ),
         Verdict(
             '"The length-area ration of the hexagon-mesh web is higher than those of the other two" (section 3.1)',
             "does not hold",
-            "it is the lowest: " + ", ".join(f"{mesh} {LIMITS[mesh]:.3f}" for mesh in LIMITS) + " over √A, and at every "
-            "N from 3 on",
-            all(ratios["hexagon"][k] < min(ratios["square"][k], ratios["triangle"][k]) for k in range(2, len(sizes)))
+            "it is the lowest: "
+            + ", ".join(f"{mesh} {LIMITS[mesh]:.3f}" for mesh in LIMITS)
+            + " over √A, and at every N",
+            all(ratios["hexagon"] < np.minimum(ratios["square"], ratios["triangle"]))
             and LIMITS["hexagon"] < LIMITS["square"] < LIMITS["triangle"],
         ),
         Verdict(
             '"Hexagon-mesh shape can effectively decrease the use of materials" (section 4)',
             "holds only when",
-            f"meshes of one area are compared: {100 * (1 - LIMITS['hexagon'] / LIMITS['square']):.1f} % less cable than "
-            f"squares and {100 * (1 - LIMITS['hexagon'] / LIMITS['triangle']):.1f} % less than triangles. A web that "
-            "stops the same ball has meshes of one inscribed circle of radius r, and then all three need "
+            f"meshes of one area are compared: {100 * (1 - LIMITS['hexagon'] / LIMITS['square']):.1f} % less cable "
+            f"than squares and {100 * (1 - LIMITS['hexagon'] / LIMITS['triangle']):.1f} % less than triangles. A web "
+            "that stops the same ball has meshes of one inscribed circle of radius r, and then all three need "
             + ", ".join(f"{same_hole[mesh]:.12g}" for mesh in LIMITS)
-            + " × S/r of cable: the same, as each mesh is r/2 times its perimeter, shared by two",
+            + " times S/r of cable: a mesh is r/2 times its perimeter, and each side serves two meshes",
             max(abs(value - 1) for value in same_hole.values()) < 1e-12,
         ),
         Verdict(
             "Figure 13 and section 3.3.1: the hexagon web has 1778 meshes, 5156 elements and 3554 nodes",
             "does not hold",
-            f"of the {len(windows)} windows of 1778 hexagons in rows of alternately n and n − 1, "
-            f"{len(fitting)} has 3554 nodes, {fitting[0][0]} rows of {fitting[0][1]} and {fitting[0][1] - 1}, and it has "
-            f"{fitting[0][3]} elements: two digits are swapped",
-            [one[3] for one in fitting] == [5165] and size["hexagon"] == (3554, 5165),
+            f"all {len(windows)} windows of 1778 hexagons in rows of alternately n and n − 1 have 3554 nodes, and none "
+            f"has 5156 elements: they have {', '.join(str(one[3]) for one in windows)}. {PAPER[3]} belongs to "
+            f"{PAPER[0]} rows of {PAPER[1]} and {PAPER[1] - 1}, the one that is nearly square: two digits are swapped",
+            {one[2] for one in windows} == {3554}
+            and 5156 not in {one[3] for one in windows}
+            and PAPER in windows
+            and size["hexagon"] == PAPER[2:],
         ),
         Verdict(
             "Example 3: the triangle web has 1540 meshes, 2014 elements and 755 nodes",
             "does not hold",
-            f"Euler's formula leaves {euler} meshes to 2014 elements and 755 nodes, as figure 11 has it for the same web; "
-            f"{sectors} if the sectors between its links were counted as well, as in the square and the hexagon web",
+            f"Euler's formula leaves {euler} meshes to 2014 elements and 755 nodes, as figure 11 has it for the same "
+            f"web; {sectors} if the sectors between its links were counted as well, as in the square and the hexagon "
+            "web",
             euler == 1260 and sectors != 1540 and size["triangle"] == (755, 2014),
         ),
         Verdict(
             "Figures 11 and 12: 1260 meshes, 2014 elements, 755 nodes; 1600 meshes, 3120 elements, 1677 nodes",
             "holds",
             f"the webs exist as counted: (nodes, elements) are {size['triangle']} and {size['square']}. In the square "
-            f"web 1600 counts the {len(webs['square'].rim)} sectors between links at the rim as meshes, in the triangle "
-            "web 1260 does not count them",
+            f"web 1600 counts the {len(webs['square'].rim)} sectors between links at the rim as meshes, in the "
+            "triangle web 1260 does not count them",
             size["square"] == (1677, 3120) and 3120 - 1677 + 1 + len(webs["square"].rim) == 1600,
         ),
     ]
@@ -159,7 +167,9 @@ def case(quick):
     def drawn():
         return _drawn(sizes, ratios)
 
-    caption = "Left: the webs of three layers of figure 9, meshes of one area. Right: √A times their ratio of length to "
+    caption = (
+        "Left: the webs of figure 9, three layers of meshes of one area. Right: √A times their ratio of length to "
+    )
     return Case(
         rows=rows,
         verdicts=verdicts,

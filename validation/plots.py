@@ -30,16 +30,10 @@ def axes(xlabel, ylabel, columns=1, height=3.6, **options):
     return page, (found[0] if columns == 1 else found)
 
 
-def convergence(sizes, curves, order, xlabel, ylabel):
-    """Errors over sizes in logarithms: ``curves`` by name, and a line of the ``order`` that theory gives."""
-    page, plot = axes(xlabel, ylabel)
-    sizes = np.asarray(sizes, dtype=float)
-    for marker, (name, errors) in zip("osD^v", curves.items(), strict=False):
-        plot.loglog(sizes, errors, marker, label=name)
-    start = next(iter(curves.values()))
-    plot.loglog(sizes, start[-1] * (sizes / sizes[-1]) ** order, "--", label=f"order {abs(order):g}", **REFERENCE)
-    plot.legend(frameon=False)
-    return page
+def ticks(plot, numbers):
+    """Ticks of a logarithmic x axis at some numbers, written out."""
+    plot.set_xticks(numbers, [f"{number:g}" for number in numbers])
+    plot.set_xticks([], minor=True)
 
 
 def picture(solution, field=None):

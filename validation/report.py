@@ -17,7 +17,8 @@ HEADS = ("quantity", "refweb", "reference", "source", "difference", "tolerance, 
 STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1c1c1c; background: #fff; margin: 0 auto; padding: 0 1rem 4rem;
-  max-width: 60rem; overflow-wrap: break-word; }
+  max-width: 76rem; overflow-wrap: break-word; }
+p, ul, pre, figure, blockquote { max-width: 60rem; }
 h1, h2, h3 { line-height: 1.25; } h2 { margin-top: 3rem; border-bottom: 2px solid #1b5e8c; }
 h3 { margin-top: 2.5rem; }
 a { color: #1b5e8c; }
@@ -25,7 +26,8 @@ pre { overflow-x: auto; background: #f4f4f2; padding: .6rem .8rem; }
 .scroll { overflow-x: auto; margin: 1rem 0; }
 table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .7rem .3rem 0; border-bottom: 1px solid #ddd; }
-td { min-width: 4rem; max-width: 22rem; } td.number { white-space: nowrap; }
+td { min-width: 4rem; max-width: 22rem; } td.number { white-space: nowrap; } td:first-child { min-width: 11rem; }
+table.number td:nth-child(6) { min-width: 16rem; }
 .yes { color: #2f6b3c; } .no { color: #b3261e; font-weight: bold; }
 figure { margin: 1.5rem 0; } img { max-width: 100%; height: auto; } figcaption { font-size: .9rem; color: #444; }
 blockquote { margin: 1rem 0; padding: .2rem 0 .2rem 1rem; border-left: 3px solid #1b5e8c; }
@@ -153,7 +155,8 @@ def _table(title, heads, rows, kind):
     head = "".join(f"<th>{_inline(word)}</th>" for word in heads)
     body = "\n".join("<tr>" + "".join(cell(i, word) for i, word in enumerate(row)) + "</tr>" for row in rows)
     caption = f"<p><strong>{_inline(title)}</strong></p>\n" if title else ""
-    return f'{caption}<div class="scroll"><table><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table></div>'
+    table = f'<table class="{kind}"><thead><tr>{head}</tr></thead>\n<tbody>{body}</tbody></table>'
+    return f'{caption}<div class="scroll">{table}</div>'
 
 
 def _page(blocks, images):

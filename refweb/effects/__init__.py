@@ -7,7 +7,7 @@ matrix and knows no other effect.
     A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
     `Drive`, a `LineDrive` or a `Constraint`.
 ``extend(net)``
-    The `refweb.lines.Net` with more rows or mass; comes before any ``on``.
+    The `refweb.lines.Net` with more rows or mass; comes before any ``on``, of what has no ``on`` first.
 ``start(net, supported, v)``
     Writes initial velocities.
 """

@@ -133,7 +133,7 @@ class Body(Table):
         return np.array([np.cross(first, own), first, own])
 
     def _grown(self):
-        """(radius of growth, half sizes of the core) of `refweb.shapes`."""
+        """(radius of growth, half sizes of the core) of `refweb.shape_contacts`."""
         if self.shape == "sphere":
             return self.radius, (0.0, 0.0, 0.0)
         if self.shape == "ring":

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .. import penalty, rubbing
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..contact_points import AWAY, PENALTY, RADIUS, closest, dot, numbers, point, share, touched
 from ..inputs import InputError, Table, field, nearest, real, shown
@@ -171,7 +170,8 @@ class Contact(Table):
     Parameters
     ----------
     stiffness : float
-        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent.
+        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent. A sphere touches a line once, other shapes
+        each of its elements up to three times.
     exponent : {1, 1.5}
         p of the push k δ^p at the depth δ.
     damping : float
@@ -242,7 +242,10 @@ class Contact(Table):
         return np.ascontiguousarray(np.vstack(cells), dtype=np.int32), np.ascontiguousarray(np.vstack(data))
 
     def _pressed(self, net, element, plain, bodies):
-        force, energy, stiffness, bound = (kernels if plain else penalty.kernels)(*element)
+        make = kernels
+        if not plain:
+            from ..penalty import kernels as make
+        force, energy, stiffness, bound = make(*element)
         cells, data = self._numbers(net, bodies)
         return Family(
             name="contact",
@@ -258,6 +261,8 @@ class Contact(Table):
         )
 
     def _rubbed(self, net, element, spins, bodies):
+        from .. import rubbing
+
         force, stiffness, bound, damping, damping_bound = rubbing.kernels(*element, spins)
         cells, data = self._numbers(net, bodies, spins)
         return Family(

@@ -1,0 +1,162 @@
+"""Explicit steps of order 4 and 6: orders, stability, invariants, and what they refuse."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import refweb
+from refweb.central_difference import CentralDifference
+from refweb.inputs import InputError
+from refweb.nystrom import Nystrom, splitting, stability
+
+ORDERS = [4, 6]
+END = 0.02
+
+
+def window(effects=(), **changes):
+    """A small square web under prestress, smooth law; its centre is thrown."""
+    thrown = refweb.Velocity(node="centre", value=(0.5, 0.2, 2.0))
+    cable = refweb.Cable(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=0.01)
+    return refweb.Scene(
+        **{"web": refweb.Window(mesh="square", rows=4, columns=4, side=0.2), "cable": cable, **changes},
+        effects=[thrown, *effects],
+        solve=refweb.Dynamic(duration=END),
+    ).build()
+
+
+def exact(system, end):
+    """Displacement of every row by scipy's DOP853."""
+    free, n = system.free, len(system.free)
+    mass = np.repeat(system.net.mass, 3)[free]
+
+    def rate(t, y):
+        x, v = np.zeros((2, system.rows, 3))
+        x.ravel()[free], v.ravel()[free] = y[:n], y[n:]
+        return np.concatenate([y[n:], system.force(t, x, v).ravel()[free] / mass])
+
+    start = np.concatenate([np.zeros(n), system.initial_velocity().ravel()[free]])
+    y = solve_ivp(rate, (0.0, end), start, "DOP853", rtol=1e-13, atol=1e-15).y[:n, -1]
+    x = np.zeros((system.rows, 3))
+    x.ravel()[free] = y
+    return x
+
+
+def ran(system, end, **steps):
+    solver = Nystrom(system, **steps)
+    run = solver.start()
+    return solver, run, solver.rows(run, [end])
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_order(order):
+    """Fitted over steps of which the error is far above rounding; 0.4: the next even order adds to the first ones."""
+    system = window()
+    reference, limit = exact(system, END), CentralDifference(system).bound()
+    steps = limit * np.array([0.8, 0.6, 0.45, 0.35])
+    counts = np.ceil(END / steps)
+    errors = [
+        np.abs(ran(system, END, order=order, step_size=END / n * (1 + 1e-12))[1].x - reference).max() for n in counts
+    ]
+    assert errors[-1] > 1e-13
+    slope = np.polyfit(np.log(END / counts), np.log(errors), 1)[0]
+    assert abs(slope - order) < 0.4, (slope, errors)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_far_fewer_evaluations_than_central_differences(order):
+    """At 0.4 of its own bound, against central differences at 0.05 of theirs, which evaluate forces more often."""
+    system = window()
+    reference = exact(system, END)
+    solver, run, _ = ran(system, END, order=order, safety=0.4)
+    other = CentralDifference(system, safety=0.05)
+    slow = other.start()
+    other.rows(slow, [END])
+    assert solver.figures(run)["nfev"] < other.figures(slow)["nfev"]
+    assert np.abs(run.x - reference).max() < 0.3 * np.abs(slow.x - reference).max()
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_coefficients(order):
+    """Symmetric, consistent, and stable up to a bound below that of as many steps of central differences."""
+    kicks, drifts = splitting(order)
+    assert len(kicks) == len(drifts) + 1
+    np.testing.assert_array_equal(kicks, kicks[::-1])
+    np.testing.assert_array_equal(drifts, drifts[::-1])
+    np.testing.assert_allclose([kicks.sum(), drifts.sum()], 1.0, rtol=1e-15)
+    assert stability(np.array([0.5, 0.5]), np.array([1.0])) == pytest.approx(2.0, abs=2e-3)
+    assert 2.0 < stability(kicks, drifts) < 2.0 * len(drifts)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_bound_of_stability(order):
+    """A mass on a linear spring stays bounded below it; longer steps are refused."""
+    solver = Nystrom(window(), order=order)
+    limit = stability(solver.kicks, solver.drifts)
+    assert solver.stretch == pytest.approx(0.5 * limit)
+    for share in (0.3, 0.6, 0.9, 0.99):
+        q, p, largest, h = 0.0, 1.0, 0.0, share * limit
+        for _ in range(2000):
+            for i, kick in enumerate(solver.kicks):
+                p -= kick * h * q
+                if i < len(solver.drifts):
+                    q += solver.drifts[i] * h * p
+            largest = max(largest, abs(q))
+        assert largest < 10.0  # near a resonance the ellipse that it moves on is long
+    with pytest.raises(InputError, match="step_size = .* must be ≤"):
+        Nystrom(window(), order=order, step_size=1.01 * solver.stretch * solver.bound())
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_books_close(order):
+    """Energy without drift over long times; the impulse of the supports makes up for momentum to rounding."""
+    system = window([refweb.Gravity(acceleration=(0.0, 1.0, -9.81))])
+    solver, run, rows = ran(system, 0.2, order=order, safety=0.9)
+    assert run.drift < {4: 1e-4, 6: 1e-6}[order]  # at 0.9 of the bound the fastest of its waves have some 1e-4 and 1e-6
+    free = ~system.supported
+    mass = system.net.mass[:, None]
+    weight = (mass * (0.0, 1.0, -9.81)).sum(axis=0) * 0.2
+    start = np.where(free, mass * system.initial_velocity(), 0.0).sum(axis=0)
+    end = np.where(free, mass * run.v, 0.0).sum(axis=0)
+    np.testing.assert_allclose(end - start, weight + run.impulse, atol=1e-11 * np.abs(run.impulse).max())
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_an_impact_is_that_of_central_differences(order):
+    """A ball on a slack web has kinks; both are within their stated errors."""
+    ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.01, 0.02, -0.105), velocity=(0.0, 0.0, 2.0))
+    given = refweb.Scene(
+        web=refweb.Window(mesh="square", rows=6, columns=6, side=0.2),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
+        effects=[ball, refweb.Contact(stiffness=1e4)],
+        solve=refweb.Dynamic(duration=0.1, method="explicit", order=order),
+    )
+    explicit = refweb.run(given)
+    central = refweb.run(given.replace(solve=refweb.Dynamic(duration=0.1, safety=0.1)))
+    assert explicit.solver["method"] == "explicit" and explicit.solver["energy_drift"] < 1e-3
+    for name, one in explicit.results.items():
+        other = central.results[name]
+        assert abs(one.value - other.value) <= one.error + other.error, name
+    assert explicit.results["deflection"].error < 1e-2 * explicit.results["deflection"].value
+
+
+REFUSED = {
+    "damping": refweb.Damping(time=1e-3),
+    "rotating frame": refweb.Frame(angular_velocity=(0.0, 0.0, 1.0)),
+    "motion": refweb.Motion(node="rim", displacement=[(0, 0, 0, 0), (1, 0, 0, 1)]),
+    "reel": refweb.Reel(lines="all", factor=[(0, 1), (1, 0.9)]),
+    "load in time": refweb.Load(node="centre", force=(0, 0, 1), factor=[(0, 0), (1, 1)]),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_refused(name):
+    with pytest.raises(InputError, match='method = "explicit" takes no.*use "central-difference" or "cvode"'):
+        Nystrom(window([REFUSED[name]]))
+
+
+def test_keys():
+    with pytest.raises(InputError, match="order = 5 must be 4 or 6"):
+        refweb.Dynamic(duration=1.0, method="explicit", order=5)
+    with pytest.raises(InputError, match='order = 4 has no meaning with method = "central-difference"'):
+        refweb.Dynamic(duration=1.0, order=4)
+    assert refweb.Dynamic(duration=1.0, method="explicit").order == 6

@@ -1,0 +1,286 @@
+"""What a scene does not call for is not there: no module of it is loaded, no entry of the tangent and no kernel waits.
+
+Modules are those of a process of its own that runs one scene and nothing else. Entries of the pattern are counted from
+the lines of the web and the pairs that an effect couples, kernels from what the compiled loop is called with.
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tomllib
+from functools import cache
+
+import numba
+import numpy as np
+import pytest
+
+import refweb
+from refweb import central_difference
+from refweb.scene import EFFECTS, LISTS, SHIPPED, WEBS
+
+ROOT = pathlib.Path(refweb.__file__).parent
+MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in ROOT.rglob("*.py")}
+
+# Modules
+
+EVERY = {"inputs", "errors", "compiled", "settings", "laws", "cables", "webs", "elements", "lines", "shapes", "bodies"}
+EVERY |= {"effects", "effects.elasticity", "system", "state", "observables", "scene", "io", "solution", "runner"}
+"""What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
+NEWTON = {"statics", "factor", "pattern"}
+DYNAMICS = {"dynamics", "probes", "stepping"}
+METHOD = {
+    "newton": NEWTON,
+    "relaxation": NEWTON | {"relaxation"},
+    "central-difference": DYNAMICS | {"central_difference"},
+    "cvode": DYNAMICS | {"implicit", "cvode", "pattern", "factor"},
+    "ida": DYNAMICS | {"implicit", "cvode", "ida", "pattern", "factor"},
+}
+BELOW = {name: {"time_tables"} for name in ("load", "motion", "pressure", "thrust")}
+BELOW |= {name: {"time_tables", "lengths"} for name in ("reel", "temperature")} | {"contact": {"contact_points"}}
+"""What effects are made of besides their own file."""
+BASE = ("numpy", "scipy.sparse", "numba", "numba.core.typing.cffi_utils", "skfem")
+"""Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""
+LOADED = "print(json.dumps(sorted(sys.modules)))"
+
+
+def run(*lines):
+    """Modules of a process that has run some lines."""
+    program = "\n".join(["import json, sys", *lines, LOADED])
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+def libraries(modules):
+    """Names of what stands outside of refweb and the standard library, scipy by its parts."""
+    depth = lambda name: 3 if name.startswith("scipy.sparse.") else 2 if name.startswith("scipy.") else 1  # noqa: E731
+    names = {".".join(name.split(".")[: depth(name)]) for name in modules}
+    return {n for n in names if n.split(".")[0] not in sys.stdlib_module_names and not n.startswith("refweb")}
+
+
+@cache
+def brought(*names):
+    return libraries(run(*(f"import {name}" for name in names)))
+
+
+def called(given):
+    """(modules of refweb, libraries) that a scene calls for, from its tables."""
+    solve, web, tension_only = given["solve"], given["web"]["kind"], given["cable"]["law"] == "tension-only"
+    method = solve.get("method", "newton" if solve["kind"] == "static" else "central-difference")
+    modules, outside = EVERY | METHOD[method], list(BASE)
+    modules.add(WEBS[web].split(":")[0].removeprefix("refweb."))
+    for effect in given.keys() & EFFECTS.keys():
+        modules |= {f"effects.{effect}"} | BELOW.get(effect, set())
+    if "contact" in given:
+        keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
+        rubs = keys & {"damping", "friction"}
+        if rubs or "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"]):
+            modules |= {"shape_contacts", "penalty"}
+        if rubs:
+            modules.add("rubbing")
+    rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
+    if solve.get("start", "web") != "web":
+        modules.add("starts")
+    if rests:
+        modules |= NEWTON
+        if "frame" in given:
+            modules.add("spin_limit")
+        elif tension_only:
+            modules.add("certificate")
+        if given.keys() & {"pressure", "thrust"}:
+            modules.add("follower_loads")
+    if rests or method in ("cvode", "ida"):
+        outside.append("qdldl")
+    if method in ("cvode", "ida"):
+        outside.append("sksundae")
+    if web == "cable":
+        outside.append("scipy.optimize")  # a root
+    if '"corners"' in json.dumps(given):
+        outside.append("scipy.spatial")  # a hull
+    return modules, outside
+
+
+def brief(name, **solve):
+    """The tables of a shipped scene; in dynamics of two rows."""
+    given = tomllib.loads((SHIPPED / f"{name}.toml").read_text(encoding="utf-8"))
+    if given["solve"]["kind"] == "dynamic":
+        given["solve"] |= {"duration": 2.0 * given["output"]["interval"], **solve}
+    return given
+
+
+SCENES = {path.stem: brief(path.stem) for path in sorted(SHIPPED.glob("*.toml"))}
+SCENES["by cvode"] = brief("square-impact", method="cvode")
+SCENES["by ida"] = brief("square-impact", method="ida")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_run_loads_what_its_scene_calls_for(name):
+    given = SCENES[name]
+    modules, outside = called(given)
+    assert modules <= MODULES
+    loaded = run("import refweb", f"refweb.run(refweb.Scene.from_dict(json.loads({json.dumps(given)!r})))")
+    own = {m.removeprefix("refweb.") for m in loaded if m.startswith("refweb.")}
+    assert own == modules, f"not called for: {sorted(own - modules)}, not seen: {sorted(modules - own)}"
+    assert libraries(loaded) <= brought(*outside), sorted(libraries(loaded) - brought(*outside))
+
+
+def test_the_package_alone_loads_nothing():
+    loaded = run("import refweb")
+    assert libraries(loaded) <= libraries(run()) and {m for m in loaded if m.startswith("refweb")} == {"refweb"}
+
+
+def test_libraries_are_told_apart():
+    """The comparison above is of names that are there: what is left out of `BASE` is seen."""
+    pictures = {"pyvista", "vtkmodules", "matplotlib", "PIL", "meshio"}
+    assert not brought(*BASE) & (pictures | {"sksundae", "qdldl", "scipy.optimize", "scipy.spatial"})
+    assert {"matplotlib", "scipy.optimize", "scipy.spatial"} <= brought("matplotlib", "scipy.optimize")
+
+
+# Entries and kernels
+
+PLAIN = {
+    "web": {"kind": "window", "mesh": "square", "rows": 4, "columns": 4, "side": 0.5},
+    "cable": {"law": "tension-only", "modulus": 7e7, "area": 1e-4, "density": 200.0},
+    "solve": {"kind": "dynamic", "duration": 1e-3},
+    "output": {"interval": 1e-3},
+    "accuracy": {"error": "none"},
+}
+BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, -0.3], "velocity": [0.0, 0.0, 1.0]}
+TABLES = {
+    "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    "load": {"node": 5, "force": [0.0, 0.0, 1.0]},
+    "motion": {"node": 6, "displacement": [[0.0, 0.0, 0.0, 0.0], [1.0, 0.1, 0.0, 0.0]]},
+    "point_mass": {"node": 5, "mass": 1.0},
+    "velocity": {"node": 5, "value": [0.0, 0.0, 1.0]},
+    "body": BALL,
+    "contact": {"stiffness": 1e4},
+    "link": {"nodes": [5, 6]},
+    "frame": {"angular_velocity": [0.0, 0.0, 1.0]},
+    "pressure": {"lines": [0, 1], "normal": [0.0, 0.0, 1.0], "value": 1.0},
+    "thrust": {"node": 4, "line": 0, "force": 1.0},
+    "damping": {"time": 1e-4},
+    "bending": {"stiffness": 1e-3},
+    "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
+    "temperature": {"expansion": 1e-5, "change": 10.0},
+}
+LISTED = ("force", "energy", "bound", "bound of damping", "motion", "lengths", "work of lengths", "probe")
+FAMILY = {"force": 1, "energy": 1, "bound": 1}
+KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
+KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
+KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
+KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
+KERNELS |= {name: {} for name in ("point_mass", "velocity", "body")}
+"""Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
+
+
+def scene_of(*effects):
+    given = dict(PLAIN)
+    for name in effects:
+        given[name] = [TABLES[name]] if name in LISTS else TABLES[name]
+    if "contact" in effects:
+        given["body"] = [BALL]
+    if "link" in effects:
+        given["solve"] = {**given["solve"], "method": "ida"}
+    return refweb.Scene.from_dict(given)
+
+
+def entries(*effects):
+    """Places (row and axis, row and axis) of the pattern of a scene with some effects."""
+    system = scene_of(*effects).build()
+    pattern = system.pattern
+    column = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr))
+    return set(zip(system.free[pattern.indices].tolist(), system.free[column].tolist(), strict=True))
+
+
+def coupled(pairs, held, rows):
+    """The same from pairs of rows that feel each other, rows that are held, and the number of rows."""
+    both = {(i, j) for a, b in pairs for i, j in ((a, b), (b, a), (a, a), (b, b)) if i not in held and j not in held}
+    places = {(3 * i + p, 3 * j + q) for i, j in both for p in range(3) for q in range(3)}
+    return places | {(3 * i + p, 3 * i + p) for i in range(rows) if i not in held for p in range(3)}
+
+
+def continued(web):
+    """Pairs of the outer nodes of two lines that continue each other."""
+    ends = {}
+    for a, b in web.lines.tolist():
+        for here, there in ((a, b), (b, a)):
+            ends.setdefault(here, []).append(there)
+    unit = lambda a, b: (web.points[b] - web.points[a]) / np.linalg.norm(web.points[b] - web.points[a])  # noqa: E731
+    return [
+        (a, c)
+        for b, around in ends.items()
+        for i, a in enumerate(around)
+        for c in around[:i]
+        if unit(a, b) @ unit(b, c) > np.cos(np.pi / 6.0)
+    ]
+
+
+def expected(*effects):
+    web = scene_of().build().net.web
+    pairs, held, rows = web.lines.tolist(), set(web.rim.tolist()), len(web.points)
+    if "bending" in effects:
+        pairs = pairs + continued(web)
+    if "motion" in effects:
+        held = held | {TABLES["motion"]["node"]}
+    if {"body", "contact"} & set(effects):
+        rows += 1
+    if "contact" in effects:
+        pairs = pairs + [(node, rows - 1) for node in range(rows - 1)]
+    if "frame" in effects:  # the axes of a row with each other
+        pairs = pairs + [(row, row) for row in range(rows)]
+    return coupled(pairs, held, rows)
+
+
+def test_every_effect_is_here():
+    assert TABLES.keys() == EFFECTS.keys() == KERNELS.keys() | {"link"}
+
+
+@pytest.mark.parametrize("name", [None, *EFFECTS])
+def test_entries_with_an_effect_alone(name):
+    effects = [name] if name else []
+    assert entries(*effects) == expected(*effects)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_entries_without_an_effect(name):
+    """Of all effects but one: contact and its body are one."""
+    rest = [other for other in EFFECTS if other != name and not (name == "body" and other == "contact")]
+    assert entries(*rest) == expected(*rest)
+
+
+@pytest.fixture
+def handed(monkeypatch):
+    """Numbers of kernels in the lists that the compiled loop is handed for a scene with some effects."""
+
+    def count(*effects):
+        seen = []
+        monkeypatch.setattr(central_difference, "rows_ahead", lambda *given: seen.append(given) or 1)
+        solver = central_difference.CentralDifference(scene_of(*effects).build())
+        solver.rows(solver.start(), [1e-3])
+        lists = [one for one in seen[0] if isinstance(one, numba.typed.List)]
+        counts = [len(one) for one in lists if isinstance(one._dtype, numba.types.FunctionType)]
+        return dict(zip(LISTED, counts, strict=True))
+
+    return count
+
+
+def summed(*effects):
+    """The same from `KERNELS`; a web alone has its elasticity, and one work of lengths serves all that change them."""
+    total = dict.fromkeys(LISTED, 0) | FAMILY
+    for name in effects:
+        for which, number in KERNELS[name].items():
+            total[which] += number
+    total["work of lengths"] = min(total["lengths"], 1)
+    return total
+
+
+@pytest.mark.parametrize("name", [None, *KERNELS])
+def test_kernels_with_an_effect_alone(handed, name):
+    effects = [name] if name else []
+    assert handed(*effects) == summed(*effects)
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_kernels_without_an_effect(handed, name):
+    rest = [other for other in KERNELS if other != name and not (name == "body" and other == "contact")]
+    assert handed(*rest) == summed(*rest)

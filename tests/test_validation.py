@@ -1,0 +1,83 @@
+"""Every validation case passes at its quick setting, draws its figures, and stands in a report that is complete."""
+
+import re
+
+import pytest
+
+import validation
+from validation import Case, Figure, Row, Table, Verdict, plots, report
+from validation.__main__ import main
+
+
+@pytest.mark.parametrize("name", validation.names())
+def test_case(name):
+    title, body = validation.text(name)
+    assert title and body, f"validation/{name}.py does not say what it is"
+    case = validation.run(name, quick=True)
+    assert case.failures == []
+    for figure in case.figures:
+        assert figure.caption and plots.png(figure.draw()).startswith(b"\x89PNG")
+
+
+def sample():
+    def curve():
+        page, plot = plots.axes("x [m]", "y [m]")
+        plot.plot([0, 1], [0, 1])
+        return page
+
+    return Case(
+        rows=[
+            Row("within", 1.0 + 1e-10, 1.0, "closed form", 1e-9, "rounding", "m", 1e-10),
+            Row("printed", -18.4603, "-18.460", "a paper", unit="ft"),
+        ],
+        verdicts=[Verdict("a < b & c", "holds", "by 3 %", True)],
+        figures=[Figure("A line.", curve)],
+        tables=[Table("Parameters", ["name", "value"], [["η", "1e-5"]])],
+    )
+
+
+def row(value, reference, **options):
+    return Row("a", value, reference, "b", reason="c", **options)
+
+
+def test_rows():
+    """Agreement to the last printed digit, tolerances relative and absolute, ± that covers; no number never agrees."""
+    assert row(-18.4604, "-18.460").passes and not row(-18.4606, "-18.460").passes
+    assert row(-0.8595, "-0.859").passes and row(12.4, "12").passes and not row(12.6, "12").passes
+    assert row(2.001, 2.0, tolerance=1e-3).passes and not row(2.003, 2.0, tolerance=1e-3).passes
+    assert row(1e-3, 0.0, tolerance=0.1, scale=0.02).passes and not row(3e-3, 0.0, tolerance=0.1, scale=0.02).passes
+    assert not row(float("nan"), 1.0, tolerance=1.0).passes
+    assert row(1.1, 1.0, tolerance=1.0, error=0.2, covered=True).passes
+    assert not row(1.1, 1.0, tolerance=1.0, error=0.05, covered=True).passes
+    for wrong in (dict(reference=0.0, tolerance=1.0), dict(reference=1.0)):
+        with pytest.raises(ValueError, match="a: "):
+            row(1.0, **wrong)
+
+
+def test_failures():
+    assert Case().failures == ["the case asserts nothing"]
+    assert Case(rows=[row(2.0, 1.0, tolerance=0.5)]).failures[0].startswith("a: 2 for 1.0 1, difference 1.00e+00")
+    assert Case(verdicts=[Verdict("x", "holds", "y", False)]).failures == ["x: no longer holds"]
+    with pytest.raises(ValueError, match="empty"):
+        Table("t", ["a", "b"], [["1", ""]])
+
+
+def test_report(tmp_path, monkeypatch, capsys):
+    """No cell is empty, the page loads nothing, Markdown's pictures are there, and the status tells of a failure."""
+    monkeypatch.setattr(validation, "CASES", {"Part": ("one", "two")})
+    monkeypatch.setattr(report, "CASES", validation.CASES)
+    described = "Words, doi:10.1000/182.\n\n    F = m a\n\n- item"
+    monkeypatch.setattr(report, "text", lambda name: (f"Title {name}", described))
+    monkeypatch.setattr("validation.__main__.run", lambda name, quick: sample() if name == "one" else 1 / 0)
+    assert main(["--quick", "--out", str(tmp_path)]) == 1
+    assert "ZeroDivisionError" in capsys.readouterr().out
+    page, words = ((tmp_path / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
+    cells = re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", page, re.DOTALL)
+    assert len(cells) > 20 and all(re.sub(r"<.*?>", "", cell).strip() for cell in cells)
+    assert not re.search(r"<(script|link|iframe)|@import|url\(", page)
+    assert all(source.startswith("data:image/png;base64,") for source in re.findall(r'src="(.*?)"', page))
+    assert 'href="https://doi.org/10.1000/182"' in page and "a &lt; b &amp; c" in page and "<pre>F = m a</pre>" in page
+    (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", words)
+    assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
+    assert "fails: ZeroDivisionError" in page and "fails: ZeroDivisionError" in words
+    assert main(["one", "--quick", "--out", str(tmp_path)]) == 0
