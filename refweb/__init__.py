@@ -7,8 +7,11 @@ __version__ = "0.1.0"
 
 _HOME = {
     "run": "runner",
+    "resume": "runner",
     "modes": "vibration",
     "Modes": "vibration",
+    "cost": "work_precision",
+    "Cost": "work_precision",
     "Scene": "scene",
     "Static": "settings",
     "Dynamic": "settings",

@@ -1,4 +1,4 @@
-"""The command line: ``refweb run | check | info | picture | modes``.
+"""The command line: ``refweb run | resume | check | info | picture | modes``.
 
 Exit status: 0 solved, 1 the solver failed, 2 wrong input, 130 interrupted. Nothing heavy is imported before a command
 needs it.
@@ -31,6 +31,9 @@ def parser():
     command.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")
     command.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
 
+    command = commands.add_parser("resume", help="go on with a dynamic run that was killed, interrupted or failed")
+    command.add_argument("folder", metavar="DIR", help="its result folder")
+
     command = commands.add_parser("check", help="check a scene without solving it; writes nothing")
     command.add_argument("scene", metavar="SCENE")
 
@@ -50,6 +53,13 @@ def parser():
     command.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
     command.add_argument("--out", metavar="DIR", help="result folder (default: the title and -modes)")
     command.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
+
+    command = commands.add_parser("cost", help="what digits cost: errors and CPU times of every method on a scene")
+    command.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
+    command.add_argument("--out", metavar="DIR", help="folder for cost.png and cost.csv (default: none is written)")
+    command.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="for all of it (default: 120)")
+    command.add_argument("--observe", metavar="NAME", help="observable that errors are of (default: the first)")
+    command.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
     return top
 
 
@@ -63,6 +73,15 @@ def _run(arguments):
     with progress() as tell:
         solution = run(scene, out=out, force=arguments.force, progress=tell, announce=before)
     after(solution, out)
+
+
+def _resume(arguments):
+    from .console import after, before, progress
+    from .runner import resume
+
+    with progress() as tell:
+        solution = resume(arguments.folder, progress=tell, announce=before)
+    after(solution, arguments.folder)
 
 
 def _check(arguments):
@@ -80,7 +99,7 @@ def _check(arguments):
 def _info(arguments):
     import json
 
-    from .console import before, modal, stored
+    from .console import before, modal, stored, work_precision
     from .runner import web_of
     from .scene import Scene
 
@@ -91,7 +110,7 @@ def _info(arguments):
             if arguments.json:
                 print(json.dumps(summary, indent=1, ensure_ascii=False))
             else:
-                (modal if summary.get("kind") == "modes" else stored)(summary)
+                {"modes": modal, "cost": work_precision}.get(summary.get("kind"), stored)(summary)
         except FileNotFoundError:
             raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
         except BrokenPipeError:
@@ -137,6 +156,20 @@ def _modes(arguments):
     print(f"modes in {out}")
 
 
+def _cost(arguments):
+    from .console import before, progress, work_precision
+    from .scene import Scene
+    from .work_precision import cost
+
+    scene, out = Scene.load(arguments.scene), arguments.out
+    options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
+    with progress() as tell:
+        found = cost(scene, progress=tell, announce=before, **options)
+    work_precision(found.summary())
+    if out is not None:
+        print(f"diagram in {pathlib.Path(out) / 'cost.png'}")
+
+
 def main(arguments=None):
     """Run the command line; return the exit status."""
     for stream in (sys.stdout, sys.stderr):
@@ -152,7 +185,8 @@ def main(arguments=None):
     if arguments.command is None:
         top.print_help()
         return 2
-    command = {"run": _run, "check": _check, "info": _info, "picture": _picture, "modes": _modes}[arguments.command]
+    own = {"run": _run, "resume": _resume, "check": _check, "info": _info, "picture": _picture, "modes": _modes}
+    command = {**own, "cost": _cost}[arguments.command]
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # a batch queue's end is an interruption too
     try:

@@ -257,6 +257,14 @@ class CentralDifference:
         state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
         return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), book, np.zeros(3), events)
 
+    def stored(self, run):
+        """The `Run` as arrays by name, for a checkpoint."""
+        return vars(run)
+
+    def restored(self, arrays):
+        """The `Run` of a checkpoint."""
+        return Run(**arrays)
+
     def _peaks(self, run):
         return (*self._probes, run.peaks, run.times, run.places, run.work, run.impulse)
 

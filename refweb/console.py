@@ -118,6 +118,11 @@ def stored(summary, more=()):
     if summary["results"]:
         if any(r["error"] is None for r in summary["results"].values()):
             rows.append(("", "a value without ± has no known error"))
+        for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
+            found = {n: r for n, r in summary["results"].items() if r.get(key) is not None}
+            if found:
+                parts = (f"{name} by {shown(r[key], None, r['unit'])}" for name, r in found.items())
+                rows.append(("", f"{text} {', '.join(parts)}"))
     rows += more
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
@@ -177,6 +182,29 @@ def _modes(step):
 
 def _equal(one, other):
     return abs(one["value"] - other["value"]) <= max(one["error"] + other["error"], 1e-9 * abs(one["value"]))
+
+
+def work_precision(summary):
+    """Print the box of a work-precision diagram from the content of its ``run.json``."""
+    unit, runs = summary["observable"]["unit"], summary["runs"]
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    for name in ("method", "setting", f"error [{unit}]", "of state [m]", "CPU [s]", "nfev", "nsteps"):
+        grid.add_column(Text(name), justify="left" if name in ("method", "setting") else "right", no_wrap=True)
+    number = lambda value, form: "unknown" if value is None else f"{value:{form}}"  # noqa: E731
+    for run in (run for run in runs if run["status"] == "solved"):
+        errors = (number(run[key], ".1e") for key in ("error_observable", "error_state"))
+        work = (str(run[key]) for key in ("nfev", "nsteps"))
+        grid.add_row(run["method"], run["setting"], *errors, number(run["cpu_s"], ".3f"), *work)
+    rows = [("runs", grid)] if grid.rows else []
+    told = {}
+    for run in (run for run in runs if run["status"] != "solved"):
+        told.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
+    for (status, method, message), settings in told.items():
+        which = "" if status == "refused" else f", {settings[0]}" + (" and finer" if len(settings) > 1 else "")
+        rows.append(({"budget": "left out"}.get(status, status), f"{method}{which}: {message or 'there was no time'}"))
+    rows.append(("price", summary["sentence"]))
+    rows.append(("cost", f"{summary['cost']['cpu_s']:.2f} s CPU, {summary['cost']['wall_s']:.2f} s wall"))
+    _box(f"{summary['scene']}: what digits cost", rows)
 
 
 @contextlib.contextmanager

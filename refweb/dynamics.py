@@ -89,14 +89,14 @@ def row_times(scene):
     return times
 
 
-def blocks(solver, run, times, stops):
+def blocks(solver, run, times, stops, first=0):
     """Advance through ``times`` in blocks that last about a tenth of a second and end at each of ``stops``.
 
     Yields
     ------
     (first row, rows of the solver)
     """
-    first, size = 0, 1
+    size = 1
     while first < len(times):
         stop = stops[np.searchsorted(stops, first)]
         count = min(size, stop + 1 - first)
@@ -125,6 +125,19 @@ def with_errors(results, twin, order=2.0):
     """
     errors = {n: SPREAD * order * abs(r.value - twin[n].value) + 4e-16 * abs(r.value) for n, r in results.items()}
     return {n: r._replace(error=errors[n]) for n, r in results.items()}
+
+
+CLIMBS = 8
+"""Number of times that accuracy is raised for digits that are missing."""
+STUCK = 1.5
+"""Factor by which an error has to fall where half the step, or a tenth of rtol, is meant to quarter it."""
+
+
+def missing_digits(results, digits):
+    """±, over what so many significant digits allow, of each result that has not got them."""
+    allowed = {name: 0.5 * 10.0**-digits * abs(result.value) for name, result in results.items()}
+    shares = {n: np.inf if r.error is None else r.error / max(allowed[n], 5e-324) for n, r in results.items()}
+    return {name: share for name, share in shares.items() if share > 1.0}
 
 
 class _Twin:
@@ -188,6 +201,8 @@ class Motion:
         What acts.
     solution : refweb.Solution
         What is filled in.
+    kept : dict of str to ndarray, optional
+        Checkpoint of a run that goes on.
 
     Raises
     ------
@@ -195,7 +210,7 @@ class Motion:
         For what central differences cannot take.
     """
 
-    def __init__(self, scene, system, solution):
+    def __init__(self, scene, system, solution, kept=None):
         self.scene, self.system, self.solution = scene, system, solution
         self.rows = []
         self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
@@ -212,14 +227,20 @@ class Motion:
         self._own = self._hidden()
         self._events = [self._event(event) for event in scene.event]
         self._accuracy = scene.solve.safety if self.explicit else scene.solve.rtol
+        self._repeated, self._missing, self._kept = 0, {}, kept
+        if kept is not None:
+            self._accuracy, self._repeated = float(kept["accuracy"]), int(kept["repeated"])
+            self._missing = dict(zip(kept["missing"].tolist(), kept["shares"].tolist(), strict=True))
         self._solver = self.solver(self._accuracy)
         self._columns = self._places()
         self.begin = None, None
-        if (folder := scene.start_folder) is not None:
+        if kept is not None:
+            self.begin = kept.get("begin_x"), kept.get("begin_v")
+        elif (folder := scene.start_folder) is not None:
             from .starts import stored
 
             self.begin = stored(system, folder)
-        if scene.solve.start != "equilibrium":
+        if scene.solve.start != "equilibrium" and kept is None:
             solution.warnings += started(system, self.begin[0])
 
     @property
@@ -329,9 +350,9 @@ class Motion:
         return results
 
     def follow(self, folder, tell):
-        """Run; a run whose energy book is open is repeated with half the step, or a tenth of rtol, twice at most."""
+        """Run, and run again at a higher accuracy as long as digits are asked for that are missing."""
         scene, solution, accuracy = self.scene, self.solution, self._accuracy
-        if scene.solve.start == "equilibrium":
+        if scene.solve.start == "equilibrium" and self._kept is None:
             from .starts import equilibrium
 
             found = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
@@ -342,7 +363,51 @@ class Motion:
                     'leaves it by itself; without a [frame] law = "tension-only" has no such states'
                 )
             solution.warnings += started(self.system, found.x)
-        for attempt in range(3):
+        accuracy = self._closed(accuracy, folder, tell)
+        if scene.accuracy.digits is None:
+            return
+        before = self._missing
+        for _ in range(CLIMBS):
+            missing = missing_digits(solution.reduced, scene.accuracy.digits)
+            if not missing or any(before.get(name, np.inf) <= STUCK * share for name, share in missing.items()):
+                break
+            before = self._missing = missing
+            accuracy *= self._climb(max(missing.values()))
+            self._again(accuracy, folder)
+            accuracy = self._closed(accuracy, folder, tell)
+        for name, share in missing_digits(solution.reduced, scene.accuracy.digits).items():
+            falls = before.get(name, np.inf) > share / STUCK
+            why = "it would take more still" if falls else "a higher accuracy changes it as much: it is not determined"
+            solution.warnings.append(
+                f"{name} has not the {scene.accuracy.digits} digits asked for: its ± is {share:.3g} times what they "
+                f"allow with {self._key} = {accuracy:g}; {why}"
+            )
+
+    def _climb(self, share):
+        """Factor on safety, or rtol, for errors that are ``share`` times what they may be."""
+        if self.explicit:
+            return min(max(0.8 * share ** (-1.0 / self._solver.order), 0.125), 0.5)
+        return min(max(0.5 * share**-1.5, 0.01), 0.1)
+
+    @property
+    def _key(self):
+        return "safety" if self.explicit else "rtol"
+
+    def _again(self, accuracy, folder):
+        """Forget what was computed, for a run of another accuracy."""
+        self._accuracy, self._solver, self.rows = accuracy, self.solver(accuracy), []
+        self.solution.frames.clear()
+        if folder is not None:
+            folder.restart(self.solution.summary())
+
+    def _closed(self, accuracy, folder, tell):
+        """Run with errors; one whose energy book is open again with half the step, or a tenth of rtol, twice at most.
+
+        Returns the accuracy of the run.
+        """
+        scene, solution = self.scene, self.solution
+        for attempt in range(self._repeated, 3):
+            self._repeated = attempt
             with _Twin(self, accuracy, scene.accuracy.error == "twin") as twin:
                 try:
                     results = self._run(self._solver, folder, lambda share: tell("running", share))
@@ -350,17 +415,13 @@ class Motion:
                     if attempt == 2 or scene.solve.step_size is not None:
                         raise
                     accuracy *= 0.5 if self.explicit else 0.1
-                    key = "safety" if self.explicit else "rtol"
-                    solution.warnings.append(f"{error}; repeated with {key} = {accuracy:g}")
-                    self._solver, self.rows = self.solver(accuracy), []
-                    solution.frames.clear()
-                    if folder is not None:
-                        folder.restart(solution.summary())
+                    solution.warnings.append(f"{error}; repeated with {self._key} = {accuracy:g}")
+                    self._again(accuracy, folder)
                     continue
                 tell("finding errors by a twin run", 1.0)
                 other, ended, failure = twin.results()
             break
-        solution.reduced = results
+        solution.reduced, self._repeated = results, 0
         if other:
             steps = solution.solver["nsteps"] / ended.nsteps
             less = steps**self._solver.order if self.explicit else FINER ** (-2.0 / 3.0)
@@ -372,13 +433,15 @@ class Motion:
                     found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
         if failure:
             solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
+        return accuracy
 
     def _run(self, solver, folder, tell):
         """One run from start to end, with rows and frames; returns its results."""
-        run, times, stops = solver.start(*self.begin), *self._times()
-        tell(0.0)
+        times, stops = self._times()
+        run, ahead = self._set_off(solver, folder, times, stops)
+        tell(ahead / len(times))
         try:
-            for first, history in blocks(solver, run, times, stops):
+            for first, history in blocks(solver, run, times, stops, ahead):
                 table = self.table(history)
                 last = first + len(table) - 1
                 if folder is None:
@@ -394,7 +457,17 @@ class Motion:
                     break
         finally:
             self._note(run)
-        return self.results(run, table[-1])
+        return self.results(run, self.rows[-1])
+
+    def _set_off(self, solver, folder, times, stops):
+        """The run at its start, or where its checkpoint has it, and the number of the row ahead."""
+        if self._kept is None:
+            return solver.start(*self.begin), 0
+        own = {key.removeprefix("run_"): array for key, array in self._kept.items() if key.startswith("run_")}
+        run, row = solver.restored(own), int(self._kept["row"])
+        self._kept, self.rows = None, [folder.last_row()]
+        folder.listed([*((n, times[n]) for n in stops[stops < row]), (row, run.time)], self.system.net.bodies)
+        return run, len(times) if run.stopped else row + 1
 
     def _times(self):
         """Times of the history rows, and the rows that frames are written at."""
@@ -422,8 +495,12 @@ class Motion:
         state = State(self.system, run.time, run.x.copy(), run.v.copy())
         if folder is None:
             self.solution.frames.append((number, state))
-        else:
-            folder.frame(number, state)
+            return
+        kept = {f"run_{name}": array for name, array in self._solver.stored(run).items()}
+        kept |= {f"begin_{name}": array for name, array in zip("xv", self.begin, strict=True) if array is not None}
+        kept |= {"row": number, "accuracy": self._accuracy, "repeated": self._repeated}
+        kept |= {"missing": np.array(list(self._missing), dtype=str), "shares": np.array(list(self._missing.values()))}
+        folder.frame(number, state, run=kept)
 
     def remarks(self):
         """What a reader of the results has to know."""

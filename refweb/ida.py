@@ -259,6 +259,16 @@ class Ida(Implicit):
         run.constraint_drift = self._drift = np.zeros(2)
         return run
 
+    def stored(self, run):
+        return {**super().stored(run), "constraint_drift": run.constraint_drift}
+
+    def restored(self, arrays):
+        arrays = dict(arrays)
+        drift = arrays.pop("constraint_drift")
+        run = super().restored(arrays)
+        run.constraint_drift = self._drift = drift
+        return run
+
     def _begin(self, t, x, v):
         from scipy.sparse.linalg import splu
         from sksundae.ida import IDA

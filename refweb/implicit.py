@@ -14,7 +14,7 @@ import io
 import os
 import re
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -171,7 +171,6 @@ class Implicit:
         v = system.initial_velocity() if v is None else v.copy()
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        self._reference = np.where(self._held, x, 0.0)  # motion is written over it
         signs, count = self._signs, len(self._probes)
         none, book = np.zeros(len(signs)), np.zeros(len(system.families) + 1)
         run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy(), book)
@@ -189,13 +188,34 @@ class Implicit:
         run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.energy, run.largest = own.sum(), np.abs(own).sum()
-        run.rates = self._rates(*self._sample_of(0.0, x, v))
+        self._enter(run)
+        return run
+
+    def stored(self, run):
+        """The `Course` as arrays by name, for a checkpoint; a solver's past steps are not among them."""
+        kept = {f.name: np.asarray(getattr(run, f.name)) for f in fields(run) if f.name != "rates"}
+        return {**kept, "driven": np.asarray(self._kinetic), "spent": np.array(list(self.stats.values()))}
+
+    def restored(self, arrays):
+        """The `Course` of a checkpoint, from which the solver begins with short steps of order 1, as at t = 0."""
+        arrays = dict(arrays)
+        self._kinetic = float(arrays.pop("driven"))
+        self.stats.update(zip(self.stats, arrays.pop("spent").tolist(), strict=True))
+        run = Course(**{name: array if array.ndim else array.item() for name, array in arrays.items()})
+        run.reached = run.time
+        self._enter(run)
+        return run
+
+    def _enter(self, run):
+        """Initialise the solver at the state of a run."""
+        system = self.system
+        self._reference = np.where(self._held, run.x, 0.0)  # motion is written over it
+        run.rates = self._rates(*self._sample_of(run.time, run.x, run.v))
         with self._reported(run), _quiet():
-            self._begin(0.0, x.ravel()[system.free], v.ravel()[system.free])
+            self._begin(run.time, run.x.ravel()[system.free], run.v.ravel()[system.free])
         self._unready = self.linear_solver == "sparse"
         if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
-        return run
 
     def rows(self, run, ends):
         """Advance a run to each time of ``ends`` in turn.

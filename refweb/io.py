@@ -1,10 +1,12 @@
 """Result folders: frames, history and summary, so written that a kill at any moment leaves a folder that opens.
 
-Every file but ``history.csv``, which grows by whole rows, is written beside its place and then moved there.
+Every file but ``history.csv``, which grows by whole rows, is written beside its place and then moved there. A frame is
+listed in ``web.pvd`` after it and the checkpoint of its state are there, and its row of the history before.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pathlib
@@ -16,10 +18,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from .bodies import row_names, surface
+from .errors import SolverError
 from .inputs import InputError, short
 
 OWN = re.compile(
-    r"scene\.toml|checkpoint\.npz|(history|modes)\.csv|run\.json|web\.pvd|web\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
+    r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
     r"|(frames/)?\.refweb-[^/]+"
 )
 """Files that a run writes, and that ``--force`` removes."""
@@ -117,13 +120,13 @@ def write_body(path, body, state):
     write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
 
 
-def _is_result(folder):
-    """Whether a folder holds a ``run.json`` that a run of refweb wrote."""
+def read_summary(folder):
+    """The content of ``run.json`` in a folder, None where there is none that a run of refweb wrote."""
     try:
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(run, dict) and "refweb" in (run.get("versions") or ())
+    except (OSError, ValueError, RecursionError):
+        return None
+    return run if isinstance(run, dict) and "refweb" in (run.get("versions") or ()) else None
 
 
 def check_folder(folder, force=False):
@@ -144,14 +147,14 @@ def check_folder(folder, force=False):
                 raise InputError(f"{name}: {part.name} is a file, not a folder")
             if not os.access(part, os.W_OK | os.X_OK):
                 raise InputError(f"{name}: {part.name} cannot be written: choose another folder")
-        full = existing == folder.absolute() and any(folder.iterdir())
+        full = existing == folder.absolute() and any(not p.name.startswith(".refweb-") for p in folder.iterdir())
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(f"{name}: cannot be used: {getattr(error, 'strerror', None) or error}") from None
     if full and not force:
         raise InputError(f"{name}: is not empty: choose another folder, or force (--force) to replace its results")
-    if full and not _is_result(folder):
+    if full and read_summary(folder) is None:
         raise InputError(f"{name}: holds no run.json of refweb, so it is no result of it: nothing was removed")
 
 
@@ -179,6 +182,19 @@ def number(value):
     return repr(float(value))
 
 
+def as_toml(given):
+    """The dict of a scene as TOML, its tables in the order they have there: sums are taken in that order."""
+    import tomli_w
+
+    parts = []
+    for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
+        if isinstance(value, list):
+            parts += [f"[[{key}]]\n{tomli_w.dumps(one)}" for one in value]
+        else:
+            parts.append(tomli_w.dumps({key: value}))
+    return "\n".join(parts)
+
+
 class Folder:
     """A result folder that is being written.
 
@@ -194,55 +210,119 @@ class Folder:
         First content of ``run.json``.
     table : str
         Name of the history's file.
+    row : int, optional
+        Number of the last row to keep of a run that goes on; nothing else is cleared then.
+
+    Raises
+    ------
+    SolverError
+        From every method that writes, where the folder cannot be written any more.
     """
 
-    def __init__(self, path, scene, columns, run, table="history.csv"):
-        import tomli_w
-
-        text = tomli_w.dumps(scene.to_dict())
+    def __init__(self, path, scene, columns, run, table="history.csv", row=None):
         self.path = pathlib.Path(path)
+        self._columns, self._table = columns, table
+        if row is not None:
+            self._go_on(row, run)
+            return
+        text = as_toml(scene.to_dict())
         try:
-            (self.path / "frames").mkdir(parents=True, exist_ok=True)
+            self.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(f"result folder {short(str(path))}: cannot be made: {error.strerror}") from None
-        self._columns, self._table = columns, table
+        with self._written():
+            (self.path / "scene.toml").unlink(missing_ok=True)  # from here on there is nothing to resume
         self.summary(run)
-        clear(self.path)
-        write_text(self.path / "scene.toml", text)
+        with self._written():
+            (self.path / "frames").mkdir(exist_ok=True)
+            clear(self.path)
+            write_text(self.path / "scene.toml", text)
         self._start()
 
+    @contextlib.contextmanager
+    def _written(self):
+        """Name the folder where it cannot be written: a full disk, a permission or the folder itself that is gone."""
+        try:
+            yield
+        except OSError as error:
+            raise SolverError(
+                f"result folder {short(str(self.path))}: cannot be written any more: {error.strerror or error}; "
+                "what was written is whole"
+            ) from None
+
     def _start(self):
-        self._history = open(self.path / self._table, "w", encoding="utf-8", newline="\n")
+        with self._written():
+            self._history = open(self.path / self._table, "wb", buffering=0)
         self.row(self._columns)
         self._listed = []
         self._list_frames()
 
+    def _go_on(self, row, run):
+        """Cut the history behind a row, and remove the frames behind it."""
+        try:
+            with open(self.path / self._table, "rb") as lines:
+                kept = [len(line) for line, _ in zip(lines, range(row + 2), strict=False)]
+                lines.seek(0)
+                header = lines.readline().decode(errors="replace").strip()
+        except OSError as error:
+            raise InputError(f"{self.path / self._table}: cannot be read: {error.strerror}") from None
+        if len(kept) < row + 2 or header != ",".join(self._columns):
+            raise InputError(f"{self.path / self._table}: is not the history that checkpoint.npz goes with")
+        with self._written():
+            self._history = open(self.path / self._table, "r+b", buffering=0)
+            kept = sum(kept)
+            self._history.truncate(kept)
+            self._history.seek(kept)
+            for path in [*self.path.glob(".refweb-*"), *(self.path / "frames").iterdir()]:
+                number = re.search(r"_(\d{6,})\.vtu$", path.name)
+                if OWN.fullmatch(path.relative_to(self.path).as_posix()) and not (number and int(number[1]) <= row):
+                    path.unlink()
+        self._listed = []
+        self.summary(run)
+
     def restart(self, run):
         """Remove rows and frames and begin anew; ``run`` is the content of ``run.json``."""
         self.close()
+        with self._written():
+            (self.path / "checkpoint.npz").unlink(missing_ok=True)
         self.summary(run)
-        clear(self.path, keep=("run.json", "scene.toml"))
+        with self._written():
+            clear(self.path, keep=("run.json", "scene.toml"))
         self._start()
 
     def row(self, values):
-        """Append a row to the history."""
-        text = ",".join(v if isinstance(v, str) else number(v) for v in values)
-        self._history.write(text + "\n")
-        self._history.flush()
+        """Append a row to the history, or nothing where it does not fit on the disk."""
+        line = (",".join(v if isinstance(v, str) else number(v) for v in values) + "\n").encode()
+        whole = self._history.tell()
+        with self._written():
+            try:
+                while line:
+                    line = line[self._history.write(line) :]
+            except OSError:
+                self._history.truncate(whole)
+                raise
 
-    def frame(self, number, state, shape=None):
-        """Write frame and checkpoint of a state and list the frame in ``web.pvd``, with a ``shape`` as its mode."""
-        name, time = f"frames/web_{number:06d}.vtu", state.time if shape is None else number
-        write_frame(self.path / name, state, shape)
-        self._listed.append((time, 0, name))
-        for part, body in enumerate(state.system.net.bodies, start=1):
-            name = f"frames/{body.name}_{number:06d}.vtu"
-            write_body(self.path / name, body, state)
-            self._listed.append((time, part, name))
-        net = state.system.net
-        arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
-        arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
-        write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
+    def frame(self, number, state, shape=None, run=None):
+        """Write frame and checkpoint of a state and list the frame in ``web.pvd``, with a ``shape`` as its mode.
+
+        ``run`` is what the checkpoint holds besides, as arrays by name, for the run to go on from it.
+        """
+        with self._written():
+            write_frame(self.path / f"frames/web_{number:06d}.vtu", state, shape)
+            for body in state.system.net.bodies:
+                write_body(self.path / f"frames/{body.name}_{number:06d}.vtu", body, state)
+            net = state.system.net
+            arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
+            arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
+            arrays |= run or {}
+            write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
+        self.listed([(number, state.time if shape is None else number)], net.bodies)
+
+    def listed(self, frames, bodies):
+        """Add frames, each a row number and its time, to ``web.pvd``."""
+        for row, time in frames:
+            names = ["web", *(body.name for body in bodies)]
+            self._listed += [(time, part, f"frames/{name}_{row:06d}.vtu") for part, name in enumerate(names)]
         self._list_frames()
 
     def _list_frames(self):
@@ -250,15 +330,24 @@ class Folder:
             f'    <DataSet timestep="{number(time)}" group="" part="{part}" file={quoteattr(name)}/>\n'
             for time, part, name in self._listed
         )
-        write_text(
-            self.path / "web.pvd",
-            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
-            f"  <Collection>\n{rows}  </Collection>\n</VTKFile>\n",
-        )
+        with self._written():
+            write_text(
+                self.path / "web.pvd",
+                '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+                f"  <Collection>\n{rows}  </Collection>\n</VTKFile>\n",
+            )
 
     def summary(self, run):
         """Write ``run.json``."""
-        write_text(self.path / "run.json", json.dumps(run, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        text = json.dumps(run, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        with self._written():
+            write_text(self.path / "run.json", text)
+
+    def last_row(self):
+        """The last row of the history."""
+        with open(self.path / self._table, encoding="utf-8") as lines:
+            *_, last = lines
+        return [float(value) for value in last.split(",")]
 
     def close(self):
         """Close the history."""

@@ -45,13 +45,25 @@ class Value(NamedTuple):
 
 
 class Result(NamedTuple):
-    """A result of a run: value, its error (None where none is known), unit, time and place."""
+    """A result of a run: value, its error (None where none is known), unit, time and place.
+
+    ``error`` is that of the solution of the scene as it stands. In statics ``smoothing`` is how far a smooth law's η
+    moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
+    elements; None where it was not looked for.
+    """
 
     value: float
     error: float | None
     unit: str
     time: float
     where: int | None
+    smoothing: float | None = None
+    discretisation: float | None = None
+
+    def plain(self):
+        """As a dict, without the errors that were not looked for."""
+        extra = {key: value for key in ("smoothing", "discretisation") if (value := getattr(self, key)) is not None}
+        return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
 
 
 def _quantity(name, value):
@@ -159,14 +171,30 @@ class Observe(Table):
         at = int(np.argmax(values))
         return Value(float(values[at]), None if rows[at] is None or self.body is not None else int(rows[at]))
 
-    def error(self, state, certificate):
-        """Bound on the error of the value from a `refweb.certificate.Certificate`, None where it gives none."""
-        if certificate is None:
+    def error(self, state, equilibrium):
+        """± of the value in a `refweb.statics.Equilibrium`, None where none is known.
+
+        A proven bound from the certificate where there is one that speaks of the quantity, else an estimate from the
+        equilibrium's deviations: what the residual makes of the value, three times what rounding makes of it, and the
+        rounding of the value itself.
+        """
+        if equilibrium.certificate is not None and (self.quantity in LINE or self.quantity == "strain_energy"):
+            return self._bound(state, equilibrium.certificate)
+        place = self.value(state)
+        loose = self.quantity in NODAL and place.where in state.slack_nodes
+        if equilibrium.deviations is None or loose or self.quantity == "slack_fraction":
             return None
+        changes = []
+        for deviation in equilibrium.deviations:
+            size = np.abs(deviation).max()
+            share = 1e-7 * state.system.net.natural_length.min() / size if size > 0.0 else 0.0
+            there = type(state)(state.system, state.time, state.x + share * deviation)
+            changes.append(abs(self.value(there).value - place.value) / share if share > 0.0 else 0.0)
+        return float(changes[0] + 3.0 * max(changes[1:]) + 2.0 * np.finfo(float).eps * abs(place.value))
+
+    def _bound(self, state, certificate):
         if self.quantity == "strain_energy":
             return certificate.strain_energy
-        if self.quantity not in LINE:
-            return None
         net = state.system.net
         bound = certificate.tension
         if self.quantity == "stress":

@@ -48,7 +48,7 @@ def _inverse_mass(system, t):
     return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
 
 
-def solve(system, load_steps, progress=None, most=5_000_000):
+def solve(system, load_steps, progress=None, most=5_000_000, tolerance=TOLERANCE):
     """Equilibria at load steps, one after another, each from the one before.
 
     Parameters
@@ -61,6 +61,8 @@ def solve(system, load_steps, progress=None, most=5_000_000):
         Called with a line of text as it goes.
     most : int
         Largest number of steps for one load step.
+    tolerance : float
+        Residual to stop at.
 
     Yields
     ------
@@ -87,7 +89,7 @@ def solve(system, load_steps, progress=None, most=5_000_000):
             tension = out[0][:, 0]
             here = max(scale, force_scale(system, t, x, tension))
             last, error = error, residual(system, f, here)
-            if error <= TOLERANCE or (error <= LIMIT and done and error > 0.5 * last):
+            if error <= tolerance or (error <= LIMIT and done and error > 0.5 * last):
                 break
             if done >= most or not np.isfinite(error):
                 raise NotFound(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import pathlib
 import sys
 import time
 
@@ -10,8 +11,9 @@ import numpy as np
 
 from . import __version__
 from .errors import SolverError
-from .io import Folder, check_folder
-from .laws import LINEAR
+from .inputs import InputError, short
+from .io import Folder, check_folder, read_summary
+from .laws import LINEAR, SMOOTH
 from .observables import Result
 from .scene import Scene, in_file
 from .solution import SOLVER, Solution, as_history
@@ -48,18 +50,75 @@ def run(scene, out=None, force=False, progress=None, announce=None):
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
         check_folder(out, force)
+    return _solve(scene, out, progress, announce)
+
+
+def resume(folder, progress=None, announce=None):
+    """Go on with a dynamic run that was killed or interrupted or failed, from its last checkpoint.
+
+    Central differences come to what the undisturbed run comes to, bit for bit; CVODE and IDA begin anew there, and come
+    to it within their tolerance. A run without a checkpoint begins anew.
+
+    Parameters
+    ----------
+    folder : path-like
+        Result folder of the run.
+    progress, announce : callable, optional
+        See `run`.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    InputError
+        Where ``folder`` holds no such run.
+    SolverError
+        See `run`.
+    """
+    from .starts import checkpoint
+
+    folder = pathlib.Path(folder)
+    name = f"result folder {short(str(folder))}:"
+    if not folder.is_dir():
+        raise InputError(f"{name} is no folder")
+    summary = read_summary(folder)
+    if summary is None or not (folder / "scene.toml").is_file():
+        raise InputError(f"{name} holds no run.json and scene.toml of a run: use refweb run")
+    if summary["status"] == "solved":
+        raise InputError(f"{name} holds a solved run: there is nothing to go on with")
+    scene = Scene.load(folder / "scene.toml")
+    if summary.get("kind") == "modes" or scene.solve.kind == "static":
+        raise InputError(f"{name} holds no dynamic run, and nothing else has checkpoints: use refweb run --force")
+    check_folder(folder, force=True)
+    kept = checkpoint(folder, name) if (folder / "checkpoint.npz").exists() else None
+    if kept is None:
+        return _solve(scene, folder, progress, announce)
+    return _solve(scene, folder, progress, announce, kept, summary)
+
+
+def _solve(scene, out, progress, announce, kept=None, summary=None):
+    """Solve a scene; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on."""
     started = time.process_time(), time.perf_counter()
     system = scene.build()
     if announce is not None:
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=versions())
-    solution.warnings += _notices(scene, system)
-    follower = follower_of(scene, system, solution)
+    if kept is None:
+        solution.warnings += _notices(scene, system)
+    else:
+        solution.warnings += _before(kept, summary, system, solution.versions)
+    follower = follower_of(scene, system, solution, kept)
     solution.columns = follower.columns
-    folder = Folder(out, scene, solution.columns, solution.summary()) if out is not None else None
+    row = None if kept is None else int(kept["row"])
+    folder = Folder(out, scene, solution.columns, solution.summary(), row=row) if out is not None else None
     tell = progress or (lambda text, share: None)
     try:
         follower.follow(folder, tell)
+        if scene.accuracy.refine:
+            tell("finding the errors of elements", 1.0)
+            _refine(scene, solution)
         solution.status = "solved"
     except KeyboardInterrupt:
         solution.status, solution.message = "interrupted", f"interrupted after {follower.done}"
@@ -83,14 +142,40 @@ def run(scene, out=None, force=False, progress=None, announce=None):
     return solution
 
 
-def follower_of(scene, system, solution):
+def _refine(scene, solution):
+    """Add the errors of elements to the results."""
+    from .accuracy import discretisation_errors
+
+    def results(solution):
+        return [step["results"] for step in solution.steps] or [solution.reduced]
+
+    found = discretisation_errors(scene, results(solution), lambda finer: results(run(finer)))
+    if not solution.steps:
+        solution.reduced = found[0]
+    for step, with_errors in zip(solution.steps, found, strict=False):
+        step["results"] = with_errors
+
+
+def _before(kept, summary, system, versions):
+    """Warnings of a run that goes on; refuses a checkpoint that is none of this system."""
+    known = {"row", "accuracy", "repeated", "missing", "shares", "run_time" if "run_time" in kept else "run_state"}
+    if not known <= kept.keys() or kept.get("positions", np.zeros(0)).shape != (system.rows, 3):
+        raise InputError("checkpoint.npz is not that of a run that scene.toml leads to: use refweb run")
+    yield from summary["warnings"]
+    begun = summary["versions"]
+    if other := [name for name in versions if begun.get(name) != versions[name]]:
+        changes = ", ".join(f"{name} {versions[name]} after {begun.get(name)}" for name in other)
+        yield f"resumed with {changes}: what follows may differ in its last digits"
+
+
+def follower_of(scene, system, solution, kept=None):
     """What leads a scene from start to end; refuses what its solver cannot take, with an `InputError`."""
     with in_file(scene.file):
         if scene.solve.kind == "static":
             return _LoadSteps(scene, system, solution)
         from .dynamics import Motion
 
-        return Motion(scene, system, solution)
+        return Motion(scene, system, solution, kept)
 
 
 class _LoadSteps:
@@ -125,16 +210,24 @@ class _LoadSteps:
             if folder is not None:
                 folder.frame(*solution.frames[-1])
 
+        smoothing = None
+        if self.system.net.law.number == SMOOTH and scene.solve.method == "newton" and scene.accuracy.error != "none":
+            from .accuracy import Smoothing
+
+            smoothing = Smoothing(scene)
         totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         solution.solver = {**SOLVER, "method": scene.solve.method, **totals}
         try:
             for found in self._solver()(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
                 state = State(self.system, found.step, found.x)
                 values = [o.value(state) for o in scene.observables]
-                errors = [o.error(state, found.certificate) for o in scene.observables]
+                errors = [o.error(state, found) for o in scene.observables]
+                smoothed = [None] * len(values)
+                if smoothing is not None:
+                    smoothed = smoothing.errors(found, [value.value for value in values])
                 results = {
-                    o.name: Result(value.value, error, o.unit, found.step, value.where)
-                    for o, value, error in zip(scene.observables, values, errors, strict=True)
+                    o.name: Result(value.value, error, o.unit, found.step, value.where, moved)
+                    for o, value, error, moved in zip(scene.observables, values, errors, smoothed, strict=True)
                 }
                 stats = {key: found.stats.get(key) for key in SOLVER} | {
                     "method": scene.solve.method,

@@ -123,16 +123,16 @@ class Scene:
         output, dynamic = self.output, self.solve.kind == "dynamic"
         if not dynamic and output.interval is not None:
             raise InputError(f"[output] interval = {output.interval:g} has no meaning in statics: leave it out")
-        if not dynamic and self.accuracy is not None:
-            raise InputError("[accuracy] has no meaning in statics, whose results bring their bounds: leave it out")
+        if not dynamic and self.accuracy is not None and self.accuracy.digits is not None:
+            raise InputError(f"[accuracy] digits = {self.accuracy.digits} has no meaning in statics: leave it out")
         if not dynamic and self.event:
             raise InputError(f"[[event]] {shown(self.event[0].name)} has no meaning in statics: leave it out")
         interval = (output.interval or min(1e-3, self.solve.duration)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
+        object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
         if not dynamic:
             return
-        object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
         if interval > self.solve.duration:
             raise InputError(f"[output] interval = {interval:g} must be ≤ duration = {self.solve.duration:g} [s]")
         if self.solve.duration / interval > ROWS:
@@ -275,7 +275,8 @@ class Scene:
             found = _in(name, net.find, table.nodes, "nodes")
             supported[np.ix_(found, table.components)] = True
         acting, count = [Elasticity()], {}
-        for effect in sorted(self.effects, key=lambda effect: table_of(effect) != "body"):  # others act on bodies
+        tables = list(dict.fromkeys(["body", *map(table_of, self.effects)]))  # others act on bodies
+        for effect in sorted(self.effects, key=lambda effect: tables.index(table_of(effect))):
             key = table_of(effect)
             count[key] = count.get(key, 0) + 1
             acting.append(_Named(f"[[{key}]] {count[key]}" if key in LISTS else f"[{key}]", effect))

@@ -192,6 +192,24 @@ class Output(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class Accuracy(Table):
-    """How the error of dynamic results is found: by a twin of half the error, or not at all."""
+    """How the errors of results are found.
+
+    Parameters
+    ----------
+    error : {"twin", "none"}
+        In dynamics by a twin run of a smaller error, or not at all. In statics "none" leaves out the error of
+        smoothing; what the solution itself tells of its error costs next to nothing.
+    digits : int, optional
+        Of dynamics: significant digits that every observable has to have by its ±. Accuracy is raised until that is so,
+        or until it is shown which observables cannot have them.
+    refine : bool
+        Whether the error of elements is found, by two more runs with two and four times as many.
+    """
 
     error: str = choice("twin", "none", default="twin")
+    digits: int | None = integer(None, at_least=1, at_most=12)
+    refine: bool = boolean(False)
+
+    def check(self):
+        if self.digits is not None and self.error == "none":
+            raise InputError(f'digits = {self.digits} needs error = "twin"')

@@ -139,7 +139,7 @@ class Solution:
         """The content of ``run.json``, a dict of plain values."""
 
         def plain(results):
-            return {name: result._asdict() for name, result in results.items()}
+            return {name: result.plain() for name, result in results.items()}
 
         return {
             "status": self.status,

@@ -22,6 +22,22 @@ def equilibrium(system, progress=None):
     return found
 
 
+def checkpoint(folder, name, remedy=""):
+    """The arrays of the checkpoint in a result folder, by name; ``name`` begins the message that refuses it."""
+    try:
+        with np.load(folder / "checkpoint.npz") as archive:
+            return {key: archive[key] for key in archive}
+    except OSError as error:
+        reason = "is no folder" if not folder.is_dir() else f"checkpoint.npz cannot be read: {error.strerror or error}"
+        raise InputError(f"{name} {reason};{remedy}".removesuffix(";")) from None
+    except Exception as error:  # whatever an archive that is spoilt leads to
+        reason = short(str(error) or type(error).__name__)
+        raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes ({reason})") from None
+
+
+_STATE = ("positions", "displacements", "velocities", "bodies")
+
+
 def stored(system, folder):
     """Displacement and velocity of the rows from the checkpoint in a result folder.
 
@@ -39,16 +55,11 @@ def stored(system, folder):
     """
     path = str(folder)
     net, name = system.net, f'[solve] start = "{path if len(path) <= 60 else "..." + path[-57:]}":'
+    arrays = checkpoint(folder, name, ' it must be "web", "equilibrium" or a result folder')
     try:
-        with np.load(folder / "checkpoint.npz") as checkpoint:
-            stored = {key: checkpoint[key] for key in ("positions", "displacements", "velocities", "bodies")}
-    except OSError as error:
-        reason = "is no folder" if not folder.is_dir() else f"checkpoint.npz cannot be read: {error.strerror or error}"
-        raise InputError(f'{name} {reason}; it must be "web", "equilibrium" or a result folder') from None
-    except Exception as error:  # whatever an archive that is spoilt leads to
-        reason = short(str(error) or type(error).__name__)
-        raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes ({reason})") from None
-    positions, displacements, velocities, bodies = stored.values()
+        positions, displacements, velocities, bodies = map(arrays.__getitem__, _STATE)
+    except KeyError as error:
+        raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes (it has no {error})") from None
     arrays = (positions, displacements, velocities)
     fits = all(a.shape == positions.shape and a.shape[1:] == (3,) and a.dtype.kind == "f" for a in arrays)
     if not fits or bodies.ndim != 1 or not all(np.isfinite(a).all() for a in arrays):

@@ -58,6 +58,9 @@ class Equilibrium:
         ``residual`` [1], ``smallest_pivot`` (its sign, None where not asked for).
     certificate : refweb.certificate.Certificate, optional
         Bounds on energy and tension, for the tension-only law.
+    deviations : ndarray, shape (k, rows, 3), optional
+        Displacements by which x may be off [m]: the first what is left of the residual, the others what the rounding of
+        forces may come to; None where the tangent is singular.
     """
 
     step: float
@@ -66,6 +69,7 @@ class Equilibrium:
     force: np.ndarray
     stats: dict = field(default_factory=dict)
     certificate: object = None
+    deviations: object = None
 
 
 def check_supported(system, t):
@@ -176,6 +180,28 @@ class Newton:
             if self.factor.negative_pivots() <= self.drifting:
                 return sign
         return -1
+
+    def deviations(self, state):
+        """`Equilibrium.deviations`: what the tangent makes of the residual and of rounding, of either sign at random.
+
+        Rounding of a line's ends and of its tension leaves a force of machine precision times T + k |x| at its nodes.
+        """
+        system, net, sign = self.system, self.system.net, state.stats.get("smallest_pivot")
+        if sign is None:
+            self.factor.update(self._matrix(state.step, state.x, 1e-12 * self.axial, False))
+            state.stats["nlu"] += 1
+        stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+        moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
+        size = np.zeros(system.rows)
+        np.add.at(size, net.cells, np.finfo(float).eps * (np.abs(state.tension) + stiffness * moved)[:, None])
+        signs = np.random.default_rng(0).choice((-1.0, 1.0), (3, len(system.free)))
+        forces = [state.force.ravel()[system.free], *(signs * np.repeat(size, 3)[system.free])]
+        found = np.zeros((len(forces), system.rows, 3))
+        for deviation, force in zip(found, forces, strict=True):
+            if sign == 0 or (p := self.factor.solve(force)) is None:
+                return None
+            deviation.ravel()[system.free] = p
+        return found
 
     def solve(self, t, x, warm=False, most=200):
         """Equilibrium at load step t from the displacement x.
@@ -350,6 +376,7 @@ def solve(system, load_steps, progress=None):
         if not (convex or newton.follows):
             state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
         _add(state.stats, spent)
+        state.deviations = newton.deviations(state)
         if system.convex:
             from . import certificate
 

@@ -657,7 +657,7 @@ def test_a_fixed_step_is_never_halved(monkeypatch):
             steps.append(named["step_size"])
             super().__init__(*arguments, **named)
 
-    monkeypatch.setattr(dynamics, "CentralDifference", Noted)
+    monkeypatch.setattr(central_difference, "CentralDifference", Noted)
     with pytest.raises(OpenBook, match="use a smaller step_size than 0.0001"):
         refweb.run(scene(step_size=1e-4))
     assert steps == [1e-4]

@@ -114,9 +114,10 @@ def test_run_json(written, web):
 
 
 def test_errors_of_tensions_only(written):
-    """The certificate bounds tensions; nothing bounds displacements, and null is not zero."""
+    """The certificate bounds tensions; displacement and reaction have what residual and rounding leave."""
     results = read_json(written)["results"]
-    assert results["sag"]["error"] is None and results["support"]["error"] is None
+    for name in ("sag", "support"):
+        assert 0 < results[name]["error"] < 1e-9 * abs(results[name]["value"])
     assert 0 < results["largest tension"]["error"] < 1e-3 * results["largest tension"]["value"]
 
 
@@ -284,7 +285,7 @@ def test_scene_of_the_folder_runs_to_the_same(written, solution):
 def test_solution(solution, web):
     assert list(solution.results) == ["sag", "largest tension", "support"] and solution.status == "solved"
     sag = solution.results["sag"]
-    assert sag == (sag.value, sag.error, sag.unit, sag.time, sag.where) and (sag.unit, sag.time) == ("m", 3.0)
+    assert sag[:5] == (sag.value, sag.error, sag.unit, sag.time, sag.where) and (sag.unit, sag.time) == ("m", 3.0)
     assert sag.where == web.centre and sag.value == solution.displacement[web.centre, 2]
     assert solution.results["largest tension"].value == solution.tension.max()
     assert solution.results["largest tension"].where == solution.tension.argmax()

@@ -221,6 +221,7 @@ def test_defaults(tmp_path):
             {"name": "max_stress", "quantity": "stress", "reduce": "max"},
             {"name": "max_tension", "quantity": "tension", "reduce": "max"},
         ],
+        "accuracy": {"error": "twin", "refine": False},
     }
 
 
@@ -433,7 +434,7 @@ WRONG = [
     ("load.0.force", None, "[[load]] 1 force is missing: give force = ... [N]"),
     # types
     ("schema", 2, "schema = 2 must be 1"),
-    ("schema", True, "schema = True must be 1"),
+    ("schema", True, "schema = true must be 1"),
     ("seed", -1, "seed = -1 must be ≥ 0"),
     ("seed", 2**63, "seed = 9223372036854775808 must be a whole number below 2⁶³"),
     ("seed", 1.0, "seed = 1.0 must be a whole number"),
@@ -444,7 +445,7 @@ WRONG = [
     ("web", [{"kind": "paper"}], "must be a table: write [web]"),
     ("cable", 3, "[cable] = 3 must be a table"),
     ("cable.area", "1e-4", '[cable] area = "1e-4" must be a number [m²]'),
-    ("cable.area", True, "[cable] area = True must be a number [m²]"),
+    ("cable.area", True, "[cable] area = true must be a number [m²]"),
     ("cable.area", float("nan"), "[cable] area = nan must be a finite number [m²]"),
     ("cable.modulus", float("inf"), "[cable] modulus = inf must be a finite number [Pa]"),
     ("cable.groups", [1], "[cable] groups = [1] must be a table of groups"),
@@ -467,7 +468,7 @@ WRONG = [
     ("supports", {"components": ["x"]}, "[supports] nodes is missing"),
     ("support.0.components", ["w"], '[[support]] 1 components[0] = "w" must be one of 0, 1, 2, "x", "y", "z"'),
     ("cable.order", 2.0, "[cable] order = 2.0 must be one of 1, 2, 3"),
-    ("cable.order", True, "[cable] order = True must be one of 1, 2, 3"),
+    ("cable.order", True, "[cable] order = true must be one of 1, 2, 3"),
     ("cable.subdivide", 2.5, "[cable] subdivide = 2.5 must be a whole number"),
     # limits
     ("cable.order", 4, "[cable] order = 4 must be one of 1, 2, 3"),

@@ -373,7 +373,7 @@ def test_find():
     for selection, name, message in (
         (4000, "node", "node = 4000 must be 0 … 3553"),
         ([0, -1], "nodes", "nodes[1] = -1 must be ≥ 0"),
-        (True, "node", "node = True must be a whole number ≥ 0"),
+        (True, "node", "node = true must be a whole number ≥ 0"),
         (1.5, "node", "node = 1.5 must be a whole number ≥ 0"),
         ("center", "node", 'node = "center" names no node, did you mean "centre"?'),
         (["rmi"], "nodes", 'nodes[0] = "rmi" names no node, did you mean "rim"?'),

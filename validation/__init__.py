@@ -50,10 +50,13 @@ import numpy as np
 CASES = {
     "The paper": (
         "cable_law",
+        "example_1",
+        "example_2",
+        "example_3",
         "length_area",
         "webs_under_load",
         "webs_hit",
-        "example_1",
+        "open_parameters",
     ),
     "Statics": (
         "two_links",

@@ -64,7 +64,7 @@ def case(quick):
     for (name, unit), rest, scale in zip(names, left, scales, strict=True):
         title = f"largest change of the {name}"
         rows.append(Row(title, abs(rest).max(), 0.0, source, 1e-13, "rounding", unit, scale=scale))
-    within, reason = 2e3 / counts[-1] ** 2, "order 2 in the step, 2000 (1/steps)²"
+    within, reason = 500 / counts[-1] ** 2, "order 2 in the step, 500 (1/steps)²"
     rows.append(Row("largest change of the energy", drift[-1], 0.0, "nothing works on it", within, reason, scale=1))
     reason = "kinks fall where they fall in a step"
     rows.append(Row("order of the change of the energy", -slope(counts, drift), 2, "theory", 0.4, reason, scale=1))

@@ -93,7 +93,7 @@ def case(quick):
             r = solution.results
             errors.append(abs(r["h"].value) / top)
         histories[name] = solution.history
-        within, reason = 100 / counts[-1] ** 2, "order 2 in the step, 100 (1/steps)²"
+        within, reason = 10 / counts[-1] ** 2, "order 2 in the step, 10 (1/steps)²"
         for title, value, reference, unit in (
             ("farthest", r["farthest"], top, "m"),
             ("largest tension", r["T"], tension, "N"),

@@ -46,8 +46,6 @@ class Done:
 def write(folder, done, quick):
     """Write ``index.html``, ``report.md`` and the figures beside it; gives the path of the page."""
     folder.mkdir(parents=True, exist_ok=True)
-    for old in (*folder.glob("*.png"), *folder.glob("index.html"), *folder.glob("report.md")):
-        old.unlink()
     images = {}
     for one in done:
         for number, figure in enumerate(one.case.figures, 1):

@@ -100,7 +100,7 @@ def case(quick):
     for count in counts:
         solution, length = from_outside(0.5, int(count))
         found.append(np.hypot(solution.results["x"].value, solution.results["y"].value - length))
-    within, reason = 20 / counts[-1] ** 2, "order 2 in the step, 20 (1/steps)²"
+    within, reason = 2 / counts[-1] ** 2, "order 2 in the step, 2 (1/steps)²"
     for axis, exact in (("x", 0.0), ("y", length)):
         here = solution.results[axis]
         title = f"from outside, a quarter of a turn: {axis}"

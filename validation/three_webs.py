@@ -17,6 +17,10 @@ COLOUR = dict(zip(WEBS, plots.COLOURS, strict=False))
 MARK = dict(zip(WEBS, "^sh", strict=True))
 SLACK, PUSHES = (0.80, 0.80, 0.81), (0.78, 0.33, 0.24)
 BALL = (0.45, 0.55, 0.68)
+WIDTH, HEIGHT = 1060, 342
+"""Of each view in perspective [pixel]."""
+THICKNESS = 0.004
+"""Radius of lines in perspective [m]; a round cable of 1e-4 m² has 5.6 mm."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def _bar(page, scale, axes, shown):
         page.legend(handles=marks, loc="lower right", frameon=False, fontsize="small")
 
 
-def perspective(shown, columns=1, elevation=15.0, azimuth=28.0, radius=0.004):
+def perspective(shown):
     """Webs in true perspective, all by one camera; lines in the colours of their stress, slack grey, pushing red.
 
     Returns
@@ -79,34 +83,30 @@ def perspective(shown, columns=1, elevation=15.0, azimuth=28.0, radius=0.004):
     """
     from matplotlib.figure import Figure
 
-    scale = _scale(shown)
-    a, e = np.radians((azimuth, elevation))
-    near = np.array([np.sin(a) * np.cos(e), -np.cos(a) * np.cos(e), np.sin(e)])
-    right = np.array([np.cos(a), np.sin(a), 0.0])
-    everything = np.concatenate([one.points for one in shown])
+    scale, aspect = _scale(shown), WIDTH / HEIGHT
+    azimuth, elevation = np.radians((28.0, 15.0))
+    right = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    near = np.array([right[1] * np.cos(elevation), -right[0] * np.cos(elevation), np.sin(elevation)])
     axes = np.array([right, np.cross(near, right), near])
-    aspect = 3.1
-    view = View.fit(axes, everything, aspect, np.tan(np.radians(9.0)))
-    models = []
-    for one in shown:
-        model = [drawing.Tubes(one.points[one.lines], _colours(scale, one), radius)]
-        models.append(model + [drawing.Surface(*body, BALL) for body in one.bodies])
-    width = 1060 // columns
-    size = (width, round(width / aspect))
-    rows = -(-len(shown) // columns)
-    images = drawing.images(models, [view], [size])
-    page = Figure(figsize=(7.0, 6.4 / columns / aspect * rows + 0.3 * rows), dpi=160, layout="constrained")
-    plot = np.atleast_1d(page.subplots(rows, columns)).ravel()
-    for number, one in enumerate(plot):
+    view = View.fit(axes, np.concatenate([one.points for one in shown]), aspect, np.tan(np.radians(9.0)))
+    models = [
+        [
+            drawing.Tubes(one.points[one.lines], _colours(scale, one), THICKNESS),
+            *(drawing.Surface(*body, BALL) for body in one.bodies),
+        ]
+        for one in shown
+    ]
+    images = drawing.images(models, [view], [(WIDTH, HEIGHT)])
+    page = Figure(figsize=(7.0, (6.4 / aspect + 0.3) * len(shown)), dpi=160, layout="constrained")
+    plot = np.atleast_1d(page.subplots(len(shown)))
+    for number, (one, web) in enumerate(zip(plot, shown, strict=True)):
         one.axis("off")
-        if number >= len(shown):
-            continue
         if images:
             one.imshow(drawing.unpack(images[number])[0], extent=view.extent, interpolation="antialiased")
         else:
-            drawing.polygons(one, models[number], view, size[1])
+            drawing.polygons(one, models[number], view, HEIGHT)
             one.set(xlim=view.extent[:2], ylim=view.extent[2:], aspect="equal")
-        one.set_title(shown[number].title, fontsize="medium", loc="left")
+        one.set_title(web.title, fontsize="medium", loc="left")
     _ruler(plot[0], view)
     _bar(page, scale, list(plot), shown)
     return page

@@ -1,0 +1,281 @@
+"""One scene by every method that takes it, each from coarse to fine: what `refweb.work_precision` compares.
+
+A `Trial` is a method at one setting. Own solvers run with one probe, the observable, and without peaks, files or twin;
+scipy's DOP853 is the voice from outside: its own steps, driven by the same forces.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .errors import SolverError
+from .inputs import InputError
+from .state import State
+
+SAFETIES = (0.9, 0.5, 0.25, 0.125, 0.0625, 0.03125)
+TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
+TIGHT = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+DYNAMIC = {
+    "central-difference": ("safety", SAFETIES),
+    "explicit-4": ("safety", (0.9, 0.6, 0.4, 0.25, 0.15)),
+    "explicit-6": ("safety", (0.9, 0.6, 0.4, 0.25, 0.15)),
+    "cvode-bdf": ("rtol", TOLERANCES),
+    "cvode-adams": ("rtol", TIGHT),
+    "ida": ("rtol", TOLERANCES),
+    "dop853": ("rtol", TIGHT),
+}
+"""Methods of dynamics: the key that is varied, and its values from coarse to fine."""
+STATIC = {
+    "newton": ("tolerance", (1e-10,)),
+    "relaxation": ("tolerance", (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)),
+    "newton-smooth": ("smoothing", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)),
+}
+"""Methods of statics. The last is Newton with the smooth law at other smoothings than the scene's own."""
+KIND = {"explicit-4": "splitting", "explicit-6": "splitting", "central-difference": "splitting"}
+KIND |= {"cvode-bdf": "bdf", "ida": "bdf"}
+"""Methods whose errors may be alike: splittings by kicks and drifts, and BDF. Others are of a kind of their own."""
+PIECES = 100
+"""Smallest number of pieces of an implicit run, after each of which the clock is looked at."""
+
+
+class OverBudget(Exception):
+    """A trial has taken more time than it may."""
+
+
+@dataclass(eq=False)
+class Trial:
+    """A method at one setting, and what came of it.
+
+    Attributes
+    ----------
+    method, key, value
+        Method, and the key that is varied with its value.
+    status : {"solved", "failed", "refused", "budget"}
+        Whether it solved; failed on the way; could not take the scene; or was left out for its price.
+    message : str
+        Why, where it is not solved.
+    cpu_s : float
+        CPU time of the solver's loop [s], compiled before.
+    values : ndarray, shape (rows,)
+        The observable at the history rows, or load steps.
+    x : ndarray, shape (rows of the system, 3)
+        Displacement at the end [m].
+    nfev, njev, nlu, nsteps : int
+        Evaluations of forces and of tangents, factorizations, steps.
+    """
+
+    method: str
+    key: str
+    value: float
+    status: str = "budget"
+    message: str = ""
+    cpu_s: float = np.nan
+    values: np.ndarray | None = None
+    x: np.ndarray | None = None
+    work: dict = field(default_factory=lambda: dict(nfev=0, njev=0, nlu=0, nsteps=0))
+    error_observable: float = np.nan
+    error_state: float = np.nan
+
+    @property
+    def setting(self):
+        """The setting as text."""
+        return f"{self.key} = {self.value:g}"
+
+    @property
+    def kind(self):
+        """What the method has in common with others."""
+        return KIND.get(self.method, self.method)
+
+
+def trials(scene):
+    """The ladder of each method, a dict of lists of `Trial`."""
+    ladders = DYNAMIC if scene.solve.kind == "dynamic" else STATIC
+    found = {name: [Trial(name, key, value) for value in values] for name, (key, values) in ladders.items()}
+    if scene.solve.kind == "static":
+        cable = scene.cable
+        if cable.law == "linear" or any(group.smoothing is not None for group in cable.groups.values()):
+            del found["newton-smooth"]
+        elif cable.law == "smooth":
+            found["newton-smooth"] = [t for t in found["newton-smooth"] if t.value != cable.smoothing]
+    return found
+
+
+class Dynamics:
+    """Runs the trials of a dynamic scene.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        What moves, and for how long.
+    system : refweb.system.System
+        What acts.
+    observable : refweb.Observe
+        What is compared at the history rows.
+    """
+
+    def __init__(self, scene, system, observable):
+        from .dynamics import probe_of, row_times
+
+        self.system, self.observable, self.times = system, observable, row_times(scene)
+        self.probes = [(*probe_of(observable, system), 0)]
+        self.begin = None, None
+        if scene.start_folder is not None:
+            from .starts import stored
+
+            self.begin = stored(system, scene.start_folder)
+        elif scene.solve.start == "equilibrium":
+            from .starts import equilibrium
+
+            self.begin = equilibrium(system).x, None
+
+    def _solver(self, trial):
+        """A solver of refweb's at the setting of a trial."""
+        name, _, detail = trial.method.partition("-")
+        setting = {trial.key: trial.value}
+        if name == "explicit":
+            from .nystrom import Nystrom
+
+            return Nystrom(self.system, self.probes, order=int(detail), **setting)
+        if name == "cvode":
+            from .cvode import Cvode
+
+            return Cvode(self.system, self.probes, family=detail, **setting)
+        if name == "ida":
+            from .ida import Ida
+
+            return Ida(self.system, self.probes, **setting)
+        from .central_difference import CentralDifference
+
+        return CentralDifference(self.system, self.probes, **setting)
+
+    def compile(self, trial):
+        """Take a step with the solver of a trial; raises an `InputError` where it does not take the scene."""
+        if trial.method != "dop853":
+            solver = self._solver(trial)
+            solver.rows(solver.start(*self.begin), [1e-9 * self.times[-1]])
+
+    def run(self, trial, deadline):
+        """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the clock."""
+        if trial.method == "dop853":
+            self._outside(trial, deadline)
+            return
+        from .dynamics import blocks
+
+        solver, times, split = self._solver(trial), self.times, 1
+        if trial.key == "rtol":  # steps are the solver's own and may be looked into; explicit ones follow from the rows
+            split = -(-PIECES // (len(times) - 1))
+            times = np.interp(np.arange(split * (len(times) - 1) + 1) / split, np.arange(len(times)), times)
+        run, table = solver.start(*self.begin), []
+        began = time.process_time()
+        for _, history in blocks(solver, run, times, [len(times) - 1]):
+            table.append(history[:, 1])
+            _check(deadline)
+        trial.cpu_s = time.process_time() - began
+        trial.values, trial.x = np.concatenate(table)[::split], run.x.copy()
+        trial.work = {**{key: solver.figures(run)[key] for key in ("nfev", "njev", "nlu")}, "nsteps": run.nsteps}
+
+    def _outside(self, trial, deadline):
+        """Run scipy's DOP853 with the forces of the system."""
+        from scipy.integrate import DOP853
+        from scipy.sparse.linalg import splu
+
+        from .implicit import TRAVEL, refuse_massless, scales
+
+        system, free, n = self.system, self.system.free, len(self.system.free)
+        refuse_massless(system, trial.method)
+        if system.constraints:
+            raise InputError(f'[[link]] needs method = "ida": {trial.method} does not hold lengths')
+        x = np.zeros((system.rows, 3)) if self.begin[0] is None else self.begin[0].copy()
+        v = system.initial_velocity() if self.begin[1] is None else self.begin[1].copy()
+        v[system.supported] = 0.0
+        system.drive(0.0, x, v)
+        mass, held = np.repeat(system.net.mass, 3)[free], np.where(system.supported, x, 0.0)
+        consistent = system.net.spread is not None
+        over_mass = splu(system.pattern.matrix(system.mass())).solve if consistent else lambda f: f / mass
+
+        def rows(t, y):
+            x, v = held.copy(), np.zeros((system.rows, 3))
+            x.ravel()[free], v.ravel()[free] = y[:n], y[n:]
+            system.drive(t, x, v)
+            return x, v
+
+        def rate(t, y):
+            return np.concatenate([y[n:], over_mass(system.force(t, *rows(t, y)).ravel()[free])])
+
+        near, fast = scales(system)
+        y, end, rtol = np.concatenate([x.ravel()[free], v.ravel()[free]]), self.times[-1], trial.value
+        breaks = [t for part in (*system.families, *system.drives, *system.line_drives) for t in part.times]
+        thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
+        values, row, steps, spent = np.empty(len(self.times)), 0, 0, -time.process_time()
+        solver = DOP853(rate, 0.0, y, end, rtol=rtol, atol=rtol * np.repeat([near, fast], n))
+        while row < len(values):
+            ahead = min((t for t in breaks if t > solver.t * (1.0 + 1e-12)), default=end)
+            speed = 2.0 * np.abs(solver.y[n:]).max(initial=0.0)
+            travel = TRAVEL * thickness / speed if speed > 0.0 else np.inf
+            solver.max_step = max(min(ahead - solver.t, travel), 1e-12 * end)
+            if steps or row:
+                message = solver.step()
+                steps += 1
+                if solver.status == "failed":
+                    raise SolverError(f"dop853 stopped at t = {solver.t:.6g} s: {message}")
+            inside = None
+            while row < len(values) and self.times[row] <= solver.t:
+                if row:
+                    inside = inside or solver.dense_output()
+                    y = inside(self.times[row])
+                spent += time.process_time()
+                trial_x, trial_v = rows(self.times[row], y)
+                values[row] = self.observable.value(State(system, self.times[row], trial_x, trial_v)).value
+                spent -= time.process_time()
+                row += 1
+            _check(deadline)
+        trial.cpu_s, trial.values, trial.x = spent + time.process_time(), values, trial_x
+        trial.work = {"nfev": solver.nfev, "njev": 0, "nlu": 0, "nsteps": steps}
+
+
+class Statics:
+    """Runs the trials of a static scene; see `Dynamics`."""
+
+    def __init__(self, scene, system, observable):
+        self.scene, self.system, self.observable = scene, system, observable
+
+    def compile(self, trial):
+        """Solve the first load step, with the kernels of the method."""
+        self._solved(trial, self.scene.solve.load_steps[:1], math.inf)
+
+    def run(self, trial, deadline):
+        """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the clock."""
+        states, stats = self._solved(trial, self.scene.solve.load_steps, deadline)
+        trial.values, trial.x = np.array([self.observable.value(state).value for state in states]), states[-1].x
+        trial.work = {key: sum(spent[key] for spent in stats) for key in trial.work}
+
+    def _system(self, trial):
+        """The scene's system, or that of another smoothing."""
+        if trial.key != "smoothing":
+            return self.system
+        return self.scene.replace(cable=replace(self.scene.cable, law="smooth", smoothing=trial.value)).build()
+
+    def _solved(self, trial, steps, deadline):
+        """States of a trial, and what each took; notes the CPU time."""
+        system, options = self._system(trial), {}
+        if trial.method == "relaxation":
+            from .relaxation import solve
+
+            options = {"tolerance": trial.value}
+        else:
+            from .statics import solve
+        began, found = time.process_time(), []
+        for equilibrium in solve(system, steps, lambda text: _check(deadline), **options):
+            found.append(equilibrium)
+            _check(deadline)
+        trial.cpu_s = time.process_time() - began
+        return [State(system, one.step, one.x) for one in found], [one.stats for one in found]
+
+
+def _check(deadline):
+    if time.perf_counter() > deadline:
+        raise OverBudget

@@ -1,0 +1,334 @@
+"""What digits cost: every method on one scene, its errors against its CPU time.
+
+Errors are differences to a reference that no method alone can set: of all runs, the two of different kinds that agree
+best are the references, one of them is compared with, and their difference is how far any error can be trusted. Where
+one kind of method alone takes the scene, its two finest runs stand in, and that is said.
+
+The budget is kept by looking at the clock: a run may take a quarter of what is left, is left out where the runs before
+it say that it would take more, and is ended where it does.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import pathlib
+import time
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+
+from .errors import SolverError
+from .inputs import InputError, nearest, real, shown
+from .io import check_folder, clear, write_atomically, write_text
+from .ladders import Dynamics, OverBudget, Statics, trials
+from .observables import DEFAULT, LINE, NODAL
+from .runner import versions, web_of
+from .scene import Scene, in_file
+
+SHARE = 0.25
+"""Largest share of what is left of the budget that a run may take."""
+CHEAP, REPEATS = 0.2, 3
+"""Runs of less CPU time [s] are repeated; their smallest time counts."""
+COLUMNS = "method setting error_observable error_state cpu_s nfev njev nlu nsteps status".split()
+"""Columns of ``cost.csv``."""
+DIGITS = (1, 2, 3, 6, 9, 12)
+"""Digits whose price is told."""
+
+
+@dataclass(eq=False)
+class Cost:
+    """Work and precision of every method on one scene.
+
+    Attributes
+    ----------
+    scene : refweb.Scene
+        The scene.
+    observable : refweb.Observe
+        What is compared, at every history row or load step.
+    trials : list of refweb.ladders.Trial
+        All runs; ``error_observable`` [unit of the observable] is the largest difference over the rows, and
+        ``error_state`` [m] that of the displacements at the end.
+    references : tuple of refweb.ladders.Trial
+        The two runs that errors are measured with; empty where there are no two.
+    independent : bool
+        Whether they are of different kinds.
+    trust : tuple of float
+        How far they are apart: in the observable, and in displacement [m]. An error below that means nothing.
+    scale : float
+        Largest value of the observable over time, which digits are relative to.
+    """
+
+    scene: object
+    observable: object
+    trials: list
+    web: dict
+    references: tuple = ()
+    independent: bool = False
+    trust: tuple = (np.nan, np.nan)
+    scale: float = np.nan
+    status: str = "running"
+    message: str = ""
+    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0})
+
+    @property
+    def sentence(self):
+        """What digits cost, in words."""
+        return " ".join(_sentence(self))
+
+    def price(self, digits, method=None):
+        """The cheapest solved `Trial` with so many digits of the observable, of one method or of all; None if none.
+
+        Other smoothings than the scene's are other laws, and not among them.
+        """
+        limit = self.scale * 10.0**-digits
+        if not self.trust[0] <= limit:
+            return None
+        good = [t for t in self.trials if t.error_observable <= limit and method in (None, t.method)]
+        good = [t for t in good if t.key != "smoothing"]
+        return min(good, key=lambda t: t.cpu_s, default=None)
+
+    def rows(self):
+        """Rows of ``cost.csv`` below its header, `COLUMNS`."""
+        for t in self.trials:
+            work = [t.work[key] for key in ("nfev", "njev", "nlu", "nsteps")]
+            yield [t.method, t.setting, t.error_observable, t.error_state, t.cpu_s, *work, t.status]
+
+    def summary(self):
+        """The content of ``run.json``, a dict of plain values; ``kind`` is "cost"."""
+        none = lambda value: value if math.isfinite(value) else None  # noqa: E731
+        runs = [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]
+        runs = [{key: none(v) if isinstance(v, float) else v for key, v in run.items()} for run in runs]
+        return {
+            "kind": "cost",
+            "status": self.status,
+            "message": self.message,
+            "scene": self.scene.title,
+            "web": self.web,
+            "sentence": self.sentence,
+            "observable": {"name": self.observable.name, "unit": self.observable.unit, "largest": none(self.scale)},
+            "references": [f"{t.method}, {t.setting}" for t in self.references],
+            "independent": self.independent,
+            "apart": {"observable": none(self.trust[0]), "state": none(self.trust[1])},
+            "runs": [{**run, "message": t.message} for run, t in zip(runs, self.trials, strict=True)],
+            "cost": self.cost,
+            "versions": versions(),
+        }
+
+    def draw(self):
+        """The work-precision diagram, a `matplotlib.figure.Figure`."""
+        from .diagram import diagram
+
+        return diagram(self)
+
+    def save(self, folder, force=False):
+        """Write ``cost.csv``, ``cost.png``, ``scene.toml`` and ``run.json``.
+
+        Raises
+        ------
+        InputError
+            Where the folder is not empty or cannot be written.
+        """
+        import tomli_w
+
+        check_folder(folder, force)
+        folder = pathlib.Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "run.json", json.dumps(self.summary(), indent=1, ensure_ascii=False) + "\n")
+        clear(folder)
+        write_text(folder / "scene.toml", tomli_w.dumps(self.scene.to_dict()))
+        lines = [",".join(map(str, row)) for row in (COLUMNS, *self.rows())]
+        write_text(folder / "cost.csv", "\n".join(lines) + "\n")
+        write_atomically(folder / "cost.png", self.draw().savefig)
+
+
+def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None, announce=None):
+    """Run a scene by every method that takes it, from coarse to fine, and compare errors and CPU times.
+
+    Parameters
+    ----------
+    scene : Scene, path-like or str
+        A scene, a scene file or the name of a scene shipped with refweb. Its events and twins are left out.
+    observe : str, optional
+        Name of the observable that errors are of: a nodal quantity, one of lines, or the slack fraction; by default
+        the first of the scene that is one.
+    budget : float
+        Time that all of it may take [s].
+    out : path-like, optional
+        Result folder; without it nothing touches the disk.
+    force : bool
+        Replace the results of an earlier run in ``out``.
+    progress : callable, optional
+        Called with a line of text and the share of the budget that is spent.
+    announce : callable, optional
+        Called with the scene and its system when the input has been accepted.
+
+    Returns
+    -------
+    Cost
+
+    Raises
+    ------
+    InputError
+        For wrong input; nothing has been written.
+    SolverError
+        Where no method solves the scene.
+    """
+    began = time.process_time(), time.perf_counter()
+    budget = real(above=0, unit="s").metadata["read"]("budget", budget)
+    scene = scene if isinstance(scene, Scene) else Scene.load(scene)
+    if out is not None:
+        check_folder(out, force)
+    scene = scene.replace(event=())
+    system = scene.build()
+    with in_file(scene.file):
+        observable = _observable(scene, observe)
+    if announce is not None:
+        announce(scene, system)
+    runner = (Dynamics if scene.solve.kind == "dynamic" else Statics)(scene, system, observable)
+    ladders = trials(scene)
+    found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
+    try:
+        _climb(ladders, runner, began[1] + budget, budget, progress or (lambda text, share: None))
+        found.status = "solved" if any(t.status == "solved" for t in found.trials) else "failed"
+    except KeyboardInterrupt:
+        found.status = "interrupted"
+        raise
+    finally:
+        _compare(found)
+        found.cost = {"cpu_s": time.process_time() - began[0], "wall_s": time.perf_counter() - began[1]}
+        if found.status == "failed":
+            found.message = next((f"{t.method}: {t.message}" for t in found.trials if t.message), found.sentence)
+        if out is not None:
+            found.save(out, force)
+    if found.status == "failed":
+        raise SolverError(f"no method solves the scene within {budget:g} s; {found.message}")
+    return found
+
+
+def _observable(scene, name):
+    """What is compared: the observable of a name, or the first that a state alone determines."""
+    known = (*NODAL, *LINE, "slack_fraction")
+    if name is None:
+        return next(o for o in (*scene.observables, *DEFAULT) if o.quantity in known)
+    names = {o.name: o for o in scene.observables}
+    if name not in names:
+        raise InputError(f"observe = {shown(name)} is no observable of the scene, {nearest(name, names)}")
+    if names[name].quantity not in known:
+        raise InputError(
+            f'observe = {shown(name)} is of quantity "{names[name].quantity}", must be one of {", ".join(known)}'
+        )
+    return names[name]
+
+
+def _climb(ladders, runner, deadline, budget, tell):
+    """Run all ladders at once, rung by rung, while there is time."""
+    for rung in range(max(map(len, ladders.values()))):
+        for ladder in ladders.values():
+            if rung >= len(ladder):
+                continue
+            now, trial, before = time.perf_counter(), ladder[rung], ladder[:rung]
+            if any(t.status in ("budget", "refused") for t in before):
+                trial.status, trial.message = before[-1].status, before[-1].message
+                continue
+            tell(f"{trial.method}, {trial.setting}", 1.0 - (deadline - now) / budget)
+            if _expected(trial, before) > SHARE * (deadline - now):
+                trial.message = "would take more than its share of the budget"
+                continue
+            _try(trial, runner, deadline, first=rung == 0)
+
+
+def _expected(trial, before):
+    """CPU time that the runs before let expect [s]: growing as with them, or as explicit steps and tolerances do."""
+    spent = [(t.value, t.cpu_s) for t in before if t.status == "solved"]
+    if not spent:
+        return 0.0
+    power = 1.0 if trial.key == "safety" else 0.2
+    if len(spent) > 1:
+        (first, one), (last, other) = spent[-2:]
+        power = max(power, math.log(other / one) / math.log(first / last))
+    return spent[-1][1] * (spent[-1][0] / trial.value) ** power
+
+
+def _try(trial, runner, deadline, first):
+    """Run a trial, several times where it is cheap, and note how it ended; the first of a method compiles it before."""
+    least, until = np.inf, 0.0
+    for _ in range(REPEATS):
+        began, spent = time.perf_counter(), time.process_time()
+        try:
+            if first and least == np.inf:
+                runner.compile(trial)
+                began, spent = time.perf_counter(), time.process_time()
+            until = until or began + SHARE * (deadline - began)
+            runner.run(trial, until)
+        except OverBudget:
+            if least < np.inf:
+                break
+            trial.message = "took more than its share of the budget"
+            return
+        except InputError as error:
+            trial.status, trial.message = "refused", str(error)
+            return
+        except SolverError as error:
+            trial.status, trial.message, trial.cpu_s = "failed", str(error), time.process_time() - spent
+            return
+        trial.status, least = "solved", min(least, trial.cpu_s)
+        if trial.cpu_s > CHEAP or 2.0 * time.perf_counter() - began > until:
+            break
+    trial.cpu_s = least
+
+
+def _apart(one, other):
+    """Largest differences of the observable and of displacement at the end."""
+    return (
+        float(np.abs(one.values - other.values).max()),
+        float(np.linalg.norm(one.x - other.x, axis=1).max(initial=0.0)),
+    )
+
+
+def _compare(found):
+    """Find the references, and the errors of all runs."""
+    solved = [t for t in found.trials if t.status == "solved"]
+    able = [t for t in solved if t.key != "smoothing"]
+    pairs = [pair for pair in combinations(able, 2) if pair[0].kind != pair[1].kind]
+    found.independent = bool(pairs)
+    pairs = pairs or list(zip(able[:-1], able[1:], strict=True))[-1:]
+    if not pairs:
+        return
+    scale = max(np.abs(able[-1].values).max(), 1e-300), max(np.linalg.norm(able[-1].x, axis=1).max(), 1e-300)
+
+    def relative(pair):
+        return max(off / size for off, size in zip(_apart(*pair), scale, strict=True))
+
+    first, second = found.references = min(pairs, key=relative)
+    found.trust, found.scale = _apart(first, second), float(np.abs(first.values).max())
+    for trial in solved:
+        trial.error_observable, trial.error_state = found.trust if trial is first else _apart(trial, first)
+
+
+def _sentence(found):
+    if not found.references:
+        yield "No two runs can be compared, so nothing is known of errors."
+        return
+    best = {}
+    for digits in DIGITS:
+        if (trial := found.price(digits)) is not None:
+            best[trial] = digits
+    best = {trial: digits for trial, digits in best.items() if digits >= min(3, max(best.values()))}
+    told = [
+        f"{digits} digit{'s' if digits > 1 else ''}{' cost' if not i else ''} {trial.cpu_s:.2g} s with {trial.method}, "
+        f"{trial.setting}"
+        for i, (trial, digits) in enumerate(sorted(best.items(), key=lambda item: item[1]))
+    ]
+    name = found.observable.name
+    yield f"{name}: {'; '.join(told)}." if told else f"No run has a digit of {name} that can be trusted."
+    one, other = (f"{t.method} ({t.setting})" for t in found.references)
+    agreed = -math.log10(max(found.trust[0] / found.scale, 1e-16)) if found.scale else 0.0
+    if found.independent:
+        yield f"The references, {one} and {other}, agree to {max(agreed, 0.0):.1f} digits."
+    else:
+        yield (
+            f"One kind of method alone takes the scene: {one} and {other} are {max(agreed, 0.0):.1f} digits apart, "
+            "which says how it converges, and no more."
+        )
