@@ -13,6 +13,7 @@ import signal
 import sys
 import threading
 import warnings
+from dataclasses import replace
 
 from .inputs import InputError
 
@@ -30,6 +31,7 @@ def parser():
     command.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
     command.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")
     command.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")
+    command.add_argument("--horizon", action="store_true", help="find how long the motion is determined")
 
     command = commands.add_parser("resume", help="go on with a dynamic run that was killed, interrupted or failed")
     command.add_argument("folder", metavar="DIR", help="its result folder")
@@ -69,6 +71,10 @@ def _run(arguments):
     from .scene import Scene, slug
 
     scene = Scene.load(arguments.scene)
+    if arguments.horizon:
+        if scene.solve.kind == "static":
+            raise InputError(f"--horizon has no meaning for {arguments.scene}: it is static, leave it out")
+        scene = scene.replace(accuracy=replace(scene.accuracy, horizon=True))
     out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
     with progress() as tell:
         solution = run(scene, out=out, force=arguments.force, progress=tell, announce=before)

@@ -62,6 +62,11 @@ def before(scene, system):
     counted = [f"{name} × {times}" if times > 1 else name for name, times in count.items()]
     groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
     how = f"{solve.kind}, {solve.method}, "
+    if solve.method == "auto":
+        from .choice import decided
+
+        solve, why = decided(scene, system)
+        how = f"{solve.kind}, {solve.method} ({why}), "
     if solve.kind == "static":
         how += "load steps " + ", ".join(f"{s:g}" for s in solve.load_steps[:8])
         how += ", ..." if len(solve.load_steps) > 8 else ""
@@ -108,6 +113,16 @@ def _reduced(results):
     return grid
 
 
+def _determined(horizon):
+    """How long a motion is determined, in words."""
+    ended = [(k, time) for k, time in horizon["digits"] if time is not None]
+    text = f"a difference of {horizon['perturbation']:.0e} m"
+    text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"
+    text += "; " + ", ".join(f"{k - 1} digits after {time:.4g} s" for k, time in ended[-3:]) if ended else ""
+    text += "" if horizon["digits"][-1][1] is not None else "; digits are left at the end"
+    return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
+
+
 def stored(summary, more=()):
     """Print the box of a finished run from the content of its ``run.json``, with ``more`` rows (name, text)."""
     solver, cost, rows = summary["solver"], summary["cost"], []
@@ -123,6 +138,11 @@ def stored(summary, more=()):
             if found:
                 parts = (f"{name} by {shown(r[key], None, r['unit'])}" for name, r in found.items())
                 rows.append(("", f"{text} {', '.join(parts)}"))
+    if horizon := summary.get("horizon"):
+        rows.append(("horizon", _determined(horizon)))
+        for name, r in horizon.get("ensemble", {}).items():
+            unit = summary["results"][name]["unit"]
+            rows.append(("", f"{name} {shown(r['mean'], r['deviation'], unit)} over the ensemble, standard deviation"))
     rows += more
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"

@@ -211,6 +211,12 @@ class Motion:
     """
 
     def __init__(self, scene, system, solution, kept=None):
+        self._choice = {}
+        if scene.solve.method == "auto":
+            from .choice import decided
+
+            solve, self._choice["choice"] = decided(scene, system)
+            scene = scene.replace(solve=solve)
         self.scene, self.system, self.solution = scene, system, solution
         self.rows = []
         self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
@@ -488,7 +494,7 @@ class Motion:
         ]
         self._widths = run.events[:, SIDE].copy()
         figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.figures(run))
-        self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **figures}
+        self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **self._choice, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None
 
     def _frame(self, number, folder, run):

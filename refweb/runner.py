@@ -119,6 +119,10 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
         if scene.accuracy.refine:
             tell("finding the errors of elements", 1.0)
             _refine(scene, solution)
+        if scene.accuracy.horizon:
+            from .horizon import horizon
+
+            solution.horizon = horizon(follower, solution.results, scene.accuracy.ensemble, tell)
         solution.status = "solved"
     except KeyboardInterrupt:
         solution.status, solution.message = "interrupted", f"interrupted after {follower.done}"

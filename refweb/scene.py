@@ -123,8 +123,9 @@ class Scene:
         output, dynamic = self.output, self.solve.kind == "dynamic"
         if not dynamic and output.interval is not None:
             raise InputError(f"[output] interval = {output.interval:g} has no meaning in statics: leave it out")
-        if not dynamic and self.accuracy is not None and self.accuracy.digits is not None:
-            raise InputError(f"[accuracy] digits = {self.accuracy.digits} has no meaning in statics: leave it out")
+        for key in ("digits", "horizon") if not dynamic and self.accuracy is not None else ():
+            if value := getattr(self.accuracy, key):
+                raise InputError(f"[accuracy] {key} = {shown(value)} has no meaning in statics: leave it out")
         if not dynamic and self.event:
             raise InputError(f"[[event]] {shown(self.event[0].name)} has no meaning in statics: leave it out")
         interval = (output.interval or min(1e-3, self.solve.duration)) if dynamic else None
@@ -300,7 +301,7 @@ class Scene:
         return system
 
     def _check_links(self):
-        if self.solve.method != "ida":
+        if self.solve.method not in ("ida", "auto"):
             here = f'kind = "{self.solve.kind}" and method = "{self.solve.method}"'
             raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = "ida", not {here}')
         if self.solve.start == "equilibrium":

@@ -59,6 +59,7 @@ OWN = {
     "explicit": ("safety", "step_size", "order"),
     "cvode": (*_TOLERANCES, "family", "max_order", "linear_solver"),
     "ida": (*_TOLERANCES, "max_order", "linear_solver"),
+    "auto": (),
 }
 """Keys of `Dynamic` that have a meaning with one method or another."""
 
@@ -69,9 +70,9 @@ class Dynamic(Table):
 
     Parameters
     ----------
-    method : {"central-difference", "explicit", "cvode", "ida"}
+    method : {"central-difference", "explicit", "cvode", "ida", "auto"}
         Explicit central differences, explicit steps of higher order, or CVODE or IDA of SUNDIALS with steps that follow
-        from the error.
+        from the error; "auto" chooses by what the scene is, see `refweb.choice`.
     duration : float
         Time to simulate [s].
     safety : float
@@ -99,7 +100,7 @@ class Dynamic(Table):
     """
 
     kind: str = choice("dynamic", default="dynamic")
-    method: str = choice("central-difference", "explicit", "cvode", "ida", default="central-difference")
+    method: str = choice("central-difference", "explicit", "cvode", "ida", "auto", default="central-difference")
     duration: float = real(above=0, unit="s")
     safety: float | None = real(None, above=0, at_most=1)
     step_size: float | None = real(None, above=0, unit="s")
@@ -204,12 +205,21 @@ class Accuracy(Table):
         or until it is shown which observables cannot have them.
     refine : bool
         Whether the error of elements is found, by two more runs with two and four times as many.
+    horizon : bool
+        Of dynamics: whether it is found how long the motion is determined, see `refweb.horizon`.
+    ensemble : int, optional
+        With ``horizon``: number of runs that mean and spread of results are taken of.
     """
 
     error: str = choice("twin", "none", default="twin")
     digits: int | None = integer(None, at_least=1, at_most=12)
     refine: bool = boolean(False)
+    horizon: bool = boolean(False)
+    ensemble: int | None = integer(None, at_least=2, at_most=10_000)
 
     def check(self):
+        """Refuse what needs something else."""
+        if self.ensemble is not None and not self.horizon:
+            raise InputError(f"ensemble = {self.ensemble} needs horizon = true")
         if self.digits is not None and self.error == "none":
             raise InputError(f'digits = {self.digits} needs error = "twin"')

@@ -49,6 +49,8 @@ class Solution:
         Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
+    horizon : dict
+        How long the motion is determined, see `refweb.horizon.horizon`; empty where that was not asked for.
     events : list of dict
         Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
     frames : list of (int, refweb.state.State)
@@ -71,6 +73,7 @@ class Solution:
     events: list = field(default_factory=list)
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
+    horizon: dict = field(default_factory=dict)
     utilisation: tuple | None = None
 
     @property
@@ -154,6 +157,7 @@ class Solution:
             "versions": self.versions,
             "seed": self.scene.seed,
             "warnings": self.warnings,
+            **({"horizon": self.horizon} if self.horizon else {}),
         }
 
     def save(self, folder, force=False):

@@ -293,7 +293,7 @@ def _compare(found):
     able = [t for t in solved if t.key != "smoothing"]
     pairs = [pair for pair in combinations(able, 2) if pair[0].kind != pair[1].kind]
     found.independent = bool(pairs)
-    pairs = pairs or list(zip(able[:-1], able[1:], strict=True))[-1:]
+    pairs = pairs or [pair for pair in zip(able[:-1], able[1:], strict=True) if pair[0].method == pair[1].method]
     if not pairs:
         return
     scale = max(np.abs(able[-1].values).max(), 1e-300), max(np.linalg.norm(able[-1].x, axis=1).max(), 1e-300)

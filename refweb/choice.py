@@ -1,0 +1,81 @@
+"""``method = "auto"``: which dynamic method a scene is given to, and why.
+
+Links and nodes without mass leave IDA alone, curved elements and a consistent mass CVODE. For all else the question is
+whether anything asks for the short steps that an explicit method has to take. Waves do, and contact, initial velocities
+and starts out of equilibrium make waves: then a compiled explicit step, 1e-6 s and 12e-9 s per element, is 40 to 130
+times cheaper than one of CVODE. Where tables alone move a web from its equilibrium, or damping lowers the explicit
+bound, and ends the waves that would have to be followed, BDF takes steps as long as the motion allows.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from .inputs import InputError
+
+USUAL = 3
+"""Digits that are aimed at where a scene does not say."""
+MANY = 5
+"""Digits from which order 6 is cheaper than order 2."""
+PER_STEP, PER_ELEMENT = 1e-6, 12e-9
+"""CPU time of a compiled explicit step [s], and of each element in it [s]."""
+QUICK = 0.5
+"""CPU time of an explicit run [s] below which nothing is to be gained."""
+DAMPED = 5.0
+"""Share by which damping lowers the bound of stability where BDF is cheaper."""
+
+
+def decided(scene, system):
+    """The `refweb.Dynamic` that stands for ``method = "auto"``, and the reason for it in words."""
+    net, digits = system.net, scene.accuracy.digits or USUAL
+    bare = np.flatnonzero((net.mass <= 0.0) & ~system.supported.all(axis=1))
+    tolerance = max(10.0 ** -(digits + 1), 1e-12)
+    if system.constraints:
+        return _of(scene, "ida", rtol=tolerance), "only ida holds the lengths of [[link]]"
+    if len(bare):
+        return _of(scene, "ida", rtol=tolerance), f"node {bare[0]} has no mass, which only ida takes"
+    family = "adams" if digits >= MANY else "bdf"
+    if net.order > 1 or net.spread is not None:
+        what = f"order {net.order}" if net.order > 1 else "a consistent mass"
+        return _of(scene, "cvode", rtol=tolerance, family=family), f"{what} is not for explicit steps"
+    bound = _bound(system)
+    steps = scene.solve.duration / (0.5 * bound)
+    seconds = steps * (PER_STEP + PER_ELEMENT * len(net.cells))
+    price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
+    undamped = copy.copy(system)
+    undamped.families = [replace(f, damping_bound=None) for f in system.families]
+    damped = _bound(undamped) / bound
+    if seconds > QUICK and damped > DAMPED:
+        why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
+        return _of(scene, "cvode", rtol=tolerance, family="bdf"), why
+    if seconds > QUICK and _quiet(scene, system):
+        why = f"tables alone move it from its equilibrium: no waves ask for {price}"
+        return _of(scene, "cvode", rtol=tolerance, family=family), why
+    if digits >= MANY:
+        try:
+            from .nystrom import Nystrom
+
+            Nystrom(system)
+            return _of(scene, "explicit"), f"{digits} digits, and forces that follow from displacement alone: {price}"
+        except InputError:
+            pass
+    return _of(scene, "central-difference"), price
+
+
+def _of(scene, method, **keys):
+    return replace(scene.solve, method=method, **keys)
+
+
+def _bound(system):
+    from .central_difference import CentralDifference
+
+    return CentralDifference(system).bound()
+
+
+def _quiet(scene, system):
+    """Whether no body, velocity or lack of equilibrium makes waves."""
+    touched = any(family.name == "contact" for family in system.families)
+    return scene.solve.start == "equilibrium" and not touched and not system.initial_velocity().any()

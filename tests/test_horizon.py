@@ -1,0 +1,87 @@
+"""How long a motion is determined: a linear oscillator for ever, an unstable one for a time that is known."""
+
+import json
+
+import numpy as np
+import pytest
+
+import refweb
+from refweb.__main__ import main
+from refweb.horizon import PERTURBATION
+from refweb.inputs import InputError
+
+
+def oscillator(prestrain, duration, **accuracy):
+    """A mass between two lines along x, which may move along y only: stable under tension, not under pressure."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+        cable=refweb.Cable(law="linear", modulus=7e7, area=1e-4, density=0.0, prestrain=prestrain),
+        effects=[refweb.PointMass(node=1, mass=1.0)],
+        support=[refweb.Supports(nodes=1, components=["x", "z"])],
+        observe=[
+            refweb.Observe(name="early", quantity="velocity", node=1, component="y", reduce="min"),
+            refweb.Observe(name="last", quantity="displacement", node=1, component="y"),
+        ],
+        solve=refweb.Dynamic(duration=duration),
+        output=refweb.Output(interval=duration / 200),
+        accuracy=refweb.Accuracy(horizon=True, **accuracy),
+    )
+
+
+def test_growth_of_an_unstable_equilibrium():
+    """Pressed lines: y'' = κ² y with κ² = 2 |T|/(L m), so that differences grow with κ e-folds per second."""
+    prestrain = -1e-3
+    tension = 7e3 * prestrain  # distance over natural length is 1 + prestrain
+    rate = np.sqrt(2.0 * abs(tension))
+    scene = oscillator(prestrain, 12.0 / rate)
+    # Slow enough to stay near the equilibrium: at the end at 2e-3 m, of 0.045 m to where the lines have no force.
+    scene = scene.replace(effects=[*scene.effects, refweb.Velocity(node=1, value=(0.0, 1e-7, 0.0))])
+    found = refweb.run(scene).horizon
+    # At the start half of the difference decays: of 12 e-folds 0.7 are lost, of which the fit sees a part.
+    assert found["growth"] == pytest.approx(rate, rel=0.05)
+    assert found["perturbation"] == pytest.approx(PERTURBATION / (1.0 + prestrain))
+    times = [time for _, time in found["digits"] if time is not None]
+    assert times == sorted(times) and [k for k, _ in found["digits"]] == list(range(12, 0, -1))
+
+
+def test_a_regular_motion_stays_determined(tmp_path):
+    """Of a taut oscillator ten digits are left at the end, and nothing is statistical."""
+    scene = oscillator(1e-3, 5.0)
+    scene = scene.replace(effects=[*scene.effects, refweb.Velocity(node=1, value=(0.0, 1.0, 0.0))])
+    solution = refweb.run(scene, out=tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))["horizon"]
+    assert found["statistical"] == [] and dict(map(tuple, found["digits"]))[10] is None
+    assert found["digits"] == [list(pair) for pair in solution.horizon["digits"]]
+
+
+def test_an_ensemble_of_what_is_not_determined():
+    """A mass at rest on pressed lines leaves to either side: mean and spread say so, and it is called statistical."""
+    rate = np.sqrt(2.0 * 7e3 * 1e-3)
+    scene = oscillator(-1e-3, 45.0 / rate, ensemble=8)
+    found = refweb.run(scene).horizon
+    last = found["ensemble"]["last"]
+    assert "last" in found["statistical"]
+    assert last["deviation"] > abs(last["mean"]) > 0.0
+
+
+def test_command_line(tmp_path, capsys):
+    assert main(["run", "square-load", "--horizon", "--out", str(tmp_path / "out")]) == 2
+    assert "--horizon has no meaning for square-load: it is static" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    path = tmp_path / "hit.toml"
+    path.write_text(
+        'schema = 1\n[web]\nkind = "cable"\nstart = [0,0,0]\nend = [1,0,0]\nelements = 4\nlength = 1.1\n'
+        '[cable]\nlaw = "tension-only"\nmodulus = 7e5\narea = 1e-4\ndensity = 200.0\n'
+        '[gravity]\nacceleration = [0.0, 0.0, -9.81]\n[solve]\nkind = "dynamic"\nduration = 0.05\n'
+    )
+    assert main(["run", str(path), "--horizon", "--out", str(tmp_path / "out")]) == 0
+    assert "e-folds/s" in capsys.readouterr().out
+    assert main(["info", str(tmp_path / "out")]) == 0
+    assert "e-folds/s" in capsys.readouterr().out
+
+
+def test_bad_input():
+    with pytest.raises(InputError, match="ensemble = 16 needs horizon = true"):
+        refweb.Accuracy(ensemble=16)
+    with pytest.raises(InputError, match=r"\[accuracy\] horizon = true has no meaning in statics"):
+        refweb.Scene.load("square-load").replace(accuracy=refweb.Accuracy(horizon=True)).build()
