@@ -76,10 +76,6 @@ class Cable(Table):
 
     def check(self):
         """Fill in the smooth law's parameters; refuse them for other laws, and an EA that is 0 in floating point."""
-        for name, group in [("", self), *((f"groups.{short(name)} ", group) for name, group in self.groups.items())]:
-            modulus, area = group.modulus or self.modulus, group.area or self.area
-            if not modulus * area > 0:
-                raise InputError(f"{name}modulus = {modulus:g} times area = {area:g} must be > 0 [N]")
         for key, default in (("slackness", 0.0), ("smoothing", 1e-5)):
             if self.law == "smooth":
                 if getattr(self, key) is None:

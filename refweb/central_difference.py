@@ -54,6 +54,8 @@ class Run:
         Impulse of the supports on the net [N s].
     events : ndarray, shape (events, 6)
         What each event has come to, see `refweb.stepping`.
+    recent : ndarray, shape (probes, 4)
+        Time and value of each probe when it was last looked at, twice, for methods of higher order.
     """
 
     state: np.ndarray
@@ -64,6 +66,7 @@ class Run:
     work: np.ndarray
     impulse: np.ndarray
     events: np.ndarray
+    recent: np.ndarray
 
     @property
     def stopped(self):
@@ -255,7 +258,9 @@ class CentralDifference:
             passes(event, values[int(event[0])])
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
-        return Run(state, saved, values, np.zeros(len(signs)), where[:, 0].copy(), book, np.zeros(3), events)
+        none, recent = np.zeros(len(signs)), np.full((len(signs), 4), np.nan)
+        recent[:, 2], recent[:, 3] = 0.0, values
+        return Run(state, saved, values, none, where[:, 0].copy(), book, np.zeros(3), events, recent)
 
     def stored(self, run):
         """The `Run` as arrays by name, for a checkpoint."""
@@ -266,7 +271,7 @@ class CentralDifference:
         return Run(**arrays)
 
     def _peaks(self, run):
-        return (*self._probes, run.peaks, run.times, run.places, run.work, run.impulse)
+        return (*self._probes, run.peaks, run.times, run.places, run.recent, run.work, run.impulse)
 
     def rows(self, run, ends):
         """Advance a run to each time of ``ends`` in turn; equal steps lead to each.

@@ -76,7 +76,10 @@ def certify(system, equilibrium, factor=None):
         unbalanced = outer + resultant @ (force + correction)
         unbalanced[system.supported] = 0.0
         y = np.zeros((system.rows, 3))
-        y.ravel()[system.free] = factor.solve(unbalanced.ravel()[system.free].astype(float))
+        p = factor.solve(unbalanced.ravel()[system.free].astype(float))
+        if p is None:  # what stays unbalanced enters the gap
+            break
+        y.ravel()[system.free] = p
         correction += weight[:, None] * (bars @ y)
     unbalanced = outer + resultant @ (force + correction)
     unbalanced[system.supported] = 0.0

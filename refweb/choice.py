@@ -22,6 +22,8 @@ MANY = 5
 """Digits from which order 6 is cheaper than order 2."""
 PER_STEP, PER_ELEMENT = 1e-6, 12e-9
 """CPU time of a compiled explicit step [s], and of each element in it [s]."""
+VISCOUS = 8.0
+"""How much longer a step takes where forces depend on velocity, which the second kick is iterated for."""
 QUICK = 0.5
 """CPU time of an explicit run [s] below which nothing is to be gained."""
 DAMPED = 5.0
@@ -44,16 +46,18 @@ def decided(scene, system):
     bound = _bound(system)
     steps = scene.solve.duration / (0.5 * bound)
     seconds = steps * (PER_STEP + PER_ELEMENT * len(net.cells))
+    if any(family.damping is not None for family in system.families):
+        seconds *= VISCOUS
     price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
     undamped = copy.copy(system)
     undamped.families = [replace(f, damping_bound=None) for f in system.families]
     damped = _bound(undamped) / bound
     if seconds > QUICK and damped > DAMPED:
         why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
-        return _of(scene, "cvode", rtol=tolerance, family="bdf"), why
+        return _of(scene, "cvode", rtol=tolerance, family="adams"), why
     if seconds > QUICK and _quiet(scene, system):
         why = f"tables alone move it from its equilibrium: no waves ask for {price}"
-        return _of(scene, "cvode", rtol=tolerance, family=family), why
+        return _of(scene, "cvode", rtol=tolerance, family="bdf"), why
     if digits >= MANY:
         try:
             from .nystrom import Nystrom

@@ -116,6 +116,11 @@ class Implicit:
     def __init__(self, system, probes=(), watch=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
         self.system, self.rtol = system, rtol
         self.unknowns = len(system.free)
+        if not self.unknowns:
+            raise InputError(
+                f'[solve] method = "{self.method}" needs something that is free to move: all nodes are supported; use '
+                '"central-difference"'
+            )
         near, fast = scales(system)
         self.atol_position = rtol * near if atol_position is None else atol_position
         self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity

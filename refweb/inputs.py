@@ -15,6 +15,8 @@ from dataclasses import MISSING
 
 LARGEST = 1e100
 """Largest value of a number with a unit: products of three stay finite."""
+SMALLEST = 1e-100
+"""Smallest value of a number that must not be negative, unless it is 0."""
 _WHOLE = 2**63 - 1
 
 
@@ -99,6 +101,9 @@ def _bounded(name, value, unit, above, at_least, below, at_most):
     ):
         if bad:
             _refuse(name, value, f"{sign} {bound:g}" + (f" [{unit}]" if unit else ""))
+    if 0.0 in (above, at_least) and 0 < value < SMALLEST:
+        least = f"≥ {SMALLEST:g}" if above == 0.0 else f"0 or ≥ {SMALLEST:g}"
+        _refuse(name, value, least + (f" [{unit}]" if unit else ""))
     return value
 
 

@@ -155,10 +155,20 @@ class Dynamics:
 
     def compile(self, trial):
         """Take a step with the solver of a trial; raises an `InputError` where it does not take the scene."""
-        if trial.method != "dop853":
-            solver = self._solver(trial)
-            with contextlib.suppress(SolverError):  # energies of a first moment may be too small for their book
-                solver.rows(solver.start(*self.begin), [1e-9 * self.times[-1]])
+        if trial.method == "dop853":
+            self._refuse(trial.method)
+            return
+        solver = self._solver(trial)
+        with contextlib.suppress(SolverError):  # energies of a first moment may be too small for their book
+            solver.rows(solver.start(*self.begin), [1e-9 * self.times[-1]])
+
+    def _refuse(self, method):
+        """Refuse for DOP853 what has no mass, or lengths that are held."""
+        from .implicit import refuse_massless
+
+        refuse_massless(self.system, method)
+        if self.system.constraints:
+            raise InputError(f'[[link]] needs method = "ida": {method} does not hold lengths')
 
     def run(self, trial, deadline):
         """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the clock."""
@@ -185,12 +195,9 @@ class Dynamics:
         from scipy.integrate import DOP853
         from scipy.sparse.linalg import splu
 
-        from .implicit import TRAVEL, refuse_massless, scales
+        from .implicit import TRAVEL, scales
 
         system, free, n = self.system, self.system.free, len(self.system.free)
-        refuse_massless(system, trial.method)
-        if system.constraints:
-            raise InputError(f'[[link]] needs method = "ida": {trial.method} does not hold lengths')
         x = np.zeros((system.rows, 3)) if self.begin[0] is None else self.begin[0].copy()
         v = system.initial_velocity() if self.begin[1] is None else self.begin[1].copy()
         v[system.supported] = 0.0
@@ -247,7 +254,8 @@ class Statics:
 
     def compile(self, trial):
         """Solve the first load step, with the kernels of the method."""
-        self._solved(trial, self.scene.solve.load_steps[:1], math.inf)
+        with contextlib.suppress(SolverError):
+            self._solved(trial, self.scene.solve.load_steps[:1], math.inf)
 
     def run(self, trial, deadline):
         """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the clock."""

@@ -14,6 +14,8 @@ DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
 MOST = 1e8
 """Largest number of steps of a history row."""
+LOOKS = 4
+"""Number of parts of a step of higher order at whose ends peaks are looked for."""
 SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
 """Columns of events: the probe, or behind the probes the sum, whose value passes a level; the side it is on, 1 above
 and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts; whether
@@ -65,17 +67,52 @@ def set_lengths(t, lengths, reeled, reeled_lines, line_drives, line_cells, line_
 
 
 @kernel()
+def interpolate(s, h, old, x, v, inverse, f, here, speed):
+    """Write position and velocity at the share s of a step from ``old`` (position, velocity, acceleration)."""
+    r = 1.0 - s
+    way, more = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * r * r
+    b0, b1 = s * r**3 * (1.0 + 3.0 * s), -(s**3) * r * (4.0 - 3.0 * s)
+    c0, c1 = 0.5 * s * s * r**3, 0.5 * s**3 * r * r
+    db0, db1 = r * r * (1.0 - 3.0 * s) * (1.0 + 5.0 * s), -s * s * (2.0 - 3.0 * s) * (6.0 - 5.0 * s)
+    dc0, dc1 = 0.5 * s * r * r * (2.0 - 5.0 * s), 0.5 * s * s * r * (3.0 - 5.0 * s)
+    for q in range(x.shape[0]):
+        for k in range(3):
+            far, v0, v1 = x[q, k] - old[0, q, k], h * old[1, q, k], h * v[q, k]
+            a0, a1 = h * h * old[2, q, k], h * h * inverse[q, k] * f[q, k]
+            here[q, k] = old[0, q, k] + way * far + b0 * v0 + b1 * v1 + c0 * a0 + c1 * a1
+            speed[q, k] = (more * far + db0 * v0 + db1 * v1 + dc0 * a0 + dc1 * a1) / h
+
+
+@kernel()
+def culminate(i, now, value, sign, recent, peaks, times):
+    """Take the top of the parabola through the last three values of a probe, where it has one between them.
+
+    ``recent`` holds time and value of the two before.
+    """
+    before, low, at, high = recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3]
+    if sign * high > sign * low and sign * high > sign * value:  # never of what is not a number yet
+        rise, fall = (high - low) / (at - before), (value - high) / (now - at)
+        curve = (fall - rise) / (now - before)
+        slope = rise + curve * (at - before)
+        top = high - 0.25 * slope * slope / curve
+        if sign * top > sign * peaks[i]:
+            peaks[i], times[i] = top, at - 0.5 * slope / curve
+    recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3] = at, high, now, value
+
+
+@kernel()
 def advance(
     count, h, t, kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
     kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines,
     line_drives, line_cells, line_data, reeled_cells, by_length,
-    probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
+    probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent, book, impulse,
     energies, energy_outs, watch, total, events,
 ):  # fmt: skip
     """``count`` steps of size h from time t; writes x, v, f, peaks, the book of work and the supports' impulse.
 
     A step is a kick, a drift and a kick of h times ``kicks`` and ``drifts``; more of them are a method of higher order,
-    for forces that follow from displacement alone.
+    for forces that follow from displacement alone. Such steps are long: between their ends peaks are looked for on the
+    polynomial of degree 5 through position, velocity and acceleration, and between what is seen there on parabolas.
 
     Forces that depend on velocity see that at the end of the step, which the second kick, thereby implicit, is iterated
     for: kick and kick stay adjoint to each other, and the method of order 2. The iteration contracts with ½ h C/m.
@@ -88,6 +125,8 @@ def advance(
     before, reaction, motion = np.empty((driven.size, 7)), np.zeros(3), len(kernels)
     power, half = np.zeros(len(kernels)), np.empty((rows if viscous.size else 0, 3))
     more = drifts.size - 1
+    old, inner = np.empty((3, rows if more else 0, 3)), np.empty((3, rows if more else 0, 3))
+    inner_lines = np.empty_like(lines) if more else lines
     kick, drift, last_kick = kicks[more] * h, drifts[more] * h, kicks[more + 1] * h
     unused = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     flat_half, flat_unused = half.reshape(-1), unused.reshape(-1)
@@ -102,6 +141,8 @@ def advance(
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
         now = t + step * h
+        if more:
+            old[0], old[1], old[2] = x, v, inverse * f
         for n in range(more):
             for k in range(3):
                 impulse[k] += kicks[n] * h * reaction[k]
@@ -179,18 +220,47 @@ def advance(
             reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
         for k in range(3):
             impulse[k] += last_kick * reaction[k]
+        for n in range(1, LOOKS if more else 0):
+            here = now - h + h * n / LOOKS
+            interpolate(n / LOOKS, h, old, x, v, inverse, f, inner[0], inner[1])
+            inner[2] = 0.0
+            first(here, inner[0], inner[1], inner[2], first_cells, first_data, inner_lines)
+            for i in still:
+                kernels[i](here, inner[0], inner[1], inner[2], cells[i], data[i], outs[i])
+            for i in followed:
+                value = probes[i](
+                    here, inner[0], inner[1], inner[2], inner_lines, probe_rows[i], probe_data[i], where
+                )  # fmt: skip
+                if signs[i] * value > signs[i] * peaks[i]:
+                    where[1] = PLACE
+                    probes[i](here, inner[0], inner[1], inner[2], inner_lines, probe_rows[i], probe_data[i], where)
+                    peaks[i], times[i], places[i], where[1] = value, here, where[0], 0
+                culminate(i, here, value, signs[i], recent, peaks, times)
+            if watch.shape[0]:
+                book_energies(
+                    here, inner[0], inner[1], mass, cells, data, energies, energy_outs, book, working, total
+                )  # fmt: skip
+                for j in range(watch.shape[0]):
+                    value, i = np.dot(watch[j], total), len(probes) + j
+                    if signs[i] * value > signs[i] * peaks[i]:
+                        peaks[i], times[i] = value, here
+                    culminate(i, here, value, signs[i], recent, peaks, times)
         for i in followed:
             value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
             if signs[i] * value > signs[i] * peaks[i]:
                 where[1] = PLACE
                 probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
                 peaks[i], times[i], places[i], where[1] = value, now, where[0], 0
+            if more:
+                culminate(i, now, value, signs[i], recent, peaks, times)
         if watch.shape[0]:
             book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, working, total)
             for j in range(watch.shape[0]):
                 value, i = np.dot(watch[j], total), len(probes) + j
                 if signs[i] * value > signs[i] * peaks[i]:
                     peaks[i], times[i] = value, now
+                if more:
+                    culminate(i, now, value, signs[i], recent, peaks, times)
         ended = False
         for e in range(events.shape[0]):
             event = events[e]
@@ -243,8 +313,8 @@ def rows_ahead(
     ends, safety, step_size, finer, limit, kicks, drifts, state, saved, linear, mass, inverse, free, held, driven,
     working, powers, still, viscous, kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives,
     drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data,
-    reeled_cells, by_length, corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, book,
-    impulse, watch, events, history,
+    reeled_cells, by_length, corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent,
+    book, impulse, watch, events, history,
 ):  # fmt: skip
     """Advance to each time of ``ends`` and write a row of ``history`` there.
 
@@ -303,7 +373,7 @@ def rows_ahead(
                 count, h, state[0], kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still,
                 viscous, kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting, reeled,
                 reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
-                probes, probe_rows, probe_data, signs, followed, peaks, times, places, book, impulse,
+                probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent, book, impulse,
                 energies, energy_outs, watch, total, events,
             )  # fmt: skip
             stopped = taken < count or (events.shape[0] > 0 and ended_by(events))

@@ -1,8 +1,9 @@
 """What digits cost: every method on one scene, its errors against its CPU time.
 
-Errors are differences to a reference that no method alone can set: of all runs, the two of different kinds that agree
-best are the references, one of them is compared with, and their difference is how far any error can be trusted. Where
-one kind of method alone takes the scene, its two finest runs stand in, and that is said.
+Errors are differences to a reference that no method alone can set: of the finest runs of all methods, the two of
+different kinds that agree best are the references; with one of them all others are compared, and their difference is
+how far any error can be trusted. Where one kind of method alone takes the scene, its two finest runs stand in, and that
+is said.
 
 The budget is kept by looking at the clock: a run may take a quarter of what is left, is left out where the runs before
 it say that it would take more, and is ended where it does.
@@ -15,7 +16,7 @@ import math
 import pathlib
 import time
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import combinations, takewhile
 
 import numpy as np
 
@@ -78,16 +79,18 @@ class Cost:
         return " ".join(_sentence(self))
 
     def price(self, digits, method=None):
-        """The cheapest solved `Trial` with so many digits of the observable, of one method or of all; None if none.
+        """The cheapest `Trial` from which on a method keeps so many digits of the observable, None where none does.
 
-        Other smoothings than the scene's are other laws, and not among them.
+        Of one method, or of all. What the references cannot tell counts as none; other smoothings than the scene's are
+        other laws, and not among the methods.
         """
-        limit = self.scale * 10.0**-digits
+        limit, best = self.scale * 10.0**-digits, []
         if not self.trust[0] <= limit:
             return None
-        good = [t for t in self.trials if t.error_observable <= limit and method in (None, t.method)]
-        good = [t for t in good if t.key != "smoothing"]
-        return min(good, key=lambda t: t.cpu_s, default=None)
+        for name in {t.method for t in self.trials if t.key != "smoothing" and method in (None, t.method)}:
+            ladder = [t for t in self.trials if t.method == name and t.status == "solved"]
+            best += takewhile(lambda t: t.error_observable <= limit, reversed(ladder))
+        return min(best, key=lambda t: t.cpu_s, default=None)
 
     def rows(self):
         """Rows of ``cost.csv`` below its header, `COLUMNS`."""
@@ -154,7 +157,7 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
         Name of the observable that errors are of: a nodal quantity, one of lines, or the slack fraction; by default
         the first of the scene that is one.
     budget : float
-        Time that all of it may take [s].
+        Time that all of it may take [s]; runs have at least half of it, however long kernels take to compile.
     out : path-like, optional
         Result folder; without it nothing touches the disk.
     force : bool
@@ -190,7 +193,9 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     ladders = trials(scene)
     found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
     try:
-        _climb(ladders, runner, began[1] + budget, budget, progress or (lambda text, share: None))
+        _compile(ladders, runner)
+        deadline = max(began[1] + budget, time.perf_counter() + 0.5 * budget)
+        _climb(ladders, runner, deadline, budget, progress or (lambda text, share: None))
         found.status = "solved" if any(t.status == "solved" for t in found.trials) else "failed"
     except KeyboardInterrupt:
         found.status = "interrupted"
@@ -222,6 +227,16 @@ def _observable(scene, name):
     return names[name]
 
 
+def _compile(ladders, runner):
+    """Compile the kernels of each method, and find those that refuse the scene."""
+    for ladder in ladders.values():
+        try:
+            runner.compile(ladder[0])
+        except InputError as error:
+            for trial in ladder:
+                trial.status, trial.message = "refused", str(error)
+
+
 def _climb(ladders, runner, deadline, budget, tell):
     """Run all ladders at once, rung by rung, while there is time."""
     for rung in range(max(map(len, ladders.values()))):
@@ -229,14 +244,16 @@ def _climb(ladders, runner, deadline, budget, tell):
             if rung >= len(ladder):
                 continue
             now, trial, before = time.perf_counter(), ladder[rung], ladder[:rung]
-            if any(t.status in ("budget", "refused") for t in before):
-                trial.status, trial.message = before[-1].status, before[-1].message
+            if trial.status == "refused":
+                continue
+            if any(t.status == "budget" for t in before):
+                trial.message = before[-1].message
                 continue
             tell(f"{trial.method}, {trial.setting}", 1.0 - (deadline - now) / budget)
             if _expected(trial, before) > SHARE * (deadline - now):
                 trial.message = "would take more than its share of the budget"
                 continue
-            _try(trial, runner, deadline, first=rung == 0)
+            _try(trial, runner, now + SHARE * (deadline - now))
 
 
 def _expected(trial, before):
@@ -251,24 +268,17 @@ def _expected(trial, before):
     return spent[-1][1] * (spent[-1][0] / trial.value) ** power
 
 
-def _try(trial, runner, deadline, first):
-    """Run a trial, several times where it is cheap, and note how it ended; the first of a method compiles it before."""
-    least, until = np.inf, 0.0
+def _try(trial, runner, until):
+    """Run a trial, several times where it is cheap, and note how it ended."""
+    least = np.inf
     for _ in range(REPEATS):
         began, spent = time.perf_counter(), time.process_time()
         try:
-            if first and least == np.inf:
-                runner.compile(trial)
-                began, spent = time.perf_counter(), time.process_time()
-            until = until or began + SHARE * (deadline - began)
             runner.run(trial, until)
         except OverBudget:
             if least < np.inf:
                 break
             trial.message = "took more than its share of the budget"
-            return
-        except InputError as error:
-            trial.status, trial.message = "refused", str(error)
             return
         except SolverError as error:
             trial.status, trial.message, trial.cpu_s = "failed", str(error), time.process_time() - spent
@@ -291,9 +301,11 @@ def _compare(found):
     """Find the references, and the errors of all runs."""
     solved = [t for t in found.trials if t.status == "solved"]
     able = [t for t in solved if t.key != "smoothing"]
-    pairs = [pair for pair in combinations(able, 2) if pair[0].kind != pair[1].kind]
+    finest = {t.method: t for t in able}.values()
+    pairs = [pair for pair in combinations(finest, 2) if pair[0].kind != pair[1].kind]
     found.independent = bool(pairs)
-    pairs = pairs or [pair for pair in zip(able[:-1], able[1:], strict=True) if pair[0].method == pair[1].method]
+    pairs = pairs or [pair for pair in zip(able[:-1], able[1:], strict=True) if pair[1] in finest]
+    pairs = [pair for pair in pairs if found.independent or pair[0].method == pair[1].method]
     if not pairs:
         return
     scale = max(np.abs(able[-1].values).max(), 1e-300), max(np.linalg.norm(able[-1].x, axis=1).max(), 1e-300)

@@ -480,7 +480,8 @@ WRONG = [
     ("cable.modulus", 1e308, "[cable] modulus = 1e+308 must be ≤ 1e+100 [Pa]"),
     ("cable.modulus", 10**400, "[cable] modulus = 1000", "must be a finite number [Pa]"),
     ("cable", {"modulus": 1e99, "area": 1e99, "density": 1}, "[cable] line 0: stiffness", "must be ≤ 1e+100 [N/m]"),
-    ("cable", {"modulus": 1e-200, "area": 1e-200, "density": 1}, "[cable] modulus = 1e-200 times area = 1e-200"),
+    ("cable.area", 1e-200, "[cable] area = 1e-200 must be ≥ 1e-100 [m²]"),
+    ("cable.density", 5e-324, "[cable] density = 5e-324 must be 0 or ≥ 1e-100 [kg/m³]"),
     ("web", {**WINDOW, "rows": 10**9, "columns": 10}, "[web] rows × columns = 10000000000 must be ≤ 1000000"),
     ("web", {**CABLE, "elements": 10**9}, "[web] elements = 1000000000 must be ≤ 1e+06"),
     # what does not fit together

@@ -147,7 +147,8 @@ class Frame(Table):
         return families
 
     def _numbers(self, mass, points):
-        parts = [np.tile(self.angular_velocity, (len(mass), 1)), *(a.reshape(len(mass), -1) for a in (mass, points))]
+        flat = (a.reshape(len(mass), int(np.prod(a.shape[1:]))) for a in (mass, points))
+        parts = [np.tile(self.angular_velocity, (len(mass), 1)), *flat]
         return np.ascontiguousarray(np.hstack(parts))
 
     def _families(self, pulled, turned):

@@ -1,0 +1,249 @@
+"""What digits cost
+
+Each scene is run by every method that takes it, from coarse to fine, as ``refweb cost`` does: central differences,
+explicit steps of order 4 and 6, CVODE with BDF and Adams methods, IDA, and as a voice from outside scipy's DOP853,
+driven by the same compiled forces. Errors are largest differences over the history rows to a reference; the reference
+and a second one, of another kind of method, are the finest runs, and the grey zone of a diagram is where they differ:
+there nobody knows. CPU time is that of the solver's loop, compiled before, the least of several runs where they are
+cheap. A run that fails, is refused or would take more than a quarter of what is left of the time stands in the legend.
+
+A method costs what the coarsest run costs from which on it keeps the digits, interpolated on logarithmic scales between
+that run and the one before. ``method = "auto"`` names a method before anything has run; it has to be one that costs at
+most 1.5 times the best at three digits, or at as many as the references allow.
+
+Last, explicit steps of order 4 and 6 against DOP853 on the square web of the paper whose centre is thrown: the ratio of
+CPU times at equal errors of displacement, with the smooth law, whose forces have the derivatives that high orders need.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+import refweb
+from refweb.choice import decided
+from refweb.work_precision import cost
+
+from . import Case, Figure, Table, Verdict
+
+NEAR = 1.5
+"""Largest price of the method that "auto" names over the best."""
+SECONDS = 55.0
+"""Budget of a scene [s]."""
+ERRORS = 10.0 ** -np.arange(6.0, 11.1)
+"""Errors of displacement at which explicit steps and DOP853 are compared [m]."""
+
+SOFT = dict(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
+TAUT = dict(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=1e-2)
+STIFF = dict(law="tension-only", modulus=1e11, area=1e-6, density=7800.0)
+CENTRE = refweb.Observe(name="centre", quantity="displacement", node="centre")
+
+
+def thrown(value, mass=None):
+    """The centre, with a point mass or without, has a velocity."""
+    given = [refweb.Velocity(node="centre", value=value)]
+    return given if mass is None else [refweb.PointMass(node="centre", mass=mass), *given]
+
+
+def ball():
+    """A ball of 1 kg at 1 m/s, beside the middle."""
+    place = dict(position=(0.01, 0.02, -0.105), velocity=(0.0, 0.0, 1.0))
+    return [refweb.Body(name="ball", radius=0.1, mass=1.0, **place), refweb.Contact(stiffness=1e5)]
+
+
+def scene(title, web, cable, effects, duration, interval=1e-3, **solve):
+    """A scene that is observed at its centre."""
+    return refweb.Scene(
+        title=title,
+        web=web,
+        cable=refweb.Cable(**cable),
+        effects=effects,
+        observe=(CENTRE,),
+        output=refweb.Output(interval=interval),
+        solve=refweb.Dynamic(duration=duration, **{"method": "auto", **solve}),
+    )
+
+
+def window(mesh, rows, columns, side):
+    """A window of a web."""
+    return refweb.Window(mesh=mesh, rows=rows, columns=columns, side=side)
+
+
+GRAVITY = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
+
+
+def scenes():
+    """Pairs of a scene and what is to be seen in its diagram."""
+    yield (
+        scene("Plain impact", window("square", 10, 10, 0.1), SOFT, ball(), 0.1),
+        "A slack square web is hit. Lines go taut and slack and the ball touches and leaves, so that no method has its "
+        "order, and waves run through every element: explicit steps are no shorter than they have to be. Central "
+        "differences are cheapest at a few digits. BDF follows the same waves with steps that cost a hundred times "
+        "as much, or damps them until its book of energy is open.",
+    )
+    yield (
+        scene(
+            "Stiff cable",
+            refweb.SingleCable(start=(0, 0, 0), end=(3, 0, 0), elements=30, length=3.2, sag=(0, 1, 0)),
+            STIFF,
+            [GRAVITY],
+            0.5,
+        ),
+        "A steel cable, E = 1e11 Pa, swings down from a horizontal arc. Steps are 2e-5 s, its swing a second; "
+        "still explicit methods are the cheapest, as 30 elements cost a compiled step less than 2 µs, and Python's part "
+        "of an implicit step alone is a hundred times that. BDF loses energy that is in stretch, and its digits with it.",
+    )
+    ramp = refweb.Load(node="centre", force=(0.0, 0.0, 100.0), factor=[(0.0, 0.0), (8.0, 1.0)])
+    yield (
+        scene(
+            "Slow motion of a stiff net",
+            window("square", 8, 8, 0.1),
+            {**STIFF, "prestrain": 1e-3},
+            [ramp, refweb.Damping(rate=2.0)],
+            8.0,
+            0.1,
+            start="equilibrium",
+        ),
+        "A taut steel net is loaded over 8 s. Nothing makes waves, and BDF takes steps as long as the motion allows, "
+        "some hundreds where explicit methods take hundreds of thousands. Adams methods and DOP853 are bound by the "
+        "frequencies of the net as explicit steps are, and cost more than those.",
+    )
+    yield (
+        scene(
+            "Slack cable after a hit",
+            refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=40, length=1.1),
+            SOFT,
+            thrown((0.3, 0.0, 5.0), 0.1),
+            0.3,
+        ),
+        "A slack cable snaps taut and whips: two runs that differ by rounding are soon apart by millimetres, and no "
+        "method has more than two or three digits. Energy that a coarse step brings in shows in the book, and ends "
+        "central differences above a quarter of their bound; BDF loses as much and fails likewise.",
+    )
+    yield (
+        scene(
+            "Damped settling to rest",
+            window("square", 6, 6, 0.1),
+            TAUT,
+            [GRAVITY, refweb.Damping(time=2e-3, rate=30.0)],
+            1.0,
+            0.01,
+        ),
+        "A taut web settles under its weight. Damping of the material ends every wave in milliseconds, and makes explicit "
+        "steps 20 times shorter, because it is stiff itself. Both families of CVODE step over it: Adams methods, which "
+        "solve with the tangent here, cost least at three digits and more.",
+    )
+    yield (
+        scene("Ball on a hexagon web", window("hexagon", 11, 9, 0.06), SOFT, ball(), 0.1),
+        "As the plain impact, on a web whose nodes are mechanisms until its lines are taut. Halving steps gains digits "
+        "unsteadily, a matter of when lines snap. Explicit methods are close to each other, central differences cheapest "
+        "at a few digits.",
+    )
+    yield (
+        scene(
+            "Massless nodes",
+            window("square", 4, 4, 0.2),
+            {**SOFT, "density": 0.0, "prestrain": 1e-2},
+            thrown((0.0, 0.0, 1.0), 1.0),
+            0.2,
+        ),
+        "A mass swings on lines that have none. All methods that divide by mass refuse it; IDA is alone, and how far its "
+        "own tolerances agree is all that is known.",
+    )
+
+
+def quick_scenes():
+    """Two small ones."""
+    damped = [GRAVITY, refweb.Damping(time=2e-3, rate=30.0)]
+    yield (
+        scene("Thrown window", window("square", 4, 4, 0.2), TAUT, thrown((0.5, 0.2, 2.0)), 0.05),
+        "A taut web without contact: explicit steps of every order beat all others.",
+    )
+    yield scene("Damped window", window("square", 4, 4, 0.1), TAUT, damped, 0.3, 0.01), "Implicit steps win."
+
+
+def price(found, method, limit, key="error_observable"):
+    """CPU time for which a method has an error of ``limit``, interpolated; infinite where it never has.
+
+    None of its finer runs is allowed to be worse. Above its coarsest run a method costs what that costs.
+    """
+    ladder = [t for t in found.trials if t.method == method and t.status == "solved"]
+    good = next((i for i, t in enumerate(ladder) if all(getattr(f, key) <= limit for f in ladder[i:])), None)
+    if good is None:
+        return math.inf
+    here, before = ladder[good], ladder[good - 1] if good else None
+    if before is None or before.cpu_s >= here.cpu_s:
+        return here.cpu_s
+    worse, better = math.log(getattr(before, key)), math.log(max(getattr(here, key), 1e-300))
+    share = (worse - math.log(limit)) / (worse - better)
+    return math.exp((1.0 - share) * math.log(before.cpu_s) + share * math.log(here.cpu_s))
+
+
+def name_of(solve):
+    """How the ladders call the method of a `refweb.Dynamic`."""
+    return {"explicit": f"explicit-{solve.order}", "cvode": f"cvode-{solve.family}"}.get(solve.method, solve.method)
+
+
+def judged(found):
+    """What "auto" names, its price over the best, at how many digits, the best and the reason."""
+    solve, reason = decided(found.scene, found.scene.build())
+    methods = dict.fromkeys(t.method for t in found.trials)
+    digits = next((d for d in (3, 2, 1) if found.price(d) is not None), None)
+    if digits is None:
+        return name_of(solve), math.nan, 0, "none", reason
+    prices = {method: price(found, method, found.scale * 10.0**-digits) for method in methods}
+    best = min(prices, key=prices.get)
+    return name_of(solve), prices[name_of(solve)] / prices[best], digits, best, reason
+
+
+def against_dop853(quick):
+    """CPU time of DOP853 over that of explicit steps at equal errors, of the better of order 4 and 6."""
+    web = window("square", 6, 6, 0.1) if quick else refweb.Paper(mesh="square", cable_length=201.4)
+    cable = dict(law="smooth", smoothing=1e-4, modulus=7e7, area=1e-4, density=200.0)
+    found = cost(scene("Thrown mass", web, cable, thrown((0.0, 0.0, 1.0), 1.0), 0.05), budget=8.0 if quick else 100.0)
+    ratios = []
+    for error in ERRORS:
+        own = min(price(found, method, error, "error_state") for method in ("explicit-4", "explicit-6"))
+        ratios.append(price(found, "dop853", error, "error_state") / own)
+    return found, np.array(ratios)
+
+
+def drawn(found):
+    """The diagram of a cost, drawn for the report."""
+    return Figure(f"{found.scene.title}. {found.sentence}", found.draw)
+
+
+def case(quick):
+    """All diagrams, and whether "auto" is near the best."""
+    verdicts, figures, rows = [], [], []
+    for given, words in quick_scenes() if quick else scenes():
+        found = cost(given, budget=10.0 if quick else SECONDS)
+        method, ratio, digits, best, reason = judged(found)
+        verdicts.append(
+            Verdict(
+                f'{given.title}: "auto" is within {NEAR:g} × of the best',
+                "holds",
+                f"{method} costs {ratio:.2f} × {best} at {digits} digits; {reason}",
+                checked=ratio <= NEAR,
+            )
+        )
+        figures.append(Figure(f"{given.title}. {words} {found.sentence}", found.draw))
+        rows.append([given.title, found.sentence, method, f"{ratio:.2f}", reason])
+    found, ratios = against_dop853(quick)
+    figures.append(drawn(found))
+    known = np.isfinite(ratios)
+    told = ", ".join(f"{r:.1f} at {e:.0e} m" for e, r in zip(ERRORS[known], ratios[known], strict=True))
+    verdicts.append(
+        Verdict(
+            "explicit steps cost less than DOP853 by 1.5 × at equal errors from 1e-6 to 1e-11 m",
+            "holds",
+            f"DOP853 takes as many times their CPU time: {told}",
+            checked=bool(known.any() and (ratios[known] >= 1.5).all()),
+        )
+    )
+    return Case(
+        verdicts=verdicts,
+        figures=figures,
+        tables=[Table("Prices", ["scene", "digits and their price", '"auto"', "over the best", "reason"], rows)],
+    )
