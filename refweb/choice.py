@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from .inputs import InputError
+from .settings import Dynamic
 
 USUAL = 3
 """Digits that are aimed at where a scene does not say."""
@@ -22,8 +23,6 @@ MANY = 5
 """Digits from which order 6 is cheaper than order 2."""
 PER_STEP, PER_ELEMENT = 1e-6, 12e-9
 """CPU time of a compiled explicit step [s], and of each element in it [s]."""
-VISCOUS = 8.0
-"""How much longer a step takes where forces depend on velocity, which the second kick is iterated for."""
 QUICK = 0.5
 """CPU time of an explicit run [s] below which nothing is to be gained."""
 DAMPED = 5.0
@@ -45,13 +44,9 @@ def decided(scene, system):
         return _of(scene, "cvode", rtol=tolerance, family=family), f"{what} is not for explicit steps"
     bound = _bound(system)
     steps = scene.solve.duration / (0.5 * bound)
-    seconds = steps * (PER_STEP + PER_ELEMENT * len(net.cells))
-    if any(family.damping is not None for family in system.families):
-        seconds *= VISCOUS
+    seconds = steps * step_price(system)
     price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
-    undamped = copy.copy(system)
-    undamped.families = [replace(f, damping_bound=None) for f in system.families]
-    damped = _bound(undamped) / bound
+    damped = _damped(system, bound)
     if seconds > QUICK and damped > DAMPED:
         why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
         return _of(scene, "cvode", rtol=tolerance, family="adams"), why
@@ -69,8 +64,27 @@ def decided(scene, system):
     return _of(scene, "central-difference"), price
 
 
+def step_price(system):
+    """Estimate of the CPU time of an explicit step of one evaluation of forces [s].
+
+    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
+    """
+    price = PER_STEP + PER_ELEMENT * len(system.net.cells)
+    if any(family.damping is not None for family in system.families):
+        price *= 1.0 + min(_damped(system, _bound(system)), 7.0)
+    return price
+
+
+def _damped(system, bound):
+    """By what factor damping makes the bound of stability smaller."""
+    undamped = copy.copy(system)
+    undamped.families = [replace(f, damping_bound=None) for f in system.families]
+    return _bound(undamped) / bound
+
+
 def _of(scene, method, **keys):
-    return replace(scene.solve, method=method, **keys)
+    solve = scene.solve
+    return Dynamic(method=method, duration=solve.duration, mass=solve.mass, start=solve.start, **keys)
 
 
 def _bound(system):

@@ -349,6 +349,10 @@ class Folder:
             *_, last = lines
         return [float(value) for value in last.split(",")]
 
+    def rows(self):
+        """All rows of the history, shape (rows, columns)."""
+        return np.loadtxt(self.path / self._table, delimiter=",", skiprows=1, ndmin=2)
+
     def close(self):
         """Close the history."""
         self._history.close()

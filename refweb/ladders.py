@@ -162,6 +162,16 @@ class Dynamics:
         with contextlib.suppress(SolverError):  # energies of a first moment may be too small for their book
             solver.rows(solver.start(*self.begin), [1e-9 * self.times[-1]])
 
+    def expected(self, trial):
+        """Estimate of the CPU time of an explicit trial before any has run [s]; 0 where steps are not known."""
+        if trial.key != "safety":
+            return 0.0
+        from .choice import step_price
+
+        solver = self._solver(trial)
+        steps = self.times[-1] / (trial.value * solver.stretch * solver.bound())
+        return steps * len(solver.drifts) * step_price(self.system)
+
     def _refuse(self, method):
         """Refuse for DOP853 what has no mass, or lengths that are held."""
         from .implicit import refuse_massless
@@ -251,6 +261,10 @@ class Statics:
 
     def __init__(self, scene, system, observable):
         self.scene, self.system, self.observable = scene, system, observable
+
+    def expected(self, trial):
+        """Nothing is known before a run."""
+        return 0.0
 
     def compile(self, trial):
         """Solve the first load step, with the kernels of the method."""

@@ -250,7 +250,7 @@ def _climb(ladders, runner, deadline, budget, tell):
                 trial.message = before[-1].message
                 continue
             tell(f"{trial.method}, {trial.setting}", 1.0 - (deadline - now) / budget)
-            if _expected(trial, before) > SHARE * (deadline - now):
+            if (_expected(trial, before) or runner.expected(trial)) > SHARE * (deadline - now):
                 trial.message = "would take more than its share of the budget"
                 continue
             _try(trial, runner, now + SHARE * (deadline - now))

@@ -452,7 +452,10 @@ def test_errors_are_the_difference_to_a_finer_run():
     solution, by_hand = refweb.run(scene(error="twin", step_size=1e-4)), refweb.run(scene(step_size=1e-3 / 15))
     assert (solution.solver["nsteps"], by_hand.solver["nsteps"]) == (200, 300)
     for name, result in solution.results.items():
-        difference = abs(result.value - by_hand.results[name].value)
+        times = solution.history["time"]
+        near = (times >= 0.5 * result.time) & (times <= result.time)
+        apart = (solution.history[name] - by_hand.history[name])[near]
+        difference = max(abs(result.value - by_hand.results[name].value), np.sqrt((apart**2).mean()))
         # With errors a h² and a (2h/3)² the first is their difference over 1 − 4/9.
         np.testing.assert_allclose(result.error, SPREAD * difference / (1.0 - 4.0 / 9.0), rtol=1e-9)
 
@@ -464,8 +467,9 @@ def test_errors_cover_the_truth_on_a_smooth_motion():
     taut = dict(effects=effects, observe=observe, cable=cable(prestrain=0.05))
     value, error = refweb.run(scene(error="twin", **taut)).results["z"][:2]
     true = refweb.run(scene(safety=0.05, **taut)).results["z"].value
-    # The run that stands for the limit errs itself by 1 %, and the next order of the error is (ωh)² ≤ 1/4 at most.
-    assert 0.75 < error / SPREAD / abs(value - true) < 1.3
+    # The run that stands for the limit errs itself by 1 %, and the next order of the error is (ωh)² ≤ 1/4 at most; where
+    # the difference is small at the end, its mean before counts, which in a vibration is at most some four times that.
+    assert 0.75 < error / SPREAD / abs(value - true) < 4.0
 
 
 @pytest.mark.parametrize("interval", [2e-4, 5e-4, 1.2e-3, 2.1e-3, 1e-2])

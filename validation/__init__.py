@@ -77,6 +77,7 @@ CASES = {
         "frequencies",
         "free_net",
     ),
+    "Methods": ("work_precision",),
 }
 """Parts of the report and the names of their cases, in the order of the report."""
 VERDICTS = ("holds", "does not hold", "holds only when", "cannot be decided")

@@ -11,8 +11,9 @@ A method costs what the coarsest run costs from which on it keeps the digits, in
 that run and the one before. ``method = "auto"`` names a method before anything has run; it has to be one that costs at
 most 1.5 times the best at three digits, or at as many as the references allow.
 
-Last, explicit steps of order 4 and 6 against DOP853 on the square web of the paper whose centre is thrown: the ratio of
-CPU times at equal errors of displacement, with the smooth law, whose forces have the derivatives that high orders need.
+Last, refweb's explicit steps of order 2, 4 and 6 against DOP853 on the square web of the paper whose centre is thrown:
+the ratio of CPU times at equal errors of displacement, with the smooth law, whose forces have the derivatives that high
+orders need.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ NEAR = 1.5
 """Largest price of the method that "auto" names over the best."""
 SECONDS = 55.0
 """Budget of a scene [s]."""
+EXPLICIT = ("central-difference", "explicit-4", "explicit-6")
+"""refweb's own explicit methods, in the ladders' words."""
 ERRORS = 10.0 ** -np.arange(6.0, 11.1)
 """Errors of displacement at which explicit steps and DOP853 are compared [m]."""
 
@@ -77,79 +80,56 @@ def scenes():
     """Pairs of a scene and what is to be seen in its diagram."""
     yield (
         scene("Plain impact", window("square", 10, 10, 0.1), SOFT, ball(), 0.1),
-        "A slack square web is hit. Lines go taut and slack and the ball touches and leaves, so that no method has its "
-        "order, and waves run through every element: explicit steps are no shorter than they have to be. Central "
-        "differences are cheapest at a few digits. BDF follows the same waves with steps that cost a hundred times "
-        "as much, or damps them until its book of energy is open.",
+        "A slack square web is hit. Lines go taut and slack, and the ball touches and leaves, so that no method "
+        "has its order; waves run through every element, so that no method can step over them. Central differences"
+        " are cheapest up to four digits. BDF follows the same waves with steps that cost a hundred times as much,"
+        " and its coarsest runs damp them until their book of energy is open.",
     )
+    cable = refweb.SingleCable(start=(0, 0, 0), end=(3, 0, 0), elements=30, length=3.2, sag=(0, 1, 0))
     yield (
-        scene(
-            "Stiff cable",
-            refweb.SingleCable(start=(0, 0, 0), end=(3, 0, 0), elements=30, length=3.2, sag=(0, 1, 0)),
-            STIFF,
-            [GRAVITY],
-            0.5,
-        ),
-        "A steel cable, E = 1e11 Pa, swings down from a horizontal arc. Steps are 2e-5 s, its swing a second; "
-        "still explicit methods are the cheapest, as 30 elements cost a compiled step less than 2 µs, and Python's part "
-        "of an implicit step alone is a hundred times that. BDF loses energy that is in stretch, and its digits with it.",
+        scene("Stiff cable", cable, STIFF, [GRAVITY], 0.5),
+        "A steel cable, E = 1e11 Pa, swings down from a horizontal arc. A swing is a hundred thousand explicit "
+        "steps; still explicit methods win, as 30 elements cost a compiled step less than 1 µs and an implicit "
+        "one, in Python for the most part, some 200 µs. BDF has two digits at best: what it damps is in the swing.",
     )
     ramp = refweb.Load(node="centre", force=(0.0, 0.0, 100.0), factor=[(0.0, 0.0), (8.0, 1.0)])
+    steel = {**STIFF, "prestrain": 1e-3}
+    effects = [ramp, refweb.Damping(rate=2.0)]
     yield (
-        scene(
-            "Slow motion of a stiff net",
-            window("square", 8, 8, 0.1),
-            {**STIFF, "prestrain": 1e-3},
-            [ramp, refweb.Damping(rate=2.0)],
-            8.0,
-            0.1,
-            start="equilibrium",
-        ),
-        "A taut steel net is loaded over 8 s. Nothing makes waves, and BDF takes steps as long as the motion allows, "
-        "some hundreds where explicit methods take hundreds of thousands. Adams methods and DOP853 are bound by the "
-        "frequencies of the net as explicit steps are, and cost more than those.",
+        scene("Slow motion of a stiff net", window("square", 8, 8, 0.1), steel, effects, 8.0, 0.1, start="equilibrium"),
+        "A taut steel net is loaded over 8 s. Nothing makes waves, and BDF takes steps as long as the motion "
+        "allows, some hundreds where explicit methods take hundreds of thousands: implicit steps win clearly. "
+        "Adams methods and DOP853 are bound by the frequencies of the net as explicit steps are, and cost more "
+        "than those. For more digits than four BDF has to follow what little does vibrate, and central differences"
+        " are cheaper again.",
     )
+    cable = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=40, length=1.1)
     yield (
-        scene(
-            "Slack cable after a hit",
-            refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=40, length=1.1),
-            SOFT,
-            thrown((0.3, 0.0, 5.0), 0.1),
-            0.3,
-        ),
-        "A slack cable snaps taut and whips: two runs that differ by rounding are soon apart by millimetres, and no "
-        "method has more than two or three digits. Energy that a coarse step brings in shows in the book, and ends "
-        "central differences above a quarter of their bound; BDF loses as much and fails likewise.",
+        scene("Slack cable after a hit", cable, SOFT, thrown((0.3, 0.0, 5.0), 0.1), 0.3),
+        "A slack cable snaps taut and whips: at the end two runs that differ by little are centimetres apart, "
+        "whatever the method, and before that the centre has two digits. The energy that too long a step brings in"
+        " shows in the book and ends central differences above a quarter of their bound; BDF damps so much that it"
+        " ends likewise.",
     )
+    effects = [GRAVITY, refweb.Damping(time=2e-3, rate=30.0)]
     yield (
-        scene(
-            "Damped settling to rest",
-            window("square", 6, 6, 0.1),
-            TAUT,
-            [GRAVITY, refweb.Damping(time=2e-3, rate=30.0)],
-            1.0,
-            0.01,
-        ),
-        "A taut web settles under its weight. Damping of the material ends every wave in milliseconds, and makes explicit "
-        "steps 20 times shorter, because it is stiff itself. Both families of CVODE step over it: Adams methods, which "
-        "solve with the tangent here, cost least at three digits and more.",
+        scene("Damped settling to rest", window("square", 6, 6, 0.1), TAUT, effects, 1.0, 0.01),
+        "A taut web settles under its weight. Damping of its material ends every axial wave in milliseconds and, "
+        "stiff itself, makes explicit steps 24 times shorter: implicit steps win clearly. Adams methods, which "
+        "solve with the tangent here, cost least from two digits on, BDF below. Explicit steps of order 4 and 6 "
+        "refuse forces that depend on velocity.",
     )
     yield (
         scene("Ball on a hexagon web", window("hexagon", 11, 9, 0.06), SOFT, ball(), 0.1),
-        "As the plain impact, on a web whose nodes are mechanisms until its lines are taut. Halving steps gains digits "
-        "unsteadily, a matter of when lines snap. Explicit methods are close to each other, central differences cheapest "
-        "at a few digits.",
+        "As the plain impact, on a web that is a mechanism until its lines are taut. Shorter steps gain digits "
+        "unsteadily, as it depends on moments at which lines snap; at three digits explicit steps of orders 2 and "
+        "4 are level, and what four digits cost nobody knows.",
     )
+    massless = {**SOFT, "density": 0.0, "prestrain": 1e-2}
     yield (
-        scene(
-            "Massless nodes",
-            window("square", 4, 4, 0.2),
-            {**SOFT, "density": 0.0, "prestrain": 1e-2},
-            thrown((0.0, 0.0, 1.0), 1.0),
-            0.2,
-        ),
-        "A mass swings on lines that have none. All methods that divide by mass refuse it; IDA is alone, and how far its "
-        "own tolerances agree is all that is known.",
+        scene("Massless nodes", window("square", 4, 4, 0.2), massless, thrown((0.0, 0.0, 1.0), 1.0), 0.2),
+        "A mass swings on lines that have none. Every method that divides by mass refuses it; IDA is alone, and "
+        "how far its own tolerances agree is all that is known.",
     )
 
 
@@ -198,13 +178,13 @@ def judged(found):
 
 
 def against_dop853(quick):
-    """CPU time of DOP853 over that of explicit steps at equal errors, of the better of order 4 and 6."""
+    """CPU time of DOP853 over that of refweb's explicit methods at equal errors, of the best of order 2, 4 and 6."""
     web = window("square", 6, 6, 0.1) if quick else refweb.Paper(mesh="square", cable_length=201.4)
     cable = dict(law="smooth", smoothing=1e-4, modulus=7e7, area=1e-4, density=200.0)
     found = cost(scene("Thrown mass", web, cable, thrown((0.0, 0.0, 1.0), 1.0), 0.05), budget=8.0 if quick else 100.0)
     ratios = []
     for error in ERRORS:
-        own = min(price(found, method, error, "error_state") for method in ("explicit-4", "explicit-6"))
+        own = min(price(found, method, error, "error_state") for method in EXPLICIT)
         ratios.append(price(found, "dop853", error, "error_state") / own)
     return found, np.array(ratios)
 
@@ -234,14 +214,13 @@ def case(quick):
     figures.append(drawn(found))
     known = np.isfinite(ratios)
     told = ", ".join(f"{r:.1f} at {e:.0e} m" for e, r in zip(ERRORS[known], ratios[known], strict=True))
-    verdicts.append(
-        Verdict(
-            "explicit steps cost less than DOP853 by 1.5 × at equal errors from 1e-6 to 1e-11 m",
-            "holds",
-            f"DOP853 takes as many times their CPU time: {told}",
-            checked=bool(known.any() and (ratios[known] >= 1.5).all()),
-        )
-    )
+    mean = float(np.exp(np.log(ratios[known]).mean()))
+    because = f"{mean:.1f} × in the mean: {told}"
+    claim = "× the CPU time of refweb's explicit methods at equal errors from 1e-6 to 1e-11 m"
+    verdicts.append(Verdict(f"DOP853 takes 1.5 {claim}", "holds", because, checked=mean >= 1.5))
+    if not quick:
+        because += "; most of the time of either are the forces, and DOP853 evaluates them about as often"
+        verdicts.append(Verdict(f"DOP853 takes 3 {claim}", "does not hold", because, checked=mean < 3.0))
     return Case(
         verdicts=verdicts,
         figures=figures,

@@ -1,0 +1,251 @@
+"""Work and precision of every method on a scene, the command ``refweb cost``, and ``method = "auto"``."""
+
+import csv
+import json
+import math
+import time
+
+import numpy as np
+import pytest
+
+import refweb
+from refweb.__main__ import main
+from refweb.choice import decided
+from refweb.ladders import DYNAMIC, KIND
+from refweb.work_precision import COLUMNS
+
+TAUT = dict(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=1e-2)
+THROWN = refweb.Velocity(node="centre", value=(0.5, 0.2, 2.0))
+SLACK = dict(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
+MASSLESS = dict(cable={**SLACK, "density": 0.0, "prestrain": 1e-2}, web=refweb.Window(mesh="square", rows=4, columns=4,
+                side=0.2))  # fmt: skip
+DAMPED = refweb.Damping(time=2e-3, rate=30.0)
+
+
+def scene(effects=(THROWN,), duration=0.01, web=None, interval=None, accuracy=None, solve=None, cable=TAUT, **more):
+    """A small square web under prestress."""
+    return refweb.Scene(
+        title="Small",
+        web=web or refweb.Window(mesh="square", rows=2, columns=2, side=0.2),
+        cable=refweb.Cable(**{**cable, **more}),
+        effects=effects,
+        observe=(
+            refweb.Observe(name="energy", quantity="kinetic_energy"),
+            refweb.Observe(name="centre", quantity="displacement", node="centre"),
+            refweb.Observe(name="tension", quantity="tension"),
+        ),
+        output=refweb.Output(interval=None if solve and solve.kind == "static" else interval or min(duration, 1e-3)),
+        accuracy=accuracy,
+        solve=solve or refweb.Dynamic(duration=duration),
+    )
+
+
+@pytest.fixture(scope="module")
+def found():
+    """All runs of a small scene; BDF, of thousands of steps at fine tolerances, only to 1e-5."""
+    with pytest.MonkeyPatch.context() as patch:
+        for method in ("cvode-bdf", "ida"):
+            patch.setitem(DYNAMIC, method, ("rtol", (1e-3, 1e-4, 1e-5)))
+        return refweb.cost(scene(), budget=60.0)
+
+
+def ladder(found, method):
+    return [t for t in found.trials if t.method == method and t.status == "solved"]
+
+
+def test_what_is_compared(found):
+    """The first observable that a state alone determines, by every method at every setting."""
+    assert found.observable.name == "centre" and found.status == "solved"
+    assert {t.method for t in found.trials} == set(DYNAMIC)
+    assert all(t.status == "solved" for t in found.trials)
+
+
+def test_references_agree(found):
+    """Two kinds of method agree to ten digits on a smooth motion; neither refweb's loop nor scipy can make that up."""
+    one, other = found.references
+    assert found.independent and one.kind != other.kind
+    assert found.trust[0] <= 1e-10 * found.scale and found.trust[1] <= 1e-10 * np.abs(one.x).max()
+
+
+def test_errors_fall_with_the_order(found):
+    """Fitted to the observable: 2, 4 and 6 over the step; ±0.5, as the coarsest steps are at 0.9 of the bound."""
+    for method, order in (("central-difference", 2), ("explicit-4", 4), ("explicit-6", 6)):
+        known = [t for t in ladder(found, method) if t.error_state > 10.0 * found.trust[1]]
+        slope = np.polyfit(np.log([1.0 / t.work["nsteps"] for t in known]), np.log([t.error_state for t in known]), 1)[
+            0
+        ]
+        assert len(known) >= 2 and abs(slope - order) < 0.5, (method, slope)
+    for method in ("cvode-bdf", "cvode-adams", "ida", "dop853"):
+        first, *_, last = ladder(found, method)
+        assert last.error_state < 0.1 * first.error_state, method
+
+
+def test_work_is_counted(found):
+    for t in found.trials:
+        if t.status == "solved":
+            stages = {"central-difference": 1, "explicit-4": 6, "explicit-6": 11}.get(t.method)
+            assert stages is None or t.work["nfev"] == stages * t.work["nsteps"] + 1
+            assert t.work["nfev"] > 0 and t.cpu_s > 0.0
+            assert (t.work["nlu"] > 0) == (t.kind in ("bdf", "cvode-adams"))
+
+
+def test_price(found):
+    """More digits never cost less; digits that the references do not have cost what nobody knows."""
+    prices = [found.price(digits).cpu_s for digits in (1, 3, 6, 9)]
+    assert prices == sorted(prices)
+    assert found.price(17) is None
+    assert found.price(3, "ida").method == "ida"
+    assert "3 digits cost" in found.sentence or "6 digits cost" in found.sentence
+    assert "agree to" in found.sentence
+
+
+def test_folder(found, tmp_path):
+    found.save(tmp_path / "cost")
+    with open(tmp_path / "cost" / "cost.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert (
+        list(rows[0])
+        == COLUMNS
+        == ("method,setting,error_observable,error_state,cpu_s,nfev,njev,nlu,nsteps,status".split(","))
+    )
+    assert len(rows) == len(found.trials)
+    for row, t in zip(rows, found.trials, strict=True):
+        assert row["method"] == t.method and row["status"] == t.status
+        assert t.status != "solved" or float(row["error_state"]) == t.error_state
+    assert (tmp_path / "cost" / "cost.png").read_bytes().startswith(b"\x89PNG")
+    summary = json.loads((tmp_path / "cost" / "run.json").read_text())
+    assert summary["kind"] == "cost" and summary["sentence"] == found.sentence
+    with pytest.raises(refweb.InputError, match="is not empty"):
+        found.save(tmp_path / "cost")
+    (tmp_path / "cost" / "mine.txt").write_text("stays")
+    found.save(tmp_path / "cost", force=True)
+    assert (tmp_path / "cost" / "mine.txt").exists()
+    assert refweb.Scene.load(tmp_path / "cost" / "scene.toml").title == "Small"
+
+
+def test_budget():
+    """A stiff cable in a single row, millions of steps at the finest: what there is no time for is left out."""
+    cable = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=50)
+    given = scene([refweb.Gravity(acceleration=(0, 0, -9.81))], 1.0, web=cable, modulus=1e9, interval=1.0)
+    refweb.cost(scene(duration=1e-3), budget=1.0)  # compiles
+    began = time.perf_counter()
+    found = refweb.cost(given, budget=3.0)
+    assert time.perf_counter() - began < 2.0 * 3.0  # a run ends with the block it is in, of about a tenth of a second
+    left = [t for t in found.trials if t.status == "budget"]
+    assert left and all(math.isnan(t.cpu_s) and "budget" in t.message for t in left)
+
+
+def test_massless_nodes_are_for_ida_alone():
+    """The other methods are listed as refused, with their reasons, and that no other kind confirms it is said."""
+    found = refweb.cost(scene([refweb.PointMass(node="centre", mass=1.0), THROWN], **MASSLESS), budget=8.0)
+    refused = {t.method for t in found.trials if t.status == "refused"}
+    assert refused == set(DYNAMIC) - {"ida"}
+    assert all("has no mass" in t.message for t in found.trials if t.status == "refused")
+    assert not found.independent and "alone takes the scene" in found.sentence
+    assert {t.method for t in found.references} == {"ida"}
+
+
+def test_failures_are_listed():
+    """A run whose book of energy is open has failed, and has no error: BDF of a coarse tolerance loses energy."""
+    web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=10, length=1.05)
+    given = scene([refweb.PointMass(node="centre", mass=0.1), THROWN], 0.3, web, cable=SLACK)
+    found = refweb.cost(given, budget=10.0)
+    failed = [t for t in found.trials if t.status == "failed"]
+    assert failed and all(math.isnan(t.error_state) and "energy" in t.message for t in failed)
+
+
+def test_statics():
+    """Newton and relaxation agree to the residual of relaxation; the smooth law's error falls with η."""
+    load = refweb.Load(node="centre", force=(0.0, 0.0, 1.0))
+    given = scene([load], solve=refweb.Static(load_steps=[1, 2]), cable=SLACK)
+    given = given.replace(observe=given.observe[1:])
+    found = refweb.cost(given, budget=10.0)
+    assert found.independent and {t.method for t in found.references} == {"newton", "relaxation"}
+    assert found.trust[0] < 1e-7 * found.scale
+    smooth = [t.error_observable for t in found.trials if t.method == "newton-smooth"]
+    assert all(a > b for a, b in zip(smooth[:-1], smooth[1:], strict=True)) and smooth[-1] < 1e-2 * smooth[0]
+
+
+def test_kinds():
+    """Splittings converge alike, and so do BDF of CVODE and IDA with the same tolerance: they confirm nothing."""
+    assert KIND["explicit-6"] == KIND["central-difference"] and KIND["ida"] == KIND["cvode-bdf"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (dict(budget=0.0), "budget = 0"),
+        (dict(budget=math.nan), "budget = nan"),
+        (dict(observe="centr"), 'observe = "centr" is no observable of the scene, did you mean "centre"'),
+        (dict(observe="energy"), 'is of quantity "kinetic_energy", must be one of'),
+    ],
+)
+def test_bad_input(options, message):
+    with pytest.raises(refweb.InputError, match=message):
+        refweb.cost(scene(), **options)
+
+
+def test_command_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    import tomli_w
+
+    (tmp_path / "small.toml").write_text(tomli_w.dumps(scene(duration=1e-3).to_dict()))
+    assert main(["cost", "small.toml", "--budget", "3", "--observe", "tension", "--out", "cost"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "what digits cost" in told and "dop853" in told and "diagram in cost/cost.png" in told
+    assert main(["info", "cost"]) == 0
+    assert "what digits cost" in capsys.readouterr().out
+    assert main(["cost", "small.toml", "--budget", "3", "--out", "cost"]) == 2
+    assert "is not empty" in capsys.readouterr().err
+    assert main(["cost", "small.toml", "--budget", "-1"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["cost", "small.toml"]
+
+
+# method = "auto"
+
+
+def chosen(given):
+    solve, reason = decided(given, given.build())
+    assert reason
+    return solve.method, solve.family, solve
+
+
+def test_auto_takes_what_takes_the_scene():
+    """Masslessness, curved elements and a consistent mass leave one method; digits become its tolerance."""
+    assert chosen(scene([refweb.PointMass(node="centre", mass=1.0)], **MASSLESS))[0] == "ida"
+    assert chosen(scene(order=2))[:2] == ("cvode", "bdf")
+    assert chosen(scene(solve=refweb.Dynamic(duration=0.01, mass="consistent")))[0] == "cvode"
+    many = refweb.Accuracy(digits=8)
+    assert chosen(scene(order=2, accuracy=many))[:2] == ("cvode", "adams")
+    assert chosen(scene(order=2, accuracy=many))[2].rtol == pytest.approx(1e-9)
+    link = refweb.Inline(points=[[k, 0, 0] for k in range(4)], lines=[[0, 1], [2, 3]], supports=[0])
+    effects = [refweb.Link(nodes=[1, 2]), refweb.PointMass(node=3, mass=1.0)]
+    linked = scene(effects, web=link, cable=SLACK, solve=refweb.Dynamic(duration=0.01, method="auto"))
+    linked = linked.replace(observe=())
+    assert chosen(linked)[0] == "ida"
+
+
+def test_auto_follows_waves_explicitly_and_steps_over_what_has_none():
+    assert chosen(scene())[0] == "central-difference"
+    assert chosen(scene(duration=100.0))[0] == "central-difference"
+    assert chosen(scene(accuracy=refweb.Accuracy(digits=6)))[0] == "explicit"
+    assert chosen(scene([DAMPED], accuracy=refweb.Accuracy(digits=6)))[0] == "central-difference"
+    assert chosen(scene([DAMPED], 10.0))[:2] == ("cvode", "adams")
+    ramp, still = refweb.Load(node="centre", force=(0, 0, 1.0), factor=[(0, 0), (500, 1)]), "equilibrium"
+    slow = refweb.Dynamic(duration=500.0, start=still)
+    assert chosen(scene([ramp], interval=1.0, solve=slow))[:2] == ("cvode", "bdf")
+    assert chosen(scene([ramp, THROWN], interval=1.0, solve=slow))[0] == "central-difference"
+
+
+def test_auto_runs_and_says_why(tmp_path):
+    """The run is that of the method it names, bit for bit, and run.json has the reason."""
+    given = scene(solve=refweb.Dynamic(duration=0.01, method="auto"))
+    solution = refweb.run(given, out=tmp_path / "run")
+    plain = refweb.run(scene())
+    assert solution.solver["method"] == "central-difference"
+    assert "explicit steps" in solution.solver["choice"] and "choice" not in plain.solver
+    assert solution.results["centre"].value == plain.results["centre"].value
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["solver"]["choice"] == solution.solver["choice"]
+    with pytest.raises(refweb.InputError, match='safety = 0.3 has no meaning with method = "auto"'):
+        refweb.Dynamic(duration=1.0, method="auto", safety=0.3)
