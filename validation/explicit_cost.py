@@ -20,8 +20,9 @@ import time
 
 import numpy as np
 
+from refweb.contact_points import AWAY, PENALTY, RADIUS
 from refweb.dynamics import Motion
-from refweb.lines import AXIAL_STIFFNESS, LENGTH, POINT
+from refweb.lines import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from refweb.scene import Scene
 from refweb.solution import Solution
 
@@ -46,7 +47,7 @@ void run(long blocks, const long *counts, const double *steps, long rows, double
                 f[q] = 0.0;
             }
             for (long c = 0; c < lines; ++c) {
-                const double *d = data + width * c, *r = d + POINT;
+                const double *d = data + width * c, *r = d + REFERENCE;
                 const double *xi = x + 3 * (long)cells[2 * c], *xj = x + 3 * (long)cells[2 * c + 1];
                 double *fi = f + 3 * (long)cells[2 * c], *fj = f + 3 * (long)cells[2 * c + 1];
                 const double u0 = xj[0] - xi[0], u1 = xj[1] - xi[1], u2 = xj[2] - xi[2];
@@ -70,18 +71,18 @@ void run(long blocks, const long *counts, const double *steps, long rows, double
                 double a[3], l[3], start = 0, line = 0;
                 pressed[c] = 0;
                 for (int k = 0; k < 3; ++k) {
-                    a[k] = d[k] + xi[k] - xb[k];
-                    l[k] = d[3 + k] + xj[k] - xb[k] - a[k];
+                    a[k] = d[AWAY + k] + xi[k] - xb[k];
+                    l[k] = d[AWAY + 3 + k] + xj[k] - xb[k] - a[k];
                     start += a[k] * a[k];
                     line += l[k] * l[k];
                 }
-                if (start > 2 * (d[6] * d[6] + line)) continue;
+                if (start > 2 * (d[RADIUS] * d[RADIUS] + line)) continue;
                 double place = line > 0 ? -(a[0] * l[0] + a[1] * l[1] + a[2] * l[2]) / line : 0;
                 place = place < 0 ? 0 : place > 1 ? 1 : place;
                 double p[3], square = 0;
                 for (int k = 0; k < 3; ++k) { p[k] = a[k] + place * l[k]; square += p[k] * p[k]; }
-                if (square < d[6] * d[6] && square > 0) {
-                    const double distance = sqrt(square), push = d[7] * (d[6] - distance);
+                if (square < d[RADIUS] * d[RADIUS] && square > 0) {
+                    const double distance = sqrt(square), push = d[PENALTY] * (d[RADIUS] - distance);
                     pressed[c] = push;
                     for (int k = 0; k < 3; ++k) {
                         const double pull = push * p[k] / distance;
@@ -121,7 +122,8 @@ def compiled(folder):
         return None
     source, library = pathlib.Path(folder) / "loop.c", pathlib.Path(folder) / "loop.so"
     source.write_text(SOURCE)
-    names = {"POINT": POINT, "LENGTH": LENGTH, "AXIAL": AXIAL_STIFFNESS}
+    names = {"REFERENCE": REFERENCE, "LENGTH": LENGTH, "AXIAL": AXIAL_STIFFNESS}
+    names |= {"RADIUS": RADIUS, "PENALTY": PENALTY, "AWAY": AWAY}
     flags = [f"-D{name}={value}" for name, value in names.items()]
     command = [compiler, "-O3", "-march=native", "-shared", "-fPIC", *flags, "-o", library, source, "-lm"]
     subprocess.run(command, check=True)
