@@ -22,6 +22,7 @@ from .inputs import InputError
 from .probes import INTEGERS, PLACE, PROBE
 from .stepping import (
     DRIFT,
+    LOOKS,
     MOST,
     advance,
     book_energies,
@@ -229,7 +230,9 @@ class CentralDifference:
 
     def figures(self, run):
         """What a run has spent, for ``run.json``."""
-        return dict(nfev=len(self.drifts) * run.nsteps + 1, njev=0, nlu=0)
+        follows = len(self._probes[4]) + len(self._watch) > 0  # and evaluates forces where it looks
+        per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
+        return dict(nfev=per_step * run.nsteps + 1, njev=0, nlu=0)
 
     def start(self, x=None, v=None):
         """The `Run` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""

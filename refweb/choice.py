@@ -10,7 +10,7 @@ displacement of the centre, from ``validation/work_precision.py``:
 =========================================  ===================  =========  ===========  ========
 scene                                      central differences  CVODE BDF  CVODE Adams  IDA
 =========================================  ===================  =========  ===========  ========
-ball on a square web of 180 lines          0.04 s               over 1 s   0.8 s        over 1 s
+ball on a square web of 180 lines          0.02 s               over 1 s   0.8 s        over 1 s
 steel cable that swings                    0.01 s               over 1 s   over 1 s     over 1 s
 taut steel net, loaded over 8 s            1.3 s                0.11 s     over 5 s     0.14 s
 web that settles, damped by its material   3.2 s                1.0 s      0.67 s       1.2 s

@@ -118,7 +118,7 @@ def _determined(horizon):
     ended = [(k, time) for k, time in horizon["digits"] if time is not None]
     text = f"a difference of {horizon['perturbation']:.0e} m"
     text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"
-    text += "; " + ", ".join(f"{k - 1} digits after {time:.4g} s" for k, time in ended[-3:]) if ended else ""
+    text += "".join(f"; {k - 1} digit{'s' * (k != 2)} after {time:.4g} s" for k, time in ended[-3:])
     text += "" if horizon["digits"][-1][1] is not None else "; digits are left at the end"
     return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
 

@@ -23,17 +23,21 @@ def diagram(cost, title=True):
     """Draw the two errors of a `refweb.work_precision.Cost`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
 
-    page = Figure(figsize=(9.0, 4.2), dpi=130, layout="constrained")
-    sides = page.subplots(1, 2, sharex=True)
+    page = Figure(figsize=(5.6, 7.8), dpi=130, layout="constrained")  # legible on a phone as well
+    halves = page.subplots(2, 1, sharex=True)
     unit = "" if cost.observable.unit == "1" else f" [{cost.observable.unit}]"
     names = f"error of {cost.observable.name}{unit}", "error of displacement at the end [m]"
-    for plot, name, key, trust in zip(sides, names, ("error_observable", "error_state"), cost.trust, strict=True):
+    for plot, name, key, trust in zip(halves, names, ("error_observable", "error_state"), cost.trust, strict=True):
         _curves(plot, cost, key, trust)
-        plot.set(xlabel="CPU time [s]", ylabel=name)
+        plot.set_ylabel(name)
         plot.grid(color="#dddddd", linewidth=0.6)
         plot.set_axisbelow(True)
         plot.spines[["top", "right"]].set_visible(False)
-    page.legend(*sides[0].get_legend_handles_labels(), loc="outside right center", frameon=False, fontsize=8)
+    for axis in (halves[0].yaxis, halves[1].yaxis, halves[1].xaxis):
+        _ticked(axis)
+    halves[1].set_xlabel("CPU time [s]")
+    told = halves[0].get_legend_handles_labels()
+    page.legend(*told, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
     if title:
         page.suptitle(cost.scene.title, fontsize=11)
     return page
@@ -42,7 +46,6 @@ def diagram(cost, title=True):
 def _curves(plot, cost, key, trust):
     seen = [getattr(t, key) for t in cost.trials if getattr(t, key) > 0.0]
     floor = max(trust, 1e-3 * min(seen, default=1.0))
-    top = 3.0 * max(seen, default=1.0)
     for method, (colour, marker) in STYLES.items():
         ladder = [t for t in cost.trials if t.method == method]
         if not ladder:
@@ -51,12 +54,24 @@ def _curves(plot, cost, key, trust):
         times, errors = [t.cpu_s for t in solved], [max(getattr(t, key), 0.3 * floor) for t in solved]
         plot.plot(times, errors, marker=marker, markersize=4, color=colour, linewidth=1.1, label=_label(method, ladder))
         failed = [t.cpu_s for t in ladder if t.status == "failed" and math.isfinite(t.cpu_s)]
-        plot.plot(failed, [top] * len(failed), "x", color=colour, markersize=7, markeredgewidth=1.8)
+        top = {"transform": plot.get_xaxis_transform(), "markersize": 7, "markeredgewidth": 1.8}  # no error has a place
+        plot.plot(failed, [0.97] * len(failed), "x", color=colour, **top)
     if seen:
         plot.set(xscale="log", yscale="log")
     if trust > 0.0:
-        plot.axhspan(0.1 * floor, trust, color="#bbbbbb", alpha=0.45, linewidth=0, label="references apart: not known")
+        plot.axhspan(1e-9 * floor, trust, color="#bbbbbb", alpha=0.45, linewidth=0, label="references apart: not known")
         plot.set_ylim(bottom=0.2 * floor)
+
+
+def _ticked(axis):
+    """Widen a logarithmic axis until it shows two decades at least, the only ones with a number."""
+    from matplotlib.ticker import NullFormatter
+
+    if axis.get_scale() == "log":
+        low, high = (math.log10(limit) for limit in axis.get_view_interval())
+        if math.floor(high) - math.ceil(low) < 1:
+            axis.axes.set(**{f"{axis.axis_name}lim": (10.0 ** math.floor(low), 10.0 ** math.ceil(high))})
+        axis.set_minor_formatter(NullFormatter())
 
 
 def _label(method, ladder):

@@ -400,7 +400,7 @@ class Motion:
             self._again(accuracy, folder)
             accuracy = self._closed(accuracy, folder, tell)
         for name, share in missing_digits(solution.reduced, scene.accuracy.digits).items():
-            falls = before.get(name, np.inf) > share / STUCK
+            falls = before.get(name, np.inf) > STUCK * share
             why = "it would take more still" if falls else "a higher accuracy changes it as much: it is not determined"
             solution.warnings.append(
                 f"{name} has not the {scene.accuracy.digits} digits asked for: its ± is {share:.3g} times what they "

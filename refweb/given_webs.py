@@ -7,10 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from . import inputs
+from . import inputs, memory
 from .inputs import InputError, Table, choice, node_number, numbers_list, real, rows, shown
 from .webs import Web, in_range
 
+FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".msh": "gmsh"}
+"""Formats of meshes by the end of their name, as meshio calls them."""
 _length = real(above=0, unit="m").metadata["read"]
 
 
@@ -80,7 +82,7 @@ class Inline(Table):
 
 @dataclass(frozen=True, kw_only=True)
 class File(Table):
-    """A web from a file that meshio reads and that has line cells and no others.
+    """A web from a VTK (.vtu, .vtk) or Gmsh (.msh) file that has line cells and no others.
 
     Cell data ``natural_length`` [m] and ``group`` (numbers or texts) and point data ``support`` (not 0: fixed) are
     taken where present; other data is left alone.
@@ -97,7 +99,8 @@ class File(Table):
 
     Notes
     -----
-    meshio does not come to an end on Tecplot and Kratos (mdpa) files that are cut off.
+    meshio reads the file. Of other formats that it knows some refer to files of their own, and it does not come to an
+    end on some that are cut off; it converts them: ``meshio convert net.inp net.vtu``.
     """
 
     kind: str = choice("file", default="file")
@@ -121,11 +124,14 @@ def _read(path):
 
     if not path.is_file():
         raise InputError(f"there is no file {path}")
+    if path.suffix.lower() not in FORMATS:
+        raise InputError(f"format {shown(path.suffix)} must be one of {', '.join(FORMATS)}: use meshio convert")
+    memory.check(memory.READ * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return meshio.read(path)
+            return meshio.read(path, file_format=FORMATS[path.suffix.lower()])
     except (Exception, SystemExit) as error:
         reason = f"{type(error).__name__} {error}" if isinstance(error, Exception) else said.getvalue()
         reason = " ".join(reason.replace("Error: Couldn't read file", "").replace(str(path), "").split())[:200]

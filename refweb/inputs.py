@@ -79,9 +79,12 @@ def _number(name, value, unit=""):
     if not abs(value) < math.inf:
         _refuse(name, value, f"a finite number{unit}")
     try:
-        return float(value)
+        value = float(value)
     except OverflowError:
         _refuse(name, value, f"a finite number{unit}")
+    if abs(value) > LARGEST:
+        _refuse(name, value, f"≤ {LARGEST:g}{' in size' if value < 0 else ''}{unit}")
+    return value
 
 
 def _whole(name, value, what="a whole number"):

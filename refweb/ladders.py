@@ -39,6 +39,10 @@ STATIC = {
 KIND = {"explicit-4": "splitting", "explicit-6": "splitting", "central-difference": "splitting"}
 KIND |= {"cvode-bdf": "bdf", "ida": "bdf"}
 """Methods whose errors may be alike: splittings by kicks and drifts, and BDF. Others are of a kind of their own."""
+UNKNOWN = 12.0
+"""CPU time of the coarsest implicit run over that of the longest explicit steps, until it has run."""
+OUTSIDE, CALL = 4.0, 5e-5
+"""Evaluations of the coarsest run of DOP853 over those of the longest explicit steps, and what each takes more [s]."""
 PIECES = 100
 """Smallest number of pieces of an implicit run, after each of which the clock is looked at."""
 
@@ -123,7 +127,8 @@ class Dynamics:
 
         self.system, self.observable, self.times = system, observable, row_times(scene)
         self.probes = [(*probe_of(observable, system), 0)]
-        self.begin = None, None
+        self._price, self.begin = 0.0, (None, None)
+        self._linear = system.rows - system.net.spins  # the others are angles
         if scene.start_folder is not None:
             from .starts import stored
 
@@ -163,14 +168,20 @@ class Dynamics:
             solver.rows(solver.start(*self.begin), [1e-9 * self.times[-1]])
 
     def expected(self, trial):
-        """Estimate of the CPU time of an explicit trial before any has run [s]; 0 where steps are not known."""
-        if trial.key != "safety":
-            return 0.0
+        """Estimate of the CPU time of a trial before any of its method has run [s].
+
+        That of explicit steps, by the last of them that have run; of implicit ones, whose number nobody knows before, a
+        guess that gives them their turn.
+        """
         from .choice import step_price
 
-        solver = self._solver(trial)
-        steps = self.times[-1] / (trial.value * solver.stretch * solver.bound())
-        return steps * len(solver.drifts) * step_price(self.system)
+        one = step_price(self.system)
+        if trial.key == "safety":
+            solver = self._solver(trial)
+            self._price = self._price or one * self.times[-1] / solver.bound()
+            return self._price * _stages(solver) / trial.value
+        longest = self._price / SAFETIES[0]
+        return OUTSIDE * longest * (1.0 + CALL / one) if trial.method == "dop853" else UNKNOWN * longest
 
     def _refuse(self, method):
         """Refuse for DOP853 what has no mass, or lengths that are held."""
@@ -197,7 +208,9 @@ class Dynamics:
             table.append(history[:, 1])
             _check(deadline)
         trial.cpu_s = time.process_time() - began
-        trial.values, trial.x = np.concatenate(table)[::split], run.x.copy()
+        if trial.key == "safety":
+            self._price = trial.cpu_s * trial.value / _stages(solver)
+        trial.values, trial.x = np.concatenate(table)[::split], run.x[: self._linear].copy()
         trial.work = {**{key: solver.figures(run)[key] for key in ("nfev", "njev", "nlu")}, "nsteps": run.nsteps}
 
     def _outside(self, trial, deadline):
@@ -252,7 +265,7 @@ class Dynamics:
                 spent -= time.process_time()
                 row += 1
             _check(deadline)
-        trial.cpu_s, trial.values, trial.x = spent + time.process_time(), values, trial_x
+        trial.cpu_s, trial.values, trial.x = spent + time.process_time(), values, trial_x[: self._linear]
         trial.work = {"nfev": solver.nfev, "njev": 0, "nlu": 0, "nsteps": steps}
 
 
@@ -298,6 +311,11 @@ class Statics:
             _check(deadline)
         trial.cpu_s = time.process_time() - began
         return [State(system, one.step, one.x) for one in found], [one.stats for one in found]
+
+
+def _stages(solver):
+    """Evaluations of forces of explicit steps in the time in which central differences at the bound take one."""
+    return len(solver.drifts) / solver.stretch
 
 
 def _check(deadline):

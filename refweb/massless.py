@@ -10,7 +10,6 @@ import numpy as np
 
 from .errors import SolverError
 from .factor import weak_pivot
-from .inputs import InputError
 
 WEAK = 1e-12
 """Share of the largest entry on the diagonal that each pivot of K_mm has to exceed."""
@@ -74,7 +73,7 @@ class Massless:
 
         Raises
         ------
-        InputError
+        SolverError
             Where a node has no position.
         """
         v.ravel()[self._at] = 0.0
@@ -92,7 +91,7 @@ class Massless:
         for _ in range(50):
             K = self.system.stiffness(0.0, x, v)
             if (node := self.adrift(K)) is not None:
-                raise InputError(f"{node} has no position at t = 0: it has no mass, and no tension holds it; {REMEDY}")
+                raise SolverError(f"{node} has no position at t = 0: it has no mass, and no tension holds it; {REMEDY}")
             step, y = self._solve(K, force), x.copy()
             for _ in range(30):
                 y.ravel()[at] = x.ravel()[at] + step

@@ -265,6 +265,7 @@ class Scene:
             except OSError as error:
                 path = shown(getattr(web, "path", ""))
                 raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
+        self._check_memory(len(web.lines))
         static, consistent = self.solve.kind == "static", self.solve.mass == "consistent"
         net = _in("", lines.build, web, self.cable, quasi_static=static, consistent=consistent)
         supported = np.zeros((len(net.points), 3), dtype=bool)
@@ -299,6 +300,18 @@ class Scene:
         for i, event in enumerate(self.event):
             _in(f"[[event]] {i + 1}", self._check_event, event, i, system)
         return system
+
+    def _check_memory(self, lines):
+        from . import memory
+
+        solve, elements = self.solve, lines * self.cable.subdivide
+        steps = len(solve.load_steps) if solve.kind == "static" else 0
+        bodies = sum(table_of(effect) == "body" for effect in self.effects)
+        explicit = solve.method in ("central-difference", "explicit")
+        size = memory.needed(elements, self.cable.order, explicit, bodies, steps // self.output.frames)
+        more = f", {bodies} bodies" * (bodies > 0) + f" and {steps} load steps" * (steps > 1)
+        name = f"[web] {lines} lines with [cable] subdivide = {self.cable.subdivide}, order = {self.cable.order}"
+        memory.check(size, f"{name}{more}")
 
     def _check_links(self):
         if self.solve.method not in ("ida", "auto"):
@@ -358,11 +371,12 @@ def in_file(file):
 
 def _as_given(key, value):
     """A top-level key as it stands in the file: [table], [[table]] or key = value."""
+    name = short(key) or '""'
     if isinstance(value, dict):
-        return f"[{short(key)}]"
+        return f"[{name}]"
     if isinstance(value, list) and value and isinstance(value[0], dict):
-        return f"[[{short(key)}]]"
-    return f"{short(key)} = {shown(value)}"
+        return f"[[{name}]]"
+    return f"{name} = {shown(value)}"
 
 
 def _resolve(table):

@@ -91,7 +91,9 @@ def _arc(n, distance, length):
     def mismatch(phi):
         return excess - (n - np.sin(n * phi) / np.sin(phi)) if phi > 0 else excess
 
-    phi = brentq(mismatch, 0.0, np.pi / n, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=1000)
+    phi = np.pi / n  # a circle, where the distance is lost beside the length
+    if mismatch(phi) < 0.0:
+        phi = brentq(mismatch, 0.0, phi, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=1000)
     k = np.arange(1, n)
     if phi == 0:
         return k * chord, 0.0 * k

@@ -24,11 +24,15 @@ from .errors import SolverError
 from .factor import Factor
 from .inputs import InputError
 from .laws import LINEAR, TENSION_ONLY
-from .lines import AXIAL_STIFFNESS
+from .lines import AXIAL_STIFFNESS, G0
 
 TOLERANCE = 1e-10
 """Residual at which Newton stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
+PATIENCE = 3000
+"""Largest number of factorizations of the smooth law where the central path has led to nothing."""
+SOFTEST = 1e-2
+"""Load over EA of the first net of those that grow stiffer."""
 
 
 class NotFound(SolverError):
@@ -250,7 +254,8 @@ class Newton:
                 node = np.linalg.norm(np.where(system.supported, 0, force), axis=1).argmax()
                 raise NotFound(
                     f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node "
-                    f"{node}, limit {LIMIT:g}; raise the load in smaller load_steps, or use a larger smoothing",
+                    f"{node}, limit {LIMIT:g}; raise the load in smaller load_steps, use a larger smoothing, or "
+                    'method = "relaxation"',
                     stats,
                 )
             compressed = bool((tension < 0.0).any()) and not (self.follows or self.turns)
@@ -336,6 +341,34 @@ def _by_interior_point(newton, t, x, spent):
     return state
 
 
+def _by_stiffening(newton, t, x, spent):
+    """Equilibrium from those of softer nets, in which no line snaps taut; slack parts turn far under tiny loads."""
+    system, data = newton.system, newton.system.net.line_data
+    own, still = data[:, AXIAL_STIFFNESS].copy(), np.zeros((system.rows, 3))
+    load = np.abs(sum(system.force_of(f, t, still) for f in system.families if not f.internal)).max()
+    softer = SOFTEST * newton.axial / load if load > 0.0 else 1.0
+    try:
+        while softer > 1.0:
+            data[:, AXIAL_STIFFNESS] = own / softer
+            state = Newton(system, newton.progress).solve(t, x)
+            _add(spent, state.stats)
+            x, softer = state.x, softer / 10.0
+    finally:
+        data[:, AXIAL_STIFFNESS] = own
+    return newton.solve(t, x, warm=True)
+
+
+def _by_patience(newton, t, x):
+    """Equilibrium of the smooth law by many small steps; where none is found, the message says how slack lines push."""
+    try:
+        return newton.solve(t, x, most=PATIENCE)
+    except NotFound as error:
+        data = newton.system.net.line_data
+        push = f"{(data[:, AXIAL_STIFFNESS] * data[:, G0]).max():.3g} N"
+        text = f'{error}, or law = "tension-only": slack lines push with up to {push}'
+        raise NotFound(text, error.stats) from None
+
+
 def solve(system, load_steps, progress=None):
     """Equilibria at load steps, one after another, each from the one before.
 
@@ -365,14 +398,20 @@ def solve(system, load_steps, progress=None):
     for k, t in enumerate(load_steps):
         spent = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         path = system.net.law.number != LINEAR and system.dead
+        convex = system.net.law.number == TENSION_ONLY and not newton.turns
         try:
             state = newton.solve(t, x, warm=k > 0, most=25 if path else 400)
         except NotFound as error:
             if not path:
                 raise
             _add(spent, error.stats)
-            state = _by_interior_point(newton, t, x, spent)
-        convex = system.net.law.number == TENSION_ONLY and not newton.turns
+            try:
+                state = _by_interior_point(newton, t, x, spent)
+            except NotFound:
+                if convex:
+                    state = _by_stiffening(newton, t, x, spent)
+                else:  # slack lines that push fold up, one after another
+                    state = _by_patience(newton, t, x)
         if not (convex or newton.follows):
             state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
         _add(state.stats, spent)

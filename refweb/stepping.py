@@ -111,8 +111,9 @@ def advance(
     """``count`` steps of size h from time t; writes x, v, f, peaks, the book of work and the supports' impulse.
 
     A step is a kick, a drift and a kick of h times ``kicks`` and ``drifts``; more of them are a method of higher order,
-    for forces that follow from displacement alone. Such steps are long: between their ends peaks are looked for on the
-    polynomial of degree 5 through position, velocity and acceleration, and between what is seen there on parabolas.
+    for forces that follow from displacement alone. Such steps are long: between their ends peaks, if any are followed,
+    are looked for on the polynomial of degree 5 through position, velocity and acceleration, and between what is seen
+    there on parabolas.
 
     Forces that depend on velocity see that at the end of the step, which the second kick, thereby implicit, is iterated
     for: kick and kick stay adjoint to each other, and the method of order 2. The iteration contracts with ½ h C/m.
@@ -125,8 +126,9 @@ def advance(
     before, reaction, motion = np.empty((driven.size, 7)), np.zeros(3), len(kernels)
     power, half = np.zeros(len(kernels)), np.empty((rows if viscous.size else 0, 3))
     more = drifts.size - 1
-    old, inner = np.empty((3, rows if more else 0, 3)), np.empty((3, rows if more else 0, 3))
-    inner_lines = np.empty_like(lines) if more else lines
+    looks = LOOKS if more and followed.size + watch.shape[0] else 0
+    old, inner = np.empty((3, rows if looks else 0, 3)), np.empty((3, rows if looks else 0, 3))
+    inner_lines = np.empty_like(lines) if looks else lines
     kick, drift, last_kick = kicks[more] * h, drifts[more] * h, kicks[more + 1] * h
     unused = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     flat_half, flat_unused = half.reshape(-1), unused.reshape(-1)
@@ -141,7 +143,7 @@ def advance(
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
         now = t + step * h
-        if more:
+        if looks:
             old[0], old[1], old[2] = x, v, inverse * f
         for n in range(more):
             for k in range(3):
@@ -220,9 +222,9 @@ def advance(
             reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
         for k in range(3):
             impulse[k] += last_kick * reaction[k]
-        for n in range(1, LOOKS if more else 0):
-            here = now - h + h * n / LOOKS
-            interpolate(n / LOOKS, h, old, x, v, inverse, f, inner[0], inner[1])
+        for n in range(1, looks):
+            here = now - h + h * n / looks
+            interpolate(n / looks, h, old, x, v, inverse, f, inner[0], inner[1])
             inner[2] = 0.0
             first(here, inner[0], inner[1], inner[2], first_cells, first_data, inner_lines)
             for i in still:

@@ -2,11 +2,13 @@
 
 Errors are differences to a reference that no method alone can set: of the finest runs of all methods, the two of
 different kinds that agree best are the references; with one of them all others are compared, and their difference is
-how far any error can be trusted. Where one kind of method alone takes the scene, its two finest runs stand in, and that
-is said.
+how far any error can be trusted. Where all finest runs are about as far apart, as they are where motions are chaotic,
+the best agreement may be luck, and the median difference counts. Where there are runs of one kind alone, the two finest
+of one method stand in, and that is said.
 
-The budget is kept by looking at the clock: a run may take a quarter of what is left, is left out where the runs before
-it say that it would take more, and is ended where it does.
+The budget is kept by looking at the clock: what is expected to be the cheapest comes first, and of a method that has
+had its turns later; a run may take a third of what is left, is left out where it is expected to take more, and is ended
+where it does.
 """
 
 from __future__ import annotations
@@ -28,10 +30,14 @@ from .observables import DEFAULT, LINE, NODAL
 from .runner import versions, web_of
 from .scene import Scene, in_file
 
-SHARE = 0.25
+SHARE = 1.0 / 3.0
 """Largest share of what is left of the budget that a run may take."""
+FAIR = 1.5
+"""Factor of an expected price for each rung that the method has behind it."""
 CHEAP, REPEATS = 0.2, 3
 """Runs of less CPU time [s] are repeated; their smallest time counts."""
+LUCK = 10.0
+"""Factor between the median difference of the finest runs and the least one, below which the least may be luck."""
 COLUMNS = "method setting error_observable error_state cpu_s nfev njev nlu nsteps status".split()
 """Columns of ``cost.csv``."""
 DIGITS = (1, 2, 3, 6, 9, 12)
@@ -55,8 +61,11 @@ class Cost:
         The two runs that errors are measured with; empty where there are no two.
     independent : bool
         Whether they are of different kinds.
+    apart : tuple of float
+        How far they are apart: in the observable, and in displacement [m].
     trust : tuple of float
-        How far they are apart: in the observable, and in displacement [m]. An error below that means nothing.
+        What is known of errors: the same, or the median of such differences where that is of the same size. An error
+        below that means nothing.
     scale : float
         Largest value of the observable over time, which digits are relative to.
     """
@@ -67,6 +76,7 @@ class Cost:
     web: dict
     references: tuple = ()
     independent: bool = False
+    apart: tuple = (np.nan, np.nan)
     trust: tuple = (np.nan, np.nan)
     scale: float = np.nan
     status: str = "running"
@@ -113,7 +123,8 @@ class Cost:
             "observable": {"name": self.observable.name, "unit": self.observable.unit, "largest": none(self.scale)},
             "references": [f"{t.method}, {t.setting}" for t in self.references],
             "independent": self.independent,
-            "apart": {"observable": none(self.trust[0]), "state": none(self.trust[1])},
+            "apart": {"observable": none(self.apart[0]), "state": none(self.apart[1])},
+            "trust": {"observable": none(self.trust[0]), "state": none(self.trust[1])},
             "runs": [{**run, "message": t.message} for run, t in zip(runs, self.trials, strict=True)],
             "cost": self.cost,
             "versions": versions(),
@@ -183,6 +194,7 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
         check_folder(out, force)
+        scene.to_dict()  # refuses a web that no file can hold
     scene = scene.replace(event=())
     system = scene.build()
     with in_file(scene.file):
@@ -194,7 +206,7 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
     try:
         _compile(ladders, runner)
-        deadline = max(began[1] + budget, time.perf_counter() + 0.5 * budget)
+        deadline = max(began[1] + 0.9 * budget, time.perf_counter() + 0.5 * budget)  # the rest is for the diagram
         _climb(ladders, runner, deadline, budget, progress or (lambda text, share: None))
         found.status = "solved" if any(t.status == "solved" for t in found.trials) else "failed"
     except KeyboardInterrupt:
@@ -238,29 +250,36 @@ def _compile(ladders, runner):
 
 
 def _climb(ladders, runner, deadline, budget, tell):
-    """Run all ladders at once, rung by rung, while there is time."""
-    for rung in range(max(map(len, ladders.values()))):
-        for ladder in ladders.values():
-            if rung >= len(ladder):
-                continue
-            now, trial, before = time.perf_counter(), ladder[rung], ladder[:rung]
-            if trial.status == "refused":
-                continue
-            if any(t.status == "budget" for t in before):
-                trial.message = before[-1].message
-                continue
-            tell(f"{trial.method}, {trial.setting}", 1.0 - (deadline - now) / budget)
-            if (_expected(trial, before) or runner.expected(trial)) > SHARE * (deadline - now):
-                trial.message = "would take more than its share of the budget"
-                continue
-            _try(trial, runner, now + SHARE * (deadline - now))
+    """Run all ladders at once, always the rung that is expected to be the cheapest, while there is time.
+
+    Expected prices count `FAIR` times for each rung that a method has behind it, so that all kinds have a turn.
+    """
+    ahead = {name: 0 for name, ladder in ladders.items() if ladder and ladder[0].status != "refused"}
+    while ahead:
+        prices = {name: _expected(ladders[name], rung, runner) for name, rung in ahead.items()}
+        name = min(prices, key=lambda name: prices[name] * FAIR ** ahead[name])
+        ladder, now = ladders[name], time.perf_counter()
+        trial, rest = ladder[ahead[name]], ladder[ahead[name] :]
+        share = SHARE * (deadline - now)
+        tell(f"{name}, {trial.setting}", min(1.0 - (deadline - now) / budget, 1.0))
+        if prices[name] > share and (ahead[name] or trial.key == "safety"):
+            trial.message = "would take more than its share of the budget"
+        else:
+            _try(trial, runner, now + share)
+        if trial.status == "budget":
+            for left in rest:
+                left.message = trial.message
+        ahead[name] += 1
+        if trial.status == "budget" or ahead[name] == len(ladder):
+            del ahead[name]
 
 
-def _expected(trial, before):
-    """CPU time that the runs before let expect [s]: growing as with them, or as explicit steps and tolerances do."""
-    spent = [(t.value, t.cpu_s) for t in before if t.status == "solved"]
+def _expected(ladder, rung, runner):
+    """CPU time to expect of a rung [s]: growing as it did before, or as explicit steps and tolerances do."""
+    trial = ladder[rung]
+    spent = [(t.value, t.cpu_s) for t in ladder[:rung] if t.status == "solved"]
     if not spent:
-        return 0.0
+        return runner.expected(trial)
     power = 1.0 if trial.key == "safety" else 0.2
     if len(spent) > 1:
         (first, one), (last, other) = spent[-2:]
@@ -314,7 +333,9 @@ def _compare(found):
         return max(off / size for off, size in zip(_apart(*pair), scale, strict=True))
 
     first, second = found.references = min(pairs, key=relative)
-    found.trust, found.scale = _apart(first, second), float(np.abs(first.values).max())
+    found.apart, found.scale = _apart(first, second), float(np.abs(first.values).max())
+    usual = np.median([_apart(*pair) for pair in pairs], axis=0).tolist()
+    found.trust = tuple(max(u, off) if u < LUCK * off else off for u, off in zip(usual, found.apart, strict=True))
     for trial in solved:
         trial.error_observable, trial.error_state = found.trust if trial is first else _apart(trial, first)
 
@@ -336,11 +357,19 @@ def _sentence(found):
     name = found.observable.name
     yield f"{name}: {'; '.join(told)}." if told else f"No run has a digit of {name} that can be trusted."
     one, other = (f"{t.method} ({t.setting})" for t in found.references)
-    agreed = -math.log10(max(found.trust[0] / found.scale, 1e-16)) if found.scale else 0.0
-    if found.independent:
-        yield f"The references, {one} and {other}, agree to {max(agreed, 0.0):.1f} digits."
+    agreed, known = (
+        max(-math.log10(max(off / found.scale, 1e-16)), 0.0) if found.scale else 0.0
+        for off in (found.apart[0], found.trust[0])
+    )
+    if not found.independent:
+        yield (
+            f"There are runs of one kind of method alone: {one} and {other} are {agreed:.1f} digits apart, which says "
+            "how it converges, and no more."
+        )
+    elif f"{known:.1f}" == f"{agreed:.1f}":
+        yield f"The references, {one} and {other}, agree to {agreed:.1f} digits."
     else:
         yield (
-            f"One kind of method alone takes the scene: {one} and {other} are {max(agreed, 0.0):.1f} digits apart, "
-            "which says how it converges, and no more."
+            f"The references, {one} and {other}, agree to {agreed:.1f} digits, which may be luck: {known:.1f} digits "
+            "are usual between the finest runs of different kinds."
         )

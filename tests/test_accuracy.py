@@ -34,6 +34,7 @@ def arms(load, sag, observe=(), **changes):
 def depth(load, sag):
     """Depth of the node [m], to 30 digits: P = 2 EA (l/L − 1) d/l."""
     with mpmath.workdps(30):
+
         def miss(d):
             length = mpmath.sqrt(SPAN**2 + d * d)
             return 2 * EA * (length / mpmath.mpf(str(NATURAL)) - 1) * d / length - load
@@ -195,9 +196,7 @@ def test_digits_are_reached(keys):
 
 def test_digits_that_cannot_be_had():
     """A displacement that is zero by symmetry has none, and the reason is given; the rest of the results stays."""
-    scene = thrown(3).replace(
-        observe=[refweb.Observe(name="x", quantity="displacement", node="centre", component="x")]
-    )
+    scene = thrown(3).replace(observe=[refweb.Observe(name="x", quantity="displacement", node="centre", component="x")])
     solution = refweb.run(scene)
     assert solution.status == "solved"
     (text,) = (text for text in solution.warnings if "digits" in text)

@@ -16,7 +16,7 @@ import refweb
 
 LAYERS = [
     ["inputs", "errors", "compiled"],
-    ["shapes"],
+    ["shapes", "memory"],
     ["contact_points", "bodies"],
     ["shape_contacts"],
     ["penalty"],

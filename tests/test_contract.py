@@ -104,9 +104,11 @@ def example(name, i):
     return CLASSES[name](**EXAMPLES[name][i])
 
 
-def make(name, i, law):
+def make(name, i, law, tensionless=False):
     """(net, system of one effect); a contact has bodies to touch, with ends of lines and with their middles."""
-    net = skew_net(law, pieces=3 if name == "Bending" else 1)  # no line of it continues another
+    web = replace(nets.skew_web(), natural_length=None) if tensionless else nets.skew_web()
+    pieces = 3 if name == "Bending" else 1  # no line of it continues another
+    net = lines.build(web, replace(nets.skew_cable(law), subdivide=pieces))
     bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name == "Contact" else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
@@ -199,6 +201,74 @@ def check_family(net, system, family, seed):
         turn *= np.linalg.det(turn)
         moved = position @ turn.T + [3.0, -2.0, 1.0] - net.points
         np.testing.assert_allclose(system.force(t, moved, v @ turn.T), force @ turn.T, atol=1e-12 * size)
+
+
+# States in which the generic steps above are too long, or forces too large or too small
+
+
+def flat(points, noise):
+    """A nanometre from where nothing is taut."""
+    return 1e-9 * noise, noise
+
+
+def stretched(points, noise):
+    """Every line at ten times its length, thrown about at 1 km/s."""
+    return 9.0 * (points - points.mean(axis=0)) + 0.05 * noise, 1e3 * noise
+
+
+def crumpled(points, noise):
+    """The whole web in a millimetre, at rest."""
+    return -0.999 * (points - points.mean(axis=0)) + 1e-4 * noise, 0.0 * noise
+
+
+def far(points, noise):
+    """Carried a kilometre away, where contact ends."""
+    return 0.05 * noise + [1e3, 0.0, 0.0], noise
+
+
+def agrees(change, product):
+    """Whether for one step length at least the change of something is that of its derivative, to five digits.
+
+    Too long steps cross kinks and see curvature, of too short ones rounding is left: of a wrong derivative none agrees.
+    """
+    errors = []
+    for h in 10.0 ** -np.arange(14.0):
+        exact = h * product
+        errors.append(np.linalg.norm(change(h) - exact) / (np.linalg.norm(exact) or 1.0))
+    return min(errors) < 1e-5
+
+
+@pytest.mark.parametrize("place", [flat, stretched, crumpled, far])
+@pytest.mark.parametrize("name, i, law", CASES)
+def test_derivatives_in_hard_states(name, i, law, place):
+    net, system = make(name, i, law, tensionless=place is flat)
+    noise = np.random.default_rng(7).standard_normal((2, len(net.points), 3))
+    x, v = np.zeros((2, *net.points.shape))
+    x[: net.nodes], v[: net.nodes] = place(net.points[: net.nodes], noise[0, : net.nodes])
+    d, t = noise[1], 0.7
+    for family in system.families:
+        alone = SimpleNamespace(on=lambda _, family=family: family)
+        one = System(net, [alone], np.zeros(net.points.shape, dtype=bool))
+        d = np.where(one.supported, 0.0, d)
+        force = one.force(t, x, v)
+        assert np.isfinite(force).all()
+        if family.energy is not None:
+
+            def gain(h):
+                return np.sum(one.energy_of(family, t, x + h * d) - one.energy_of(family, t, x - h * d))  # noqa: B023
+
+            assert agrees(gain, -2.0 * np.sum(force * d))
+        for part, dx, dv in ((family.stiffness, d, 0.0 * d), (family.damping, 0.0 * d, d)):
+            if part is None:
+                continue
+            values = one.stiffness(t, x, v) if part is family.stiffness else one.damping(t, x, v)
+            assert np.isfinite(values).all()
+
+            def change(h, dx=dx, dv=dv):
+                there, here = (one.force(t, x + s * dx, v + s * dv) for s in (h, -h))  # noqa: B023
+                return (there - here).ravel()[one.free]  # noqa: B023
+
+            assert agrees(change, -2.0 * (one.pattern.matrix(values) @ d.ravel()[one.free]))
 
 
 @pytest.mark.parametrize("name, i", cases("extend"))

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb import scene as scenes
 from refweb.__main__ import main
 from refweb.choice import decided
-from refweb.ladders import DYNAMIC, KIND
-from refweb.work_precision import COLUMNS
+from refweb.dynamics import Motion
+from refweb.ladders import DYNAMIC, KIND, Trial
+from refweb.work_precision import COLUMNS, Cost, _compare
 
 TAUT = dict(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=1e-2)
 THROWN = refweb.Velocity(node="centre", value=(0.5, 0.2, 2.0))
@@ -141,7 +143,7 @@ def test_massless_nodes_are_for_ida_alone():
     refused = {t.method for t in found.trials if t.status == "refused"}
     assert refused == set(DYNAMIC) - {"ida"}
     assert all("has no mass" in t.message for t in found.trials if t.status == "refused")
-    assert not found.independent and "alone takes the scene" in found.sentence
+    assert not found.independent and "one kind of method alone" in found.sentence
     assert {t.method for t in found.references} == {"ida"}
 
 
@@ -149,7 +151,7 @@ def test_failures_are_listed():
     """A run whose book of energy is open has failed, and has no error: BDF of a coarse tolerance loses energy."""
     web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=10, length=1.05)
     given = scene([refweb.PointMass(node="centre", mass=0.1), THROWN], 0.3, web, cable=SLACK)
-    found = refweb.cost(given, budget=10.0)
+    found = refweb.cost(given, budget=4.0)
     failed = [t for t in found.trials if t.status == "failed"]
     assert failed and all(math.isnan(t.error_state) and "energy" in t.message for t in failed)
 
@@ -164,6 +166,26 @@ def test_statics():
     assert found.trust[0] < 1e-7 * found.scale
     smooth = [t.error_observable for t in found.trials if t.method == "newton-smooth"]
     assert all(a > b for a, b in zip(smooth[:-1], smooth[1:], strict=True)) and smooth[-1] < 1e-2 * smooth[0]
+
+
+def finest(values):
+    """A cost of one run per method, each with one value of the observable and of displacement."""
+    found = Cost(scene(), scene().observables[1], [], {})
+    for method, value in values.items():
+        x = np.full((1, 3), value)
+        found.trials.append(Trial(method, "rtol", 1e-6, "solved", cpu_s=1.0, values=np.array([value]), x=x))
+    _compare(found)
+    return found
+
+
+def test_agreement_by_luck():
+    """Where no pair stands out, the median of the differences counts: 2e-4, 1e-3 and 1.2e-3."""
+    lucky = finest({"cvode-bdf": 1.0, "cvode-adams": 1.0002, "dop853": 1.0012})
+    assert lucky.apart[0] == pytest.approx(2e-4) and lucky.trust[0] == pytest.approx(1e-3)
+    assert "agree to 3.7 digits, which may be luck: 3.0 digits" in lucky.sentence
+    clear = finest({"cvode-bdf": 1.0, "cvode-adams": 1.0 + 1e-9, "dop853": 1.001})
+    assert clear.trust == clear.apart and clear.trust[0] == pytest.approx(1e-9)
+    assert "agree to 9.0 digits." in clear.sentence
 
 
 def test_kinds():
@@ -202,6 +224,19 @@ def test_command_line(tmp_path, monkeypatch, capsys):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["cost", "small.toml"]
 
 
+def test_interruption_keeps_what_was_run(tmp_path):
+    def tell(text, share):
+        assert 0.0 <= share <= 1.0
+        if "explicit-4" in text:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refweb.cost(scene(duration=1e-3), budget=10.0, out=tmp_path / "cost", progress=tell)
+    summary = json.loads((tmp_path / "cost" / "run.json").read_text())
+    assert summary["status"] == "interrupted"
+    assert any(run["status"] == "solved" for run in summary["runs"])
+
+
 # method = "auto"
 
 
@@ -238,7 +273,21 @@ def test_auto_follows_waves_explicitly_and_steps_over_what_has_none():
     assert chosen(scene([ramp, THROWN], interval=1.0, solve=slow))[0] == "central-difference"
 
 
-def test_auto_runs_and_says_why(tmp_path):
+DYNAMIC_SCENES = [path.stem for path in sorted(scenes.SHIPPED.glob("*.toml")) if "duration" in path.read_text()]
+
+
+@pytest.mark.parametrize("name", DYNAMIC_SCENES)
+@pytest.mark.parametrize("digits", [None, 8])
+def test_auto_takes_every_shipped_scene(name, digits):
+    """The solver that is chosen can be built, which it refuses where it does not take the scene."""
+    given = refweb.Scene.load(name)
+    solve = refweb.Dynamic(method="auto", duration=given.solve.duration, start=given.solve.start, mass=given.solve.mass)
+    given = given.replace(solve=solve, accuracy=refweb.Accuracy(digits=digits))
+    motion = Motion(given, given.build(), refweb.Solution(given))
+    assert motion.scene.solve.method in ("central-difference", "explicit", "cvode", "ida")
+
+
+def test_auto_runs_and_says_why(tmp_path, capsys):
     """The run is that of the method it names, bit for bit, and run.json has the reason."""
     given = scene(solve=refweb.Dynamic(duration=0.01, method="auto"))
     solution = refweb.run(given, out=tmp_path / "run")
@@ -247,5 +296,7 @@ def test_auto_runs_and_says_why(tmp_path):
     assert "explicit steps" in solution.solver["choice"] and "choice" not in plain.solver
     assert solution.results["centre"].value == plain.results["centre"].value
     assert json.loads((tmp_path / "run" / "run.json").read_text())["solver"]["choice"] == solution.solver["choice"]
+    assert main(["check", str(tmp_path / "run" / "scene.toml")]) == 0
+    assert "central-difference (" in capsys.readouterr().out
     with pytest.raises(refweb.InputError, match='safety = 0.3 has no meaning with method = "auto"'):
         refweb.Dynamic(duration=1.0, method="auto", safety=0.3)

@@ -687,8 +687,7 @@ def test_a_node_without_mass():
     with pytest.raises(refweb.InputError) as caught:
         Cvode(system)
     assert str(caught.value) == (
-        f"node {bare} has no mass, which cvode needs: give density > 0 or a [[point_mass]], or use "
-        'method = "ida"'
+        f'node {bare} has no mass, which cvode needs: give density > 0 or a [[point_mass]], or use method = "ida"'
     )
     Cvode(small([refweb.PointMass(node="all", mass=1.0)], density=0.0))
 

@@ -467,8 +467,8 @@ def test_errors_cover_the_truth_on_a_smooth_motion():
     taut = dict(effects=effects, observe=observe, cable=cable(prestrain=0.05))
     value, error = refweb.run(scene(error="twin", **taut)).results["z"][:2]
     true = refweb.run(scene(safety=0.05, **taut)).results["z"].value
-    # The run that stands for the limit errs itself by 1 %, and the next order of the error is (ωh)² ≤ 1/4 at most; where
-    # the difference is small at the end, its mean before counts, which in a vibration is at most some four times that.
+    # The run that stands for the limit errs itself by 1 %, and the next order of the error is (ωh)² ≤ 1/4 at most.
+    # Where the difference is small at the end, its mean before counts, in a vibration at most some four times that.
     assert 0.75 < error / SPREAD / abs(value - true) < 4.0
 
 

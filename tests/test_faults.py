@@ -18,6 +18,7 @@ import time
 import meshio
 import numpy as np
 import pytest
+import tomli_w
 
 import refweb
 from refweb import central_difference, implicit
@@ -382,6 +383,16 @@ def test_folder_that_is_spoilt_while_a_run_writes_it(tmp_path, monkeypatch, caps
     assert main(["run", str(tmp_path / "whole" / "scene.toml"), "--out", str(out)]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and "cannot be written any more" in err and "internal" not in err
+
+
+def test_a_run_that_finds_no_start(tmp_path, capsys):
+    """Nodes that nothing holds: the folder is there already, so that the status is 1 and the folder says why."""
+    bare = scene("ida", effects=(), cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=0.0))
+    (tmp_path / "bare.toml").write_text(tomli_w.dumps(bare.to_dict()))
+    assert main(["run", str(tmp_path / "bare.toml"), "--out", str(tmp_path / "out")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "has no position at t = 0" in err
+    assert opens(tmp_path / "out") == 0 and "no position" in summary_of(tmp_path / "out")["message"]
 
 
 # kill -9

@@ -234,6 +234,10 @@ def places(given, way=()):
 @st.composite
 def wrong_scenes(draw):
     """A scene with a few changes, as text."""
+
+    def wrong(values=WRONG):
+        return copy.deepcopy(draw(values))  # a list may be changed in its turn
+
     own = copy.deepcopy(draw(scenes()))
     for _ in range(draw(st.integers(1, 2))):
         *way, last = draw(st.sampled_from(sorted(places(own), key=str)))
@@ -242,15 +246,16 @@ def wrong_scenes(draw):
             table = table[key]
         change = draw(st.sampled_from(["set", "set", "set", "remove", "add", "rename", "repeat"]))
         if change == "set":
-            table[last] = draw(ENDLESS if last in ("duration", "interval") else WRONG)
+            table[last] = wrong(ENDLESS if last in ("duration", "interval") else WRONG)
         elif change == "remove":
             del table[last]
         elif change == "repeat":
             table[last] = [table[last]] * draw(st.integers(0, 3))
         elif isinstance(table, list):
-            table.append(draw(WRONG))
+            table.append(wrong())
         elif change == "add":
-            table[draw(st.sampled_from(["kind", "nodes", "unknown", "", "Ω", "a b", "..", *EFFECTS]))] = draw(WRONG)
+            name = draw(st.sampled_from(["kind", "nodes", "unknown", "", "Ω", "a b", "..", *EFFECTS]))
+            table[name] = wrong()
         else:
             table[f"{last}x"] = table.pop(last)
         if not own:

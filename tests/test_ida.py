@@ -224,7 +224,7 @@ def test_massless_nodes_are_where_forces_balance():
 
 @pytest.mark.parametrize("prestrain", [0.0, -0.01])
 def test_a_node_that_nothing_holds_is_refused(prestrain):
-    with pytest.raises(InputError, match="^node [1357] has no position at t = 0: it has no mass, .* give density"):
+    with pytest.raises(SolverError, match="^node [1357] has no position at t = 0: it has no mass, .* give density"):
         Ida(cross(prestrain=prestrain, effects=thrown(mass=1.0, node=0))).start()
 
 

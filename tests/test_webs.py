@@ -235,6 +235,14 @@ def test_slack_cable_lies_on_an_arc_of_equal_chords(elements, stretch):
     assert web.length_given and web.cells == 0
 
 
+@pytest.mark.parametrize("length", [1e15, 1e17, 1e50])
+def test_cable_beside_which_its_distance_is_lost(length):
+    """A closed polygon."""
+    web = SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=5, length=length).web()
+    chords = np.linalg.norm(np.diff(web.points[1:-1], axis=0), axis=1)
+    np.testing.assert_allclose(chords, length / 5, rtol=1e-14)
+
+
 def test_cable_on_a_half_circle():
     web = SingleCable(start=(-1, 0, 0), end=(1, 0, 0), elements=6, length=12 * np.sin(pi / 12), sag=(0, 2, 0)).web()
     angle = pi * np.arange(7) / 6
@@ -467,7 +475,7 @@ def test_files_that_are_no_web(mesh, tmp_path):
     (tmp_path / "folder.vtu").mkdir()
     assert "there is no file" in refusal(tmp_path, "folder.vtu")
     (tmp_path / "net.unknown").write_text("x")
-    assert "Could not deduce file format" in refusal(tmp_path, "net.unknown")
+    assert 'format ".unknown" must be one of .vtu, .vtk, .msh' in refusal(tmp_path, "net.unknown")
     for cells, message in (
         ([("triangle", [[0, 1, 2]]), ("line", [[2, 3]])], "triangle cells: a web has line cells and no others"),
         ([("vertex", [[0]]), ("line3", [[0, 1, 2]])], "line3, vertex cells: a web has line cells and no others"),

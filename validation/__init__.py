@@ -77,7 +77,8 @@ CASES = {
         "frequencies",
         "free_net",
     ),
-    "Methods": ("work_precision",),
+    "Methods": ("cross_validation", "coverage", "work_precision", "price_of_modelling"),
+    "Hard cases": ("hard_cases",),
 }
 """Parts of the report and the names of their cases, in the order of the report."""
 VERDICTS = ("holds", "does not hold", "holds only when", "cannot be decided")

@@ -2,8 +2,8 @@
 
 Every result of refweb has a ±. Here it is held against the truth: closed forms of statics and of oscillators, and for
 nets short explicit steps of order 6; what those still differ from steps that are twice as long, and from order 4, is
-added to ±. All methods, several accuracies of each; regular motions, and nets
-that go slack and snap taut or are hit, whose peaks are of no order.
+added to ±. All methods, several accuracies of each; regular motions, and nets that go slack and snap taut or are hit,
+whose peaks are of no order.
 
 Over all observables ± has to contain the truth in 95 of 100, and in the median it may not be wider than 30 times what
 is really off. The bounds on tensions that statics proves from convex duality count as contained or not, and are left

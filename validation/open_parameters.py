@@ -78,7 +78,7 @@ OPEN = (
     ),
     (
         "elements per line in impacts",
-        "1, and 2 and 4 beside it",
+        "1, and 2, 4 and 8 beside it",
         'the paper has "the size equal to the mesh"',
         "15 % of a stress peak of 1 kg, up to half of one of 0.1 kg ([impact](#webs_hit))",
     ),

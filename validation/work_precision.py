@@ -5,11 +5,12 @@ explicit steps of order 4 and 6, CVODE with BDF and Adams methods, IDA, and as a
 driven by the same compiled forces. Errors are largest differences over the history rows to a reference; the reference
 and a second one, of another kind of method, are the finest runs, and the grey zone of a diagram is where they differ:
 there nobody knows. CPU time is that of the solver's loop, compiled before, the least of several runs where they are
-cheap. A run that fails, is refused or would take more than a quarter of what is left of the time stands in the legend.
+cheap. A run that fails, is refused or would take more than a third of what is left of the time stands in the legend.
 
 A method costs what the coarsest run costs from which on it keeps the digits, interpolated on logarithmic scales between
 that run and the one before. ``method = "auto"`` names a method before anything has run; it has to be one that costs at
-most 1.5 times the best at three digits, or at as many as the references allow.
+most 1.5 times the best at three digits, or at as many as the references allow: in the mean of that, half a digit and a
+digit less, as the errors of an impact fall by leaps and a single price is luck.
 
 Last, refweb's explicit steps of order 2, 4 and 6 against DOP853 on the square web of the paper whose centre is thrown:
 the ratio of CPU times at equal errors of displacement, with the smooth law, whose forces have the derivatives that high
@@ -82,15 +83,16 @@ def scenes():
         scene("Plain impact", window("square", 10, 10, 0.1), SOFT, ball(), 0.1),
         "A slack square web is hit. Lines go taut and slack, and the ball touches and leaves, so that no method "
         "has its order; waves run through every element, so that no method can step over them. Central differences"
-        " are cheapest up to four digits. BDF follows the same waves with steps that cost a hundred times as much,"
-        " and its coarsest runs damp them until their book of energy is open.",
+        " are cheapest up to three digits, order 6 for more. BDF follows the same waves with steps that cost a "
+        "hundred times as much, and its coarsest runs damp them until their book of energy is open.",
     )
     cable = refweb.SingleCable(start=(0, 0, 0), end=(3, 0, 0), elements=30, length=3.2, sag=(0, 1, 0))
     yield (
         scene("Stiff cable", cable, STIFF, [GRAVITY], 0.5),
-        "A steel cable, E = 1e11 Pa, swings down from a horizontal arc. A swing is a hundred thousand explicit "
-        "steps; still explicit methods win, as 30 elements cost a compiled step less than 1 µs and an implicit "
-        "one, in Python for the most part, some 200 µs. BDF has two digits at best: what it damps is in the swing.",
+        "A steel cable, E = 1e11 Pa, swings down from a horizontal arc. That takes 19000 explicit "
+        "steps at least; still explicit methods win, as 30 elements cost a compiled step less than 1 µs and an "
+        "implicit one, in Python for the most part, some 200 µs. Central differences have six digits with their "
+        "longest step; BDF damps what is in the swing, and has three only from a tolerance of 1e-6 on.",
     )
     ramp = refweb.Load(node="centre", force=(0.0, 0.0, 100.0), factor=[(0.0, 0.0), (8.0, 1.0)])
     steel = {**STIFF, "prestrain": 1e-3}
@@ -122,8 +124,9 @@ def scenes():
     yield (
         scene("Ball on a hexagon web", window("hexagon", 11, 9, 0.06), SOFT, ball(), 0.1),
         "As the plain impact, on a web that is a mechanism until its lines are taut. Shorter steps gain digits "
-        "unsteadily, as it depends on moments at which lines snap; at three digits explicit steps of orders 2 and "
-        "4 are level, and what four digits cost nobody knows.",
+        "unsteadily, as it depends on moments at which lines snap; at three digits explicit steps of orders 2, 4 "
+        "and 6 are level, within what is luck. DOP853, which finds those moments by its control of errors, gains "
+        "digits steadily, and is cheapest for more than four where there is time to know them.",
     )
     massless = {**SOFT, "density": 0.0, "prestrain": 1e-2}
     yield (
@@ -140,7 +143,7 @@ def quick_scenes():
         scene("Thrown window", window("square", 4, 4, 0.2), TAUT, thrown((0.5, 0.2, 2.0)), 0.05),
         "A taut web without contact: explicit steps of every order beat all others.",
     )
-    yield scene("Damped window", window("square", 4, 4, 0.1), TAUT, damped, 0.3, 0.01), "Implicit steps win."
+    yield scene("Damped window", window("square", 4, 4, 0.1), TAUT, damped, 0.2, 0.01), "Implicit steps win."
 
 
 def price(found, method, limit, key="error_observable"):
@@ -166,15 +169,19 @@ def name_of(solve):
 
 
 def judged(found):
-    """What "auto" names, its price over the best, at how many digits, the best and the reason."""
+    """What "auto" names, its price over the best in the mean, and in words, at how many digits and why."""
     solve, reason = decided(found.scene, found.scene.build())
-    methods = dict.fromkeys(t.method for t in found.trials)
+    own, methods = name_of(solve), dict.fromkeys(t.method for t in found.trials)
     digits = next((d for d in (3, 2, 1) if found.price(d) is not None), None)
     if digits is None:
-        return name_of(solve), math.nan, 0, "none", reason
-    prices = {method: price(found, method, found.scale * 10.0**-digits) for method in methods}
-    best = min(prices, key=prices.get)
-    return name_of(solve), prices[name_of(solve)] / prices[best], digits, best, reason
+        return own, math.nan, f"nothing is known of digits; {reason}"
+    ratios = []
+    for known in (digits - 1.0, digits - 0.5, digits):
+        prices = {method: price(found, method, found.scale * 10.0**-known) for method in methods}
+        best = min(prices, key=prices.get)
+        ratios.append(prices[own] / prices[best])
+    mean = float(np.exp(np.log(ratios).mean()))
+    return own, mean, f"{own} costs {mean:.2f} × the best, {ratios[-1]:.2f} × {best} at {digits} digits; {reason}"
 
 
 def against_dop853(quick):
@@ -199,28 +206,23 @@ def case(quick):
     verdicts, figures, rows = [], [], []
     for given, words in quick_scenes() if quick else scenes():
         found = cost(given, budget=10.0 if quick else SECONDS)
-        method, ratio, digits, best, reason = judged(found)
+        method, ratio, because = judged(found)
         verdicts.append(
-            Verdict(
-                f'{given.title}: "auto" is within {NEAR:g} × of the best',
-                "holds",
-                f"{method} costs {ratio:.2f} × {best} at {digits} digits; {reason}",
-                checked=ratio <= NEAR,
-            )
+            Verdict(f'{given.title}: "auto" is within {NEAR:g} × of the best', "holds", because, checked=ratio <= NEAR)
         )
         figures.append(Figure(f"{given.title}. {words} {found.sentence}", found.draw))
-        rows.append([given.title, found.sentence, method, f"{ratio:.2f}", reason])
+        rows.append([given.title, found.sentence, method, f"{ratio:.2f}", because])
     found, ratios = against_dop853(quick)
     figures.append(drawn(found))
     known = np.isfinite(ratios)
     told = ", ".join(f"{r:.1f} at {e:.0e} m" for e, r in zip(ERRORS[known], ratios[known], strict=True))
-    mean = float(np.exp(np.log(ratios[known]).mean()))
+    least, mean = ratios[known].min(), float(np.exp(np.log(ratios[known]).mean()))
     because = f"{mean:.1f} × in the mean: {told}"
-    claim = "× the CPU time of refweb's explicit methods at equal errors from 1e-6 to 1e-11 m"
-    verdicts.append(Verdict(f"DOP853 takes 1.5 {claim}", "holds", because, checked=mean >= 1.5))
+    claim = "× the CPU time of refweb's explicit methods at every error from 1e-6 to 1e-11 m"
+    verdicts.append(Verdict(f"DOP853 takes 1.5 {claim}", "holds", because, checked=least >= 1.5))
     if not quick:
-        because += "; most of the time of either are the forces, and DOP853 evaluates them about as often"
-        verdicts.append(Verdict(f"DOP853 takes 3 {claim}", "does not hold", because, checked=mean < 3.0))
+        because += "; nine tenths of the time of explicit steps are the forces, which are DOP853's as well"
+        verdicts.append(Verdict(f"DOP853 takes 3 {claim}", "does not hold", because, checked=least < 3.0))
     return Case(
         verdicts=verdicts,
         figures=figures,

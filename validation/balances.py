@@ -1,0 +1,94 @@
+"""Balances of forces, energy and momentum of a solution, from its positions and velocities and the law alone."""
+
+import numpy as np
+
+import refweb
+from refweb.lines import AXIAL_STIFFNESS
+
+
+def tensions(solution):
+    """Tensions of the lines by the law alone, their directions, and the energy that the lines store."""
+    net, state = solution.state.system.net, solution.state
+    tail, head = net.cells[:, 0], net.cells[:, 1]
+    reach = net.points[head] - net.points[tail]
+    moved = state.x[head] - state.x[tail]
+    natural = net.natural_length
+    vector = reach + moved
+    length = np.linalg.norm(vector, axis=1)
+    first = np.linalg.norm(reach, axis=1)
+    # (l² − l0²)/(l + l0) keeps the digits of strains that the difference of lengths loses
+    strain = ((2 * reach + moved) * moved).sum(axis=1) / (length + first) / natural + (first - natural) / natural
+    own = solution.scene.cable
+    stiffness = own.modulus * own.area
+    if own.law == "tension-only" or own.smoothing == 0.0:
+        taut = np.maximum(strain - (own.slackness or 0.0), 0.0)
+        force, stored = stiffness * taut, 0.5 * stiffness * taut**2
+    else:
+        eta, slackness = own.smoothing, own.slackness
+
+        def ramp(s):
+            root = np.sqrt(s * s + 4 * eta * eta)
+            return np.where(s >= 0, 0.5 * (s + root), 2 * eta * eta / (root - np.minimum(s, 0.0)))
+
+        def integral(s):
+            return 0.25 * s * (s + np.sqrt(s * s + 4 * eta * eta)) + eta * eta * np.arcsinh(0.5 * s / eta)
+
+        force = stiffness * (ramp(strain - slackness) - ramp(-slackness))
+        stored = stiffness * (integral(strain - slackness) - integral(-slackness) - ramp(-slackness) * strain)
+    return force, vector / np.where(length > 0, length, 1.0)[:, None], (stored * natural).sum()
+
+
+def unbalanced(solution):
+    """Largest force at a free node, over the largest of loads and tensions."""
+    state, (force, direction, _) = solution.state, tensions(solution)
+    system, net = state.system, state.system.net
+    pulls = np.zeros((system.rows, 3))
+    np.add.at(pulls, net.cells[:, 0], force[:, None] * direction)
+    np.add.at(pulls, net.cells[:, 1], -force[:, None] * direction)
+    outer = np.zeros_like(pulls)
+    for effect in solution.scene.effects:
+        if isinstance(effect, refweb.Load):
+            outer[net.find(effect.node)] += state.time * np.array(effect.force)
+        if isinstance(effect, refweb.Gravity):
+            outer += net.mass[:, None] * np.array(effect.acceleration)
+    rest = np.where(system.supported, 0.0, pulls + outer)
+    # displacements are rounded to 2e-16 of themselves, so is the distance that a natural length of its own is taken
+    # from, and lines of EA/L = k make a force of that
+    first = np.linalg.norm(net.points[net.cells[:, 1]] - net.points[net.cells[:, 0]], axis=1)
+    given = np.where(first == net.natural_length, 0.0, first)
+    stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    rounding = 1e7 * np.finfo(float).eps * (stiffness * (np.abs(state.x).max() + given)).max()
+    scale = max(np.linalg.norm(outer, axis=1).max(), np.abs(force).max(), rounding)
+    return np.linalg.norm(rest, axis=1).max() / scale if scale > 0 else 0.0
+
+
+def energy_left(solution):
+    """Energy of the last state less that of the first and the work, over the largest there was."""
+    state, history = solution.state, solution.history
+    kinetic = 0.5 * (state.system.net.mass[:, None] * state.v**2).sum()
+    stored = tensions(solution)[2]
+    others = sum(history.get(name, [0.0])[-1] for name in ("contact_energy", "dissipated_energy"))
+    work = history["work"][-1] if "work" in history else 0.0
+    start = history["total_energy"][0]
+    largest = max(np.abs(history[name]).max() for name in history if name.endswith("energy"))
+    left = kinetic + stored + others - start - work
+    return abs(left) / largest if largest > 0 else abs(left)
+
+
+def momentum_left(solution):
+    """Momentum of all that is free less what it was and what was given to it, over the largest."""
+    history, state, worst = solution.history, solution.state, 0.0
+    system, end = state.system, state.time
+    linear = slice(system.rows - system.net.spins)  # turning bodies have a row of their own for that
+    mass, v = system.net.mass[linear], state.v[linear]
+    given = np.zeros(3)
+    for effect in solution.scene.effects:
+        if isinstance(effect, refweb.Load):
+            given += end * np.array(effect.force)
+    largest = max((mass * np.linalg.norm(v, axis=1)).sum(), np.linalg.norm(given))
+    for k, axis in enumerate("xyz"):
+        now = (mass * np.where(system.supported[linear, k], 0.0, v[:, k])).sum()
+        start, pushed = history[f"momentum_{axis}"][0], history[f"support_impulse_{axis}"]
+        largest = max(largest, np.abs(history[f"momentum_{axis}"]).max(), np.abs(pushed).max())
+        worst = max(worst, abs(now - start - pushed[-1] - given[k]))
+    return worst / largest if largest > 0 else worst
