@@ -21,6 +21,7 @@ from .errors import OpenBook, SolverError
 from .inputs import InputError
 from .probes import INTEGERS, PLACE, PROBE
 from .stepping import (
+    BREATH,
     DRIFT,
     LOOKS,
     MOST,
@@ -129,6 +130,8 @@ class CentralDifference:
     """
 
     method, order, stretch = "central-difference", 2, 1.0
+    breathe = staticmethod(lambda t: None)
+    """What is called with the time some times a second, and may raise."""
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
     def __init__(self, system, probes=(), watch=(), events=(), safety=0.5, step_size=None, finer=1.0):
@@ -295,16 +298,30 @@ class CentralDifference:
         ends = np.atleast_1d(np.asarray(ends, dtype=float))
         history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
         step, start, linear = self.step_size or 0.0, run.time, self.system.rows - self.system.net.spins
-        done = rows_ahead(
-            ends, self.safety * self.stretch, step, self.finer, DRIFT, self.kicks, self.drifts, run.state, run.saved,
-            linear, *self._masses, self._moving, *self._ends, *self._forces, self._seen, *self._energies, self._bounds,
-            self._dampings, *self._drives, self._corners, *self._peaks(run), self._watch, run.events, history,
-        )  # fmt: skip
-        if done < 0:
-            raise SolverError(
-                f"the step at t = {run.time:.6g} s is {run.state[2]:.3g} s, more than {MOST:g} steps to the next row: "
-                "ask for shorter rows, or lower the stiffness that asks for the step"
-            )
+        work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
+        done, part, breath = 0, np.zeros(2, dtype=np.int64), max(BREATH // max(work, 1), 1)
+        carried = self._carried()
+        try:
+            while True:
+                more = rows_ahead(
+                    ends[done:], breath, part, *carried, self.safety * self.stretch, step, self.finer, DRIFT,
+                    self.kicks, self.drifts, run.state, run.saved, linear, *self._masses, self._moving, *self._ends,
+                    *self._forces, self._seen, *self._energies, self._bounds, self._dampings, *self._drives,
+                    self._corners, *self._peaks(run), self._watch, run.events, history[done:],
+                )  # fmt: skip
+                if more < 0:
+                    raise SolverError(
+                        f"the step at t = {run.time:.6g} s is {run.state[2]:.3g} s, more than {MOST:g} steps to the "
+                        "next row: ask for shorter rows, or lower the stiffness that asks for the step"
+                    )
+                done += more
+                if not part[0]:
+                    break
+                self.breathe(run.time + part[0] * run.state[2])
+        except BaseException:
+            if part[0]:  # back to the last row
+                run.saved[:3] = run.saved[3:]
+            raise
         if done and run.stopped and history[done - 1, 0] == run.time:
             return history[:done]
         if done < len(ends):
@@ -314,6 +331,9 @@ class CentralDifference:
             self._name_drift(run, before)
         return history
 
+    def _carried(self):
+        return np.zeros(len(self.system.families)), np.zeros((2, len(self._drives[4])))
+
     def _name_blow_up(self, run, before):
         """Replay the last row step by step and name the first number that is not finite."""
         system, h = self.system, run.state[2]
@@ -322,8 +342,8 @@ class CentralDifference:
         count, total = round((run.time - before) / h), np.zeros(len(system.families) + 3)
         for step in range(1, count + 1):
             advance(
-                1, h, before + (step - 1) * h, self.kicks, self.drifts, x, v, f, *self._masses, *self._ends,
-                *self._forces, self._seen, *self._drives, *self._peaks(run), *self._energies, self._watch, total,
+                1, 0, *self._carried(), h, before + (step - 1) * h, self.kicks, self.drifts, x, v, f, *self._masses,
+                *self._ends, *self._forces, self._seen, *self._drives, *self._peaks(run), *self._energies, self._watch, total,
                 self._events[:0],
             )  # fmt: skip
             wrong = ~np.isfinite(x + v + f).all(axis=1)

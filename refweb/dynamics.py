@@ -171,6 +171,7 @@ class _Twin:
         self._thread, self._ended, self._failure = None, None, None
         if self._beside:  # the solver is made here: a system is used by one thread at a time
             solver = self._motion.solver(self._accuracy, twin=True)
+            solver.breathe = self._breathe
             self._thread = threading.Thread(target=self._run, args=(solver,), daemon=True)
             self._thread.start()
         return self
@@ -179,6 +180,10 @@ class _Twin:
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
+
+    def _breathe(self, t):
+        if self._stop.is_set():
+            raise InterruptedError(f"the twin run was ended at t = {t:g} s")
 
     def _run(self, solver=None):
         motion = self._motion
@@ -465,6 +470,8 @@ class Motion:
         times, stops = self._times()
         run, ahead = self._set_off(solver, folder, times, stops)
         tell(ahead / len(times))
+        if self.explicit:
+            solver.breathe = lambda t: tell(t / times[-1])
         try:
             for first, history in blocks(solver, run, times, stops, ahead):
                 table = self.table(history)

@@ -12,6 +12,8 @@ from .probes import PLACE
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned."""
+BREATH = 10_000_000
+"""Steps times cells after which a compiled loop returns, some tenths of a second."""
 MOST = 1e8
 """Largest number of steps of a history row."""
 LOOKS = 4
@@ -102,13 +104,17 @@ def culminate(i, now, value, sign, recent, peaks, times):
 
 @kernel()
 def advance(
-    count, h, t, kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
+    count, first_step, power, pull,
+    h, t, kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
     kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines,
     line_drives, line_cells, line_data, reeled_cells, by_length,
     probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent, book, impulse,
     energies, energy_outs, watch, total, events,
 ):  # fmt: skip
-    """``count`` steps of size h from time t; writes x, v, f, peaks, the book of work and the supports' impulse.
+    """``count`` steps of size h, behind the first ``first_step`` of a row from time t.
+
+    It writes x, v, f, peaks, the book of work and the supports' impulse. ``power`` and ``pull``, the power of each
+    family and ∂E/∂L of each length that changes, pass from one part of a row to the next.
 
     A step is a kick, a drift and a kick of h times ``kicks`` and ``drifts``; more of them are a method of higher order,
     for forces that follow from displacement alone. Such steps are long: between their ends peaks, if any are followed,
@@ -124,7 +130,7 @@ def advance(
     rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
     first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
     before, reaction, motion = np.empty((driven.size, 7)), np.zeros(3), len(kernels)
-    power, half = np.zeros(len(kernels)), np.empty((rows if viscous.size else 0, 3))
+    half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(lengths.size)
     more = drifts.size - 1
     looks = LOOKS if more and followed.size + watch.shape[0] else 0
     old, inner = np.empty((3, rows if looks else 0, 3)), np.empty((3, rows if looks else 0, 3))
@@ -132,17 +138,16 @@ def advance(
     kick, drift, last_kick = kicks[more] * h, drifts[more] * h, kicks[more + 1] * h
     unused = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     flat_half, flat_unused = half.reshape(-1), unused.reshape(-1)
-    for n in range(powers.shape[0]):
+    for n in range(powers.shape[0] if first_step == 0 else 0):
         i, column = powers[n, 0], powers[n, 1]
         kernels[i](t, x, v, unused, cells[i], data[i], outs[i])
         power[i] = outs[i][:, column].sum()
-    pull, was = np.empty((2, lengths.size)), np.empty(lengths.size)
-    if lengths.size:
+    if lengths.size and first_step == 0:
         by_length[0](t, x, reeled_cells, reeled_lines, pull[0])
     for s in range(held.size):
         reaction[held[s] % 3] -= f[held[s] // 3, held[s] % 3]
     for step in range(1, count + 1):
-        now = t + step * h
+        now = t + (first_step + step) * h
         if looks:
             old[0], old[1], old[2] = x, v, inverse * f
         for n in range(more):
@@ -312,8 +317,9 @@ def ended_by(events):
 
 @kernel()
 def rows_ahead(
-    ends, safety, step_size, finer, limit, kicks, drifts, state, saved, linear, mass, inverse, free, held, driven,
-    working, powers, still, viscous, kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives,
+    ends, breath, part, power, pull, safety, step_size, finer, limit, kicks, drifts,
+    state, saved, linear, mass, inverse, free, held, driven, working, powers, still, viscous,
+    kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives,
     drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data,
     reeled_cells, by_length, corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent,
     book, impulse, watch, events, history,
@@ -323,7 +329,8 @@ def rows_ahead(
     ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
     done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
     x, v and f at the row before; −1 where a row takes more than `MOST` steps. Where an event ends the run, that row is
-    the last, and its time that of the event.
+    the last, and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is
+    felt; ``part`` then holds the steps taken of a row and the steps of it, and is (0, ...) between rows.
 
     ``corners`` are the times at which a factor of natural lengths has a corner, increasing, then ∞ for the end of a row
     if there are such factors, then −∞ for its start. The step of a row is safe at all of them: in between a length is a
@@ -332,13 +339,13 @@ def rows_ahead(
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
     where, rates = np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
-    total, stopped = np.zeros(len(energies) + 3), False
+    total, stopped, left = np.zeros(len(energies) + 3), False, breath
     for n in range(ends.size):
-        interval = ends[n] - state[0]
-        if lengths.size:
+        interval, begun = ends[n] - state[0], part[0]
+        if lengths.size and not begun:
             set_lengths(state[0], lengths, reeled, reeled_lines, line_drives, line_cells, line_data, data[0])
-        if interval > 0.0:
-            changing = corners.size > 2 and corners[0] < ends[n] and corners[-3] > state[0]
+        changing = corners.size > 2 and corners[0] < ends[n] and corners[-3] > state[0]
+        if interval > 0.0 and not begun:
             back[0], back[1], back[2] = x, v, f
             speed = push = 0.0
             for r in range(linear):
@@ -369,18 +376,25 @@ def rows_ahead(
             count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
             if finer > 1.0:
                 count = int(math.ceil(finer * count))
-            h = total[-1] = interval / count
+            part[1] = count
+        if interval > 0.0:
+            h = total[-1] = interval / part[1]
             acting = lengths if changing else lengths[:0]
+            count = min(part[1] - begun, max(left, 1))
             taken = advance(
-                count, h, state[0], kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still,
-                viscous, kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting, reeled,
-                reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
+                count, begun, power, pull, h, state[0], kicks, drifts, x, v, f, mass, inverse, held, driven, working,
+                powers, still, viscous, kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting,
+                reeled, reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
                 probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent, book, impulse,
                 energies, energy_outs, watch, total, events,
             )  # fmt: skip
-            stopped = taken < count or (events.shape[0] > 0 and ended_by(events))
-            state[0] = state[0] + taken * h if taken < count else ends[n]
-            state[1], state[2] = state[1] + taken, h
+            stopped = events.shape[0] > 0 and ended_by(events)
+            state[1], state[2], left = state[1] + taken, h, left - taken
+            part[0] = begun + taken
+            if part[0] < part[1] and not stopped:
+                return n
+            state[0] = state[0] + part[0] * h if part[0] < part[1] else ends[n]
+            part[0] = 0
         row, at = history[n], 1
         row[0] = state[0]
         for i in range(len(probes)):

@@ -137,6 +137,35 @@ def test_an_interrupted_run_goes_on_bit_for_bit(tmp_path, monkeypatch, name):
     assert told(cut) == told(whole)
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_a_row_in_pieces_is_the_same_row(tmp_path, monkeypatch, name):
+    """The compiled loop comes back after every step, some of them, or none."""
+    written = []
+    for breath in (0, 3 * 40, 10**9):
+        monkeypatch.setattr(central_difference, "BREATH", breath)
+        refweb.run(of_case(name), out=tmp_path / str(breath))
+        written.append(files(tmp_path / str(breath)))
+        written[-1].pop("run.json")
+    assert written[0] == written[1] == written[2]
+
+
+def test_a_long_row_is_interrupted(tmp_path, monkeypatch):
+    """Within a row of some thousand steps; what is left is the row before."""
+    monkeypatch.setattr(central_difference, "BREATH", 0)
+    case, times = scene(duration=0.1).replace(output=refweb.Output(interval=0.02)), []
+
+    def progress(text, share):
+        times.append(share)
+        if share > 0.75:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refweb.run(case, out=tmp_path / "out", progress=progress)
+    assert len(times) > 50 and times[-1] < 0.8
+    rows = (tmp_path / "out" / "history.csv").read_text(encoding="utf-8").splitlines()[1:]
+    assert summary_of(tmp_path / "out")["message"] == f"interrupted after t = {0.02 * (len(rows) - 1):g} s"
+
+
 @pytest.mark.parametrize("method", ["cvode", "ida"])
 def test_an_interrupted_run_goes_on_within_tolerance(tmp_path, monkeypatch, method):
     """The solver begins anew at the checkpoint, so that rounding and step sizes differ, but neither books nor peaks.

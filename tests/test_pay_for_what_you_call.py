@@ -25,7 +25,18 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 # Modules
 
 EVERY = {"inputs", "errors", "compiled", "settings", "laws", "cables", "webs", "elements", "lines", "shapes", "bodies"}
-EVERY |= {"effects", "effects.elasticity", "system", "state", "observables", "scene", "io", "solution", "runner"}
+EVERY |= {
+    "effects",
+    "effects.elasticity",
+    "system",
+    "state",
+    "observables",
+    "scene",
+    "memory",
+    "io",
+    "solution",
+    "runner",
+}
 """What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
 NEWTON = {"statics", "factor", "pattern"}
 DYNAMICS = {"dynamics", "probes", "stepping"}
