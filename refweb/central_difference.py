@@ -343,8 +343,8 @@ class CentralDifference:
         for step in range(1, count + 1):
             advance(
                 1, 0, *self._carried(), h, before + (step - 1) * h, self.kicks, self.drifts, x, v, f, *self._masses,
-                *self._ends, *self._forces, self._seen, *self._drives, *self._peaks(run), *self._energies, self._watch, total,
-                self._events[:0],
+                *self._ends, *self._forces, self._seen, *self._drives, *self._peaks(run), *self._energies,
+                self._watch, total, self._events[:0],
             )  # fmt: skip
             wrong = ~np.isfinite(x + v + f).all(axis=1)
             if wrong.any():

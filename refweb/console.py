@@ -76,11 +76,12 @@ def before(scene, system):
         else:
             step = f"safety {solve.safety:g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
+    area = f"{web['area']:.4g} m², " if web["cells"] else ""
     _box(
         scene.title,
         [
             ("web", f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells; {len(system.free)} unknowns"),
-            ("", f"{web['cable_length']:.6g} m of cable, {web['area']:.4g} m², {web['mass']:.4g} kg"),
+            ("", f"{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg"),
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
             ("solve", how),
@@ -119,7 +120,8 @@ def _determined(horizon):
     text = f"a difference of {horizon['perturbation']:.0e} m"
     text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"
     text += "".join(f"; {k - 1} digit{'s' * (k != 2)} after {time:.4g} s" for k, time in ended[-3:])
-    text += "" if horizon["digits"][-1][1] is not None else "; digits are left at the end"
+    left = max((k for k, time in horizon["digits"] if time is None), default=0)
+    text += f"; {'more than ' * (left == 12)}{left} digit{'s' * (left != 1)} at the end" if left else ""
     return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
 
 
@@ -156,7 +158,8 @@ def stored(summary, more=()):
     rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
     rows += [("warning", text) for text in summary["warnings"]]
     if summary["status"] != "solved":
-        rows.append((summary["status"], summary["message"]))
+        resumed = "refweb resume goes on from its last checkpoint" if solver["energy_drift"] is not None else ""
+        rows.append((summary["status"], summary["message"] or resumed))
     _box(f"{summary['scene']}: {summary['status']}", rows)
 
 

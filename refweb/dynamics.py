@@ -147,6 +147,7 @@ def with_errors(results, twin, own, other, order=2.0):
 
 CLIMBS = 8
 """Number of times that accuracy is raised for digits that are missing."""
+STAYS = "a higher accuracy changes it as much: it is zero, or not determined, or a peak that needs a shorter interval"
 STUCK = 1.5
 """Factor by which an error has to fall where half the step, or a tenth of rtol, is meant to quarter it."""
 
@@ -398,15 +399,19 @@ class Motion:
         before = self._missing
         for _ in range(CLIMBS):
             missing = missing_digits(solution.reduced, scene.accuracy.digits)
-            if not missing or any(before.get(name, np.inf) <= STUCK * share for name, share in missing.items()):
+            falling = [share for name, share in missing.items() if before.get(name, np.inf) > STUCK * share]
+            if not falling:
                 break
-            before = self._missing = missing
-            accuracy *= self._climb(max(missing.values()))
+            before, steps = missing, solution.solver["nsteps"]
+            self._missing = before
+            accuracy *= self._climb(max(falling))
             self._again(accuracy, folder)
             accuracy = self._closed(accuracy, folder, tell)
+            if solution.solver["nsteps"] < 1.1 * steps:  # rows shorter than steps: nothing was changed
+                before = self._missing = {}
         for name, share in missing_digits(solution.reduced, scene.accuracy.digits).items():
             falls = before.get(name, np.inf) > STUCK * share
-            why = "it would take more still" if falls else "a higher accuracy changes it as much: it is not determined"
+            why = "it would take more still" if falls else STAYS
             solution.warnings.append(
                 f"{name} has not the {scene.accuracy.digits} digits asked for: its ± is {share:.3g} times what they "
                 f"allow with {self._key} = {accuracy:g}; {why}"

@@ -31,6 +31,7 @@ from .stepping import (
     STOP,
     TIME,
     book_energies,
+    culminate,
     ended_by,
     event_table,
     no_energy,
@@ -65,6 +66,8 @@ class Course:
         Impulse of the supports on the net [N s].
     events : ndarray, shape (events, 6)
         What each event has come to, see `refweb.stepping`.
+    recent : ndarray, shape (probes, 4)
+        Time and value of each probe when it was last looked at, twice: tops of parabolas count as peaks.
     """
 
     time: float
@@ -84,6 +87,7 @@ class Course:
     largest: float = 0.0
     worst: float = 0.0
     rates: tuple = ()
+    recent: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
 
     @property
     def stopped(self):
@@ -191,6 +195,8 @@ class Implicit:
             passes(event, run.peaks[int(event[SLOT])])
         stepping = count + np.flatnonzero(self._weights[:, -1])
         run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        run.recent = np.full((len(signs), 4), np.nan)
+        run.recent[:, 2], run.recent[:, 3] = 0.0, run.peaks
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.energy, run.largest = own.sum(), np.abs(own).sum()
         self._enter(run)
@@ -309,6 +315,7 @@ class Implicit:
                 for j, value in enumerate(self._weights @ total, count):
                     if self._signs[j] * value > self._signs[j] * run.peaks[j]:
                         run.peaks[j], run.times[j] = value, sample[0]
+                    culminate(j, sample[0], value, self._signs[j], run.recent, run.peaks, run.times)
         run.book, run.impulse = self._booked(run, rates, end, end)
         run.rates = rates[3]
         run.time, run.x, run.v = end, *samples[1][1:3]
@@ -414,6 +421,7 @@ class Implicit:
                 where[1] = PLACE
                 probe(t, x, v, force, lines, rows, data, where)
                 run.peaks[i], run.times[i], run.places[i], where[1] = value, t, where[0], 0
+            culminate(i, t, value, self._signs[i], run.recent, run.peaks, run.times)
 
     def _rates(self, t, x, v, force, lines, power):
         """Powers [W], force of the supports [N], natural lengths [m] and what pulls on them [N]."""

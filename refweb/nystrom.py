@@ -94,8 +94,8 @@ class Nystrom(CentralDifference):
         for family in system.families:
             if family.damping is not None or family.power is not None or family.times:
                 raise InputError(
-                    f'[solve] method = "explicit" takes no [{family.name}] that depends on velocity or time: use '
-                    '"central-difference" or "cvode"'
+                    f'[solve] method = "explicit" takes no [{family.name}], nothing that depends on velocity or time '
+                    'or whose work has to be booked: use "central-difference" or "cvode"'
                 )
         if system.drives or system.line_drives:
             raise InputError(

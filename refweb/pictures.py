@@ -112,6 +112,8 @@ def animate(folder, field=None, out=None, fps=10.0, progress=None):
 def _target(out, default, endings=None):
     from matplotlib.figure import Figure
 
+    if out is None and not default.parent.is_dir():
+        raise InputError(f"{default.parent} is no folder")
     out = Path(default if out is None else out)
     endings = endings or sorted(Figure().canvas.get_supported_filetypes())
     ending = out.suffix[1:].lower()

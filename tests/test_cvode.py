@@ -695,3 +695,26 @@ def test_a_node_without_mass():
 def test_consistent_mass_has_no_sparse_jacobian():
     with pytest.raises(refweb.InputError, match='"sparse" must be "block" or "dense" with mass = "consistent"'):
         Cvode(small(consistent=True), linear_solver="sparse")
+
+
+@pytest.mark.parametrize("method", ["cvode", "ida"])
+def test_peaks_between_steps(method):
+    """A mass on a spring, thrown along it: v/ω and t = π/2ω; the solver looks at it every 5 ms."""
+    omega, speed = 20.0, 0.3
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=omega**2, area=1.0, density=0.0),
+        effects=[refweb.PointMass(node=1, mass=1.0), refweb.Velocity(node=1, value=(speed, 0.0, 0.0))],
+        observe=[
+            refweb.Observe(name="far", quantity="displacement", node=1, component="x", reduce="max"),
+            refweb.Observe(name="stored", quantity="strain_energy", reduce="max"),
+        ],
+        solve=refweb.Dynamic(duration=0.15, method=method, rtol=1e-9),
+        output=refweb.Output(interval=0.01),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    far, stored = refweb.run(scene).results.values()
+    # a parabola through samples of h = 5 ms errs by some (ωh)⁴/64 = 2e-6 of a cosine, and its top by (ωh)²/16 of h
+    assert abs(far.value - speed / omega) < 3e-6 * speed / omega
+    assert abs(stored.value - 0.5 * speed**2) < 16 * 3e-6 * 0.5 * speed**2
+    assert abs(far.time - np.pi / (2.0 * omega)) < 1e-2 * 5e-3
