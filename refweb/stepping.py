@@ -122,7 +122,8 @@ def advance(
     there on parabolas.
 
     Forces that depend on velocity see that at the end of the step, which the second kick, thereby implicit, is iterated
-    for: kick and kick stay adjoint to each other, and the method of order 2. The iteration contracts with ½ h C/m.
+    for: kick and kick stay adjoint to each other, and the method of order 2. The iteration contracts with ½ h C/m, and
+    ends at rounding; friction that has grown may take more than 30 rounds, and what 100 leave shows in the energy book.
 
     Returns the steps taken: fewer than asked for where an event ends the run.
     """

@@ -4,8 +4,8 @@
 
 runs the cases of `CASES`, all or those named, and writes ``validation/report/index.html`` (one page that holds all of
 its figures) and ``report.md``; the exit status is 1 where a row or a verdict fails. ``tests/test_validation.py`` runs
-every case with ``--quick``. ``explicit_cost``, ``statics_cost``, ``refinement`` and ``fundamental_frequencies`` print
-tables of their own with ``python -m validation.NAME``.
+every case with ``--quick``. ``explicit_cost``, ``implicit_cost``, ``statics_cost``, ``cost_of_effects``, ``refinement``
+and ``fundamental_frequencies`` print tables of their own with ``python -m validation.NAME``.
 
 How to write a case
 -------------------
