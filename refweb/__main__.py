@@ -1,4 +1,4 @@
-"""The command line: ``refweb run | resume | check | info | picture | modes``.
+"""The command line: ``refweb run | resume | check | info | picture | modes | cost``.
 
 Exit status: 0 solved, 1 the solver failed, 2 wrong input, 130 interrupted. Nothing heavy is imported before a command
 needs it.

@@ -75,7 +75,7 @@ class Cable(Table):
     groups: dict = field(_groups, factory=dict)
 
     def check(self):
-        """Fill in the smooth law's parameters; refuse them for other laws, and an EA that is 0 in floating point."""
+        """Fill in the smooth law's parameters; refuse them for other laws."""
         for key, default in (("slackness", 0.0), ("smoothing", 1e-5)):
             if self.law == "smooth":
                 if getattr(self, key) is None:

@@ -25,13 +25,14 @@ from .stepping import (
     DRIFT,
     LOOKS,
     MOST,
+    SLOT,
     advance,
+    begins,
     book_energies,
     ended_by,
     event_table,
     no_bound,
     no_energy,
-    passes,
     rows_ahead,
     set_lengths,
     step_bound,
@@ -126,7 +127,7 @@ class CentralDifference:
     Raises
     ------
     InputError
-        For curved elements, a consistent mass, a free row without mass, or a step above the bound.
+        For curved elements, a consistent mass, links, a free row without mass, or a step above the bound.
     """
 
     method, order, stretch = "central-difference", 2, 1.0
@@ -232,7 +233,10 @@ class CentralDifference:
             set_lengths(t, *self._drives[4:10], self._data[0])
 
     def figures(self, run):
-        """What a run has spent, for ``run.json``."""
+        """What a run has spent, for ``run.json``.
+
+        The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
+        """
         follows = len(self._probes[4]) + len(self._watch) > 0  # and evaluates forces where it looks
         per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
         return dict(nfev=per_step * run.nsteps + 1, njev=0, nlu=0)
@@ -261,7 +265,7 @@ class CentralDifference:
         values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         events = self._events.copy()
         for event in events:
-            passes(event, values[int(event[0])])
+            begins(event, values[int(event[SLOT])])
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
         none, recent = np.zeros(len(signs)), np.full((len(signs), 4), np.nan)

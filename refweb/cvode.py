@@ -41,7 +41,7 @@ class Cvode(Implicit):
 
     Parameters
     ----------
-    system, probes, watch, rtol, atol_position, atol_velocity
+    system, probes, watch, events, rtol, atol_position, atol_velocity
         See `refweb.implicit.Implicit`.
     family : {"bdf", "adams"}
         Kind of multistep method.

@@ -14,7 +14,7 @@ from .laws import SMOOTH
 from .observables import LINE, NODAL, TOTAL, Observe, Result
 from .solution import SOLVER
 from .state import State, floor_remark, strength_remark
-from .stepping import SIDE, TIME
+from .stepping import AT_ONCE, SIDE, TIME
 
 _VECTORS = ("momentum", "support_impulse")
 
@@ -30,11 +30,19 @@ def _weights(system, quantity):
     return np.array(weights, dtype=float)
 
 
-def _weight(system):
-    """Force of gravity on every row [N]."""
-    still = np.zeros((system.rows, 3))
-    heavy = [f for f in system.families if f.book == "potential_energy"]
-    return sum((system.force_of(family, 0.0, still) for family in heavy), start=still)
+def _outer(system, rows):
+    """What bodies feel besides contact, g + B x + C v: g [N], B and C where a frame turns; shape (rows, 3 or 21)."""
+    still, families = np.zeros((system.rows, 3)), [f for f in system.families if not f.internal]
+
+    def force(x, v):
+        return sum((system.force_of(family, 0.0, x, v) for family in families), start=still)[rows]
+
+    parts, rest = [force(still, still)], []
+    if system.turns:
+        for unit in np.eye(3):
+            rest.append((force(still + unit, still) - parts[0], force(still, still + unit) - parts[0]))
+        parts += [np.stack(side, axis=-1).reshape(len(rows), 9) for side in zip(*rest, strict=True)]
+    return np.hstack(parts)
 
 
 def probe_of(observable, system):
@@ -55,7 +63,7 @@ def probe_of(observable, system):
         rest = np.zeros((len(rows), 3))
         if observable.body is not None:
             weight[:] = -1.0
-            rest = _weight(system)[rows]
+            rest = _outer(system, rows)
         return probes.reaction, numbers, np.hstack([weight, rest])
     kernel = probes.velocity if quantity == "velocity" else probes.displacement
     data = net.points[rows] if quantity == "position" else np.zeros((len(rows), 3))
@@ -130,13 +138,14 @@ def with_errors(results, twin, own, other, order=2.0):
     results, twin : dict of str to refweb.observables.Result
         Of either run.
     own, other : ndarray, shape (rows, columns)
-        Rows of either history: time, then the observables in their order.
+        Rows of either history: time, then the observables in their order. Those of equal times are compared: the last
+        ones differ where an event ends either run.
     order : float
         The error over the difference.
     """
-    rows = min(len(own), len(other))
-    own, apart = own[-rows:], np.abs(own[-rows:] - other[-rows:])
-    found = {}
+    rows, found = min(len(own), len(other)), {}
+    same = own[:rows, 0] == other[:rows, 0]
+    own, apart = own[:rows][same], np.abs(own[:rows] - other[:rows])[same]
     for i, (name, result) in enumerate(results.items(), 1):
         near = (own[:, 0] >= 0.5 * result.time) & (own[:, 0] <= result.time)
         mean = np.sqrt(np.mean(apart[near, i] ** 2)) if near.any() else 0.0
@@ -292,7 +301,7 @@ class Motion:
         system = self.system
         if event.kind == "contact":
             rows = [body.row for body in system.net.bodies if event.body in (None, body.name)]
-            return (probes.push, rows, _weight(system)[rows]), 0.0, True
+            return (probes.push, rows, _outer(system, rows)), 0.0, AT_ONCE
         if event.kind == "taut":
             probe = probe_of(Observe(name="_", quantity="strain", line=event.line), system)
             return probe, float(system.net.slackness[probe[1][1]]), True
@@ -412,10 +421,9 @@ class Motion:
         for name, share in missing_digits(solution.reduced, scene.accuracy.digits).items():
             falls = before.get(name, np.inf) > STUCK * share
             why = "it would take more still" if falls else STAYS
-            solution.warnings.append(
-                f"{name} has not the {scene.accuracy.digits} digits asked for: its ± is {share:.3g} times what they "
-                f"allow with {self._key} = {accuracy:g}; {why}"
-            )
+            known = f"its ± is {share:.3g} times what they allow with {self._key} = {accuracy:g}; {why}"
+            known = known if np.isfinite(share) else "its ± is not known"
+            solution.warnings.append(f"{name} has not the {scene.accuracy.digits} digits asked for: {known}")
 
     def _climb(self, share):
         """Factor on safety, or rtol, for errors that are ``share`` times what they may be."""
@@ -456,9 +464,13 @@ class Motion:
                 other, ended, rows, failure = twin.results()
             break
         solution.reduced, self._repeated = results, 0
-        if other:
-            steps = solution.solver["nsteps"] / ended.nsteps
-            less = steps**2 if self.explicit else FINER ** (-2.0 / 3.0)
+        if other and self._stopped != ended.stopped:
+            which = "the run" if self._stopped else "its twin of a smaller error"
+            solution.warnings.append(f"no errors are known: an event ends {which} and not the other of the two")
+        elif other:
+            less = FINER ** (-2.0 / 3.0)
+            if self.explicit:
+                less = (self._density / (ended.nsteps / ended.time)) ** 2 if ended.nsteps else 0.5
             factor = 1.0 / (1.0 - less)
             own = np.array(self.rows) if folder is None else folder.rows()
             solution.reduced = with_errors(results, other, own[:, : rows.shape[1]], rows, factor)
@@ -523,7 +535,8 @@ class Motion:
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
             for event, time in zip(self.scene.event, run.events[:, TIME], strict=True)
         ]
-        self._widths = run.events[:, SIDE].copy()
+        self._widths, self._stopped = run.events[:, SIDE].copy(), run.stopped
+        self._density = run.nsteps / run.time if run.time else 0.0
         figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.figures(run))
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **self._choice, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None

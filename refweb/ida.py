@@ -76,9 +76,7 @@ class Ida(Implicit):
 
             self._massless = Massless(system, self._bare)
         if system.constraints:
-            from .links import Links
-
-            self._links = Links(system)
+            self._links = system.links
         self._count = len(self._links) if self._links else 0
         self.linear_solver, self.choice = self._chosen(linear_solver)
         self._product, self._exact, self._adrift = None, False, (0.0, None)
@@ -333,17 +331,9 @@ class Ida(Implicit):
         drift = {"constraint_drift": run.constraint_drift.tolist()} if self._links else {}
         return {**super().figures(run), **drift}
 
-    def _at(self, t):
-        x, v = super()._at(t)
+    def _hold(self, x, v):
         if self._links:
             self._links.hold(x, v)
-        return x, v
-
-    def _forces(self, t, x, v):
-        force, out = super()._forces(t, x, v)
-        if self._links:
-            force += self._links.force(x, v, force)
-        return force, out
 
     def _interpolated(self, t):
         found = self._check(self._solver.step(t, "normal", None))

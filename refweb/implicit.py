@@ -30,6 +30,7 @@ from .stepping import (
     SLOT,
     STOP,
     TIME,
+    begins,
     book_energies,
     culminate,
     ended_by,
@@ -183,16 +184,15 @@ class Implicit:
         signs, count = self._signs, len(self._probes)
         none, book = np.zeros(len(signs)), np.zeros(len(system.families) + 1)
         run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy(), book)
-        force, out = self._forces(0.0, x, v)
+        force, out = self.system.balance(0.0, x, v)
         where = np.full(2, PLACE)
         for i, (probe, rows, data) in enumerate(self._arrays):
             run.peaks[i] = probe(0.0, x, v, force, out[0], rows, data, where)
             run.places[i] = where[0]
-        self._kinetic = self._driven_energy(v)
         total = self._energies(run)
         run.peaks[count:] = self._weights @ total
         for event in run.events:
-            passes(event, run.peaks[int(event[SLOT])])
+            begins(event, run.peaks[int(event[SLOT])])
         stepping = count + np.flatnonzero(self._weights[:, -1])
         run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
         run.recent = np.full((len(signs), 4), np.nan)
@@ -205,12 +205,11 @@ class Implicit:
     def stored(self, run):
         """The `Course` as arrays by name, for a checkpoint; a solver's past steps are not among them."""
         kept = {f.name: np.asarray(getattr(run, f.name)) for f in fields(run) if f.name != "rates"}
-        return {**kept, "driven": np.asarray(self._kinetic), "spent": np.array(list(self.stats.values()))}
+        return {**kept, "spent": np.array(list(self.stats.values()))}
 
     def restored(self, arrays):
         """The `Course` of a checkpoint, from which the solver begins with short steps of order 1, as at t = 0."""
         arrays = dict(arrays)
-        self._kinetic = float(arrays.pop("driven"))
         self.stats.update(zip(self.stats, arrays.pop("spent").tolist(), strict=True))
         run = Course(**{name: array if array.ndim else array.item() for name, array in arrays.items()})
         run.reached = run.time
@@ -291,7 +290,11 @@ class Implicit:
         x, v = self._reference.copy(), np.zeros((system.rows, 3))
         x.ravel()[system.free], v.ravel()[system.free] = self._interpolated(t)
         system.drive(t, x, v)
+        self._hold(x, v)
         return x, v
+
+    def _hold(self, x, v):
+        """Move a state to the nearest one that the equations allow."""
 
     def _cover(self, run, end, halvings=HALVINGS):
         """Look at the run in the middle between its time and ``end``, and at the end; leave it there."""
@@ -319,25 +322,33 @@ class Implicit:
         run.book, run.impulse = self._booked(run, rates, end, end)
         run.rates = rates[3]
         run.time, run.x, run.v = end, *samples[1][1:3]
+        if rates[4] and self.system.net.spread is not None:  # what is free jumps as well
+            self._enter(run)
 
     def _piece(self, run, samples):
         """Rates at the start, in the middle and at the end of a piece of a step, and at the start of the next one.
 
-        The last two differ at the corner of a motion, up to which its velocity is that in the middle.
+        The last two differ at the corner of a motion, up to which its velocity is that in the middle. There velocities
+        jump, which is written to the last sample; fifth comes what that takes of work and of the supports' impulse.
         """
-        after, driven, (t, x, v) = self._rates(*samples[1]), self._driven, samples[1][:3]
-        last = after
+        system, driven, (t, x, v) = self.system, self._driven, samples[1][:3]
+        last, jump = samples[1], None
         if len(driven) and (v[driven] != samples[0][2][driven]).any():
-            v = v.copy()
-            v[driven] = samples[0][2][driven]
-            last = self._rates(*self._sample_of(t, x, v))
-        return run.rates, self._rates(*samples[0]), last, after
+            before, step = v.copy(), np.zeros_like(v)
+            before[driven] = samples[0][2][driven]
+            step[driven] = v[driven] - before[driven]
+            after = before + system.kick(step)
+            after[driven] = v[driven]
+            self._hold(x, after)
+            last, samples[1] = self._sample_of(t, x, before), self._sample_of(t, x, after)
+            jump = self._kinetic(after) - self._kinetic(before), self._momentum(after) - self._momentum(before)
+        return run.rates, self._rates(*samples[0]), self._rates(*last), self._rates(*samples[1]), jump
 
     def _uneven(self, run, rates, end, x, v):
         """Whether powers change too much within a piece, as where damped lines go slack in a long step."""
         start, middle, last = (rate[0] for rate in rates[:3])
         apart = (end - run.time) * np.abs(start - 2.0 * middle + last).sum() / 12.0
-        return apart > UNEVEN * run.largest and apart > UNEVEN * 0.5 * (v * self.system.momentum(v)).sum()
+        return apart > UNEVEN * run.largest and apart > UNEVEN * self._kinetic(v)
 
     def _booked(self, run, rates, end, t):
         """Work, and impulse of the supports, at time t of a piece, by the parabola through its three rates."""
@@ -346,24 +357,22 @@ class Implicit:
         a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
         start, middle, last = rates[:3]
         power, reaction, _, pull = (a * p + b * q + c * r for p, q, r in zip(start, middle, last, strict=True))
-        book = run.book + width * power
+        book, impulse = run.book + width * power, run.impulse + width * reaction
         book[-1] += pull @ (last[2] - start[2])
-        return book, run.impulse + width * reaction
+        if rates[4] and t == end:
+            book[-1], impulse = book[-1] + rates[4][0], impulse + rates[4][1]
+        return book, impulse
 
     def _there(self, run, rates, end, t, x, v):
         """The run at a state within a piece."""
         return replace(run, time=t, x=x, v=v, book=self._booked(run, rates, end, t)[0])
-
-    def _forces(self, t, x, v):
-        """Force on every row [N], and what each family observes."""
-        return self.system.forces(t, x, v)
 
     def _sample(self, t):
         return self._sample_of(t, *self._at(t))
 
     def _sample_of(self, t, x, v):
         """Time, displacement, velocity, force, what the lines show, and the power of each family, last of motion."""
-        force, out = self._forces(t, x, v)
+        force, out = self.system.balance(t, x, v)
         self._refuse_endless(t, force)
         power, driven = np.zeros(len(out) + 1), self._driven
         for i, column in self._powered:
@@ -429,30 +438,31 @@ class Implicit:
         reaction = np.bincount(self._fixed % 3, force.ravel()[self._fixed], 3)
         return power, -reaction, *lengths
 
-    def _driven_energy(self, v):
-        mass, driven = self.system.net.mass, self._driven
-        return 0.5 * (mass[driven, None] * v[driven] ** 2).sum() if len(driven) else 0.0
+    def _kinetic(self, v):
+        """Kinetic energy [J]."""
+        return 0.5 * (v * self.system.momentum(v)).sum()
+
+    def _momentum(self, v):
+        """Momentum of what is free [N s], shape (3,)."""
+        moving = self.system.momentum(np.where(self._held, 0.0, v))
+        return moving[: self.system.rows - self.system.net.spins].sum(axis=0)
 
     def _energies(self, run):
         """Energy of each family, kinetic energy, work [J] and step size [s]."""
         system, total = self.system, np.zeros(len(self.system.families) + 3)
-        book = run.book.copy()
-        book[-1] += self._driven_energy(run.v) - self._kinetic
         system.prepare(run.time)
-        numbers = (system.net.mass, *self._book, book, self._working)
+        numbers = (system.net.mass, *self._book, run.book, self._working)
         book_energies(run.time, run.x, run.v, *numbers, total)
-        total[-3] = 0.5 * (run.v * system.momentum(run.v)).sum()
+        total[-3] = self._kinetic(run.v)
         total[-1] = run.step
         return total
 
     def _fill(self, row, run, before):
-        system, where = self.system, np.zeros(2, dtype=np.int64)
-        force, out = self._forces(run.time, run.x, run.v)
+        where = np.zeros(2, dtype=np.int64)
+        force, out = self.system.balance(run.time, run.x, run.v)
         total = self._energies(run)
         values = [p(run.time, run.x, run.v, force, out[0], r, d, where) for p, r, d in self._arrays]
-        moving = np.where(self._held, 0.0, system.momentum(run.v))
-        momentum = moving[: system.rows - system.net.spins].sum(axis=0)
-        row[:] = [run.time, *values, *total, *momentum, *run.impulse]
+        row[:] = [run.time, *values, *total, *self._momentum(run.v), *run.impulse]
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.largest = max(run.largest, np.abs(own).sum())
         drift = abs(own.sum() - total[-2] - run.energy)

@@ -62,7 +62,7 @@ class InteriorPoint:
         return -(self.bars.T @ ((self.axial * g)[:, None] * direction))
 
     def _factorize(self, direction, length):
-        """Factorize the Newton matrix; the larger ``ridge``, the stiffer it is made."""
+        """Factorize the Newton matrix, each time it is asked for one stiffer across the elements."""
         along = self.axial / self.natural * self.g / (self.g + self.w)
         ridge = 0.0
         for _ in range(20):

@@ -7,6 +7,7 @@ listed in ``web.pvd`` after it and the checkpoint of its state are there, and it
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import pathlib
@@ -38,11 +39,19 @@ def write_atomically(path, write):
     os.close(handle)
     try:
         write(name)
-        os.chmod(name, 0o644)
+        os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
     except BaseException:
         pathlib.Path(name).unlink(missing_ok=True)
         raise
+
+
+@functools.cache
+def _umask():
+    """The process's mask of permissions, which can only be read by setting it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
 
 
 def write_text(path, text):
@@ -126,7 +135,8 @@ def read_summary(folder):
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return None
-    return run if isinstance(run, dict) and "refweb" in (run.get("versions") or ()) else None
+    own = isinstance(run, dict) and isinstance(run.get("versions"), dict) and "refweb" in run["versions"]
+    return run if own else None
 
 
 def check_folder(folder, force=False):
@@ -169,6 +179,8 @@ def clear(folder, keep=("run.json",)):
 def copy(source, target):
     """Copy what a run wrote from one folder to another, ``run.json`` last."""
     target = pathlib.Path(target)
+    if source.resolve() == target.resolve():
+        return
     (target / "frames").mkdir(parents=True, exist_ok=True)
     clear(target)
     own = [p for p in source.rglob("*") if p.is_file() and OWN.fullmatch(p.relative_to(source).as_posix())]

@@ -264,6 +264,11 @@ class Dynamics:
                 values[row] = self.observable.value(State(system, self.times[row], trial_x, trial_v)).value
                 spent -= time.process_time()
                 row += 1
+            if consistent and steps and ahead < end and solver.t > ahead * (1.0 - 1e-12):  # a corner of a motion
+                sides = (rows(t, solver.y)[1] for t in (ahead * (1.0 + 1e-12), 0.5 * (solver.t_old + ahead)))
+                jump = np.where(system.supported, np.subtract(*sides), 0.0)
+                solver.y[n:] += system.kick(jump).ravel()[free]
+                solver.f = rate(solver.t, solver.y)
             _check(deadline)
         trial.cpu_s, trial.values, trial.x = spent + time.process_time(), values, trial_x[: self._linear]
         trial.work = {"nfev": solver.nfev, "njev": 0, "nlu": 0, "nsteps": steps}

@@ -8,7 +8,6 @@ or strain. Nothing needs a display: `refweb.drawing` renders by OpenGL off scree
 from __future__ import annotations
 
 import io
-import json
 import os
 import tomllib
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ import numpy as np
 from . import drawing, shots, views
 from .drawing import Balls, Surface, Tubes
 from .inputs import InputError, nearest
+from .io import read_summary, write_atomically
 
 SIZE, FILM_SIZE = (1600, 1000), (1200, 750)
 DARK, PALE, BEFORE, SUPPORT, SLACK = "#333333", "#888888", "#999999", (0.25, 0.25, 0.27), (0.80, 0.80, 0.81)
@@ -60,7 +60,7 @@ def picture(folder, frame=None, field=None, out=None):
     field = _field(shot, field)
     pins = shot.pins if len(shot.pins) else shots.read(folder, last).pins
     for figure in _figures([shot], field, pins, _heading(folder), SIZE):
-        figure.savefig(out)
+        write_atomically(out, figure.savefig)
     return out
 
 
@@ -105,7 +105,8 @@ def animate(folder, field=None, out=None, fps=10.0, progress=None):
             progress("drawing frames", (len(film) + 1) / len(reel))
         film.append(Image.open(page).convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE))
     duration = [round(1000 / fps)] * (len(film) - 1) + [1000]
-    film[0].save(out, save_all=True, append_images=film[1:], duration=duration, loop=0)
+    rest = dict(save_all=True, append_images=film[1:], duration=duration, loop=0)
+    write_atomically(out, lambda name: film[0].save(name, **rest))
     return out
 
 
@@ -121,7 +122,7 @@ def _target(out, default, endings=None):
         raise InputError(f'out = "{out}": unknown format "{ending}", {nearest(ending, endings)}')
     if not out.parent.is_dir():
         raise InputError(f'out = "{out}": there is no folder "{out.parent}"')
-    if not os.access(out if out.exists() else out.parent, os.W_OK):
+    if out.is_dir() or not all(os.access(path, os.W_OK) for path in (out, out.parent) if path.exists()):
         raise InputError(f'out = "{out}": cannot be written, choose another place')
     return out
 
@@ -137,10 +138,7 @@ def _field(shot, name):
 
 def _heading(folder):
     """Title, how a frame's time reads, and a word on a run that is not solved."""
-    try:
-        run = json.loads((Path(folder) / "run.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        run = {}
+    run = read_summary(Path(folder)) or {}
     try:
         kind = tomllib.loads((Path(folder) / "scene.toml").read_text(encoding="utf-8"))["solve"]["kind"]
     except (OSError, ValueError, KeyError, TypeError):

@@ -74,29 +74,48 @@ def velocity(t, x, v, f, lines, rows, data, where):
     return largest_of(v, data, rows, where)
 
 
+@kernel()
+def _outer(data, n, first, k, x, v, row):
+    """Component k of g + B x + C v at a row; data has g, and then B and C where they are not zero, from ``first``."""
+    outer = data[n, first + k]
+    if data.shape[1] > first + 3:
+        at = first + 3 + 3 * k
+        for i in range(3):
+            outer += data[n, at + i] * x[row, i] + data[n, at + 9 + i] * v[row, i]
+    return outer
+
+
 @kernel(PROBE)
 def reaction(t, x, v, f, lines, rows, data, where):
-    """Component or magnitude of Σ w (g − f) over rows; data holds w and g, shape (rows, 6)."""
-    x = y = z = 0.0
+    """Component or magnitude of Σ w (g + B x + C v − f) over rows; data holds w, g, B, C, shape (rows, 6 or 24)."""
+    total0 = total1 = total2 = 0.0
     first = rows[1]
     for n in range(data.shape[0]):
         r = first + n if first >= 0 else rows[3 + n]
-        x += data[n, 0] * (data[n, 3] - f[r, 0])
-        y += data[n, 1] * (data[n, 4] - f[r, 1])
-        z += data[n, 2] * (data[n, 5] - f[r, 2])
+        total0 += data[n, 0] * (_outer(data, n, 3, 0, x, v, r) - f[r, 0])
+        total1 += data[n, 1] * (_outer(data, n, 3, 1, x, v, r) - f[r, 1])
+        total2 += data[n, 2] * (_outer(data, n, 3, 2, x, v, r) - f[r, 2])
     where[0] = first if first >= 0 else rows[3]
     if rows[0] == MAGNITUDE:
-        return math.sqrt(x * x + y * y + z * z)
-    return x if rows[0] == 0 else y if rows[0] == 1 else z
+        return math.sqrt(total0 * total0 + total1 * total1 + total2 * total2)
+    return total0 if rows[0] == 0 else total1 if rows[0] == 1 else total2
 
 
 @kernel(PROBE)
 def push(t, x, v, f, lines, rows, data, where):
-    """Largest magnitude of g − f over rows, the force of contact on bodies; data holds g, shape (rows, 3)."""
+    """Largest magnitude of g + B x + C v − f over rows, the force of contact on bodies, 0 where it is of rounding.
+
+    data holds g, B, C, shape (rows, 3 or 21).
+    """
     best = 0.0
     for n in range(rows.size):
-        x, y, z = data[n, 0] - f[rows[n], 0], data[n, 1] - f[rows[n], 1], data[n, 2] - f[rows[n], 2]
-        best = max(best, x * x + y * y + z * z)
+        square = scale = 0.0
+        for k in range(3):
+            outer, whole = _outer(data, n, 0, k, x, v, rows[n]), f[rows[n], k]
+            square += (outer - whole) ** 2
+            scale += outer * outer + whole * whole
+        if square > 1e-26 * scale:
+            best = max(best, square)
     return math.sqrt(best)
 
 

@@ -86,10 +86,10 @@ def resume(folder, progress=None, announce=None):
     summary = read_summary(folder)
     if summary is None or not (folder / "scene.toml").is_file():
         raise InputError(f"{name} holds no run.json and scene.toml of a run: use refweb run")
-    if summary["status"] == "solved":
+    if summary.get("status") == "solved":
         raise InputError(f"{name} holds a solved run: there is nothing to go on with")
     scene = Scene.load(folder / "scene.toml")
-    if summary.get("kind") == "modes" or scene.solve.kind == "static":
+    if summary.get("kind") in ("modes", "cost") or scene.solve.kind == "static":
         raise InputError(f"{name} holds no dynamic run, and nothing else has checkpoints: use refweb run --force")
     check_folder(folder, force=True)
     kept = checkpoint(folder, name) if (folder / "checkpoint.npz").exists() else None
@@ -256,7 +256,7 @@ class _LoadSteps:
                 if (len(self.rows) - 1) % scene.output.frames == 0:
                     frame()
         finally:
-            if self.rows and solution.frames[-1][0] < len(self.rows) - 1:
+            if self.rows and (not solution.frames or solution.frames[-1][0] < len(self.rows) - 1):
                 frame()
 
     def remarks(self):
@@ -280,7 +280,7 @@ def web_of(system):
 
 
 def versions():
-    names = ("numpy", "scipy", "scikit-fem", "numba", "meshio", "qdldl")
+    names = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
     own = {"refweb": __version__, "python": sys.version.split()[0]}
     return {**own, **{name: importlib.metadata.version(name) for name in names}}
 

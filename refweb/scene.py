@@ -81,7 +81,7 @@ class Scene:
     output : Output
         What a result folder holds.
     accuracy : Accuracy, optional
-        How errors are found, in dynamics.
+        How errors are found.
     observe : sequence of refweb.Observe
         Numbers to follow; `refweb.observables.DEFAULT` without any.
     event : sequence of Event
@@ -288,6 +288,11 @@ class Scene:
         _distinct_motions(system)
         if system.constraints:
             self._check_links()
+        if self.start_folder is not None and self.accuracy.refine:
+            raise InputError(
+                f"[accuracy] refine = true must be false with [solve] start = {shown(self.solve.start)}: its state is "
+                "that of these elements, and finer ones have other nodes"
+            )
         system.initial_velocity()
         own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
         columns = dict.fromkeys(own, "a column of its own")

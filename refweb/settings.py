@@ -182,7 +182,8 @@ class Output(Table):
     Parameters
     ----------
     interval : float, optional
-        Time between history rows [s], 1e-3 by default; in statics the load steps are the rows.
+        Time between history rows [s], 1e-3 by default or the duration if that is shorter; in statics the load steps are
+        the rows.
     frames : int, optional
         A VTU every this many rows, the first and the last state always; 10 by default, in statics 1.
     """

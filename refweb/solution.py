@@ -32,7 +32,7 @@ class Solution:
     state : refweb.state.State
         The last state.
     columns : list of str
-        The same names with units, as ``history.csv`` heads them.
+        Names of the columns of ``history.csv``, with units.
     steps : list of dict
         Results and solver figures of each load step.
     solver, cost, web : dict

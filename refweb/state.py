@@ -96,7 +96,7 @@ class State:
     @cached_property
     def reaction(self):
         """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
-        force = np.where(self.system.supported, -self._forces[0], 0.0)
+        force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
         for body in self.system.net.bodies:
             internal = (f for f in self.system.families if f.internal)
             force[body.row] = sum(self.system.force_of(f, self.time, self.x, self.v)[body.row] for f in internal)

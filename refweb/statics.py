@@ -372,7 +372,8 @@ def _by_patience(newton, t, x):
 def solve(system, load_steps, progress=None):
     """Equilibria at load steps, one after another, each from the one before.
 
-    Where Newton's method finds none from the last state, `refweb.interior` leads there.
+    Where Newton's method finds none from the last state, the interior point of `refweb.interior` leads there if all
+    loads are dead; then a series of softer nets, for the tension-only law, or many small steps, for the smooth one.
 
     Parameters
     ----------

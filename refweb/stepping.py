@@ -20,8 +20,9 @@ LOOKS = 4
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
 SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
 """Columns of events: the probe, or behind the probes the sum, whose value passes a level; the side it is on, 1 above
-and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts; whether
-the run ends there; time of the event, infinite before."""
+and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts, and
+whether being above at t = 0 does (`AT_ONCE`); whether the run ends there; time of the event, infinite before."""
+AT_ONCE = 2.0
 
 
 def event_table(events):
@@ -56,6 +57,13 @@ def passes(event, value):
     side = 1.0 if value > event[LEVEL] else -1.0
     before, event[SIDE] = event[SIDE], side
     return side != before and (side > 0.0 or event[RISING] == 0.0)
+
+
+@kernel()
+def begins(event, value):
+    """Note the side of an event at t = 0; where it happens by being there, as a contact does, it has happened."""
+    if passes(event, value) and event[RISING] == AT_ONCE:
+        event[TIME], event[SIDE] = 0.0, 0.0
 
 
 @kernel()
@@ -340,7 +348,7 @@ def rows_ahead(
     x, v, f = saved[0], saved[1], saved[2]
     back = saved[3:]
     where, rates = np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
-    total, stopped, left = np.zeros(len(energies) + 3), False, breath
+    total, stopped, left = np.zeros(len(energies) + 3), events.shape[0] > 0 and ended_by(events), breath
     for n in range(ends.size):
         interval, begun = ends[n] - state[0], part[0]
         if lengths.size and not begun:

@@ -80,8 +80,8 @@ class System:
         if not waiting and all(family.at_rest for family in self.families):
             return self
         rest = copy.copy(self)
-        rest.__dict__.pop("pattern", None)
-        rest.__dict__.pop("loose", None)
+        for kept in ("pattern", "loose", "_inverse_mass"):
+            rest.__dict__.pop(kept, None)
         rest.supported = self.supported.copy()
         rest.supported[waiting] = True
         rest.supported[self.rows - self.net.spins :] = True
@@ -205,6 +205,43 @@ class System:
         i = np.repeat(net.cells[:, :, None], net.cells.shape[1], axis=2)
         pairs = (i.ravel(), i.swapaxes(1, 2).ravel())
         return coo_array((net.spread.ravel(), pairs), shape=(self.rows, self.rows)).tocsr()
+
+    @cached_property
+    def _inverse_mass(self):
+        """Free components that have mass, and the factorized mass matrix of these."""
+        from scipy.sparse.linalg import splu
+
+        heavy = np.repeat(self.net.mass, 3)[self.free] > 0.0
+        return self.free[heavy], splu(self.pattern.matrix(self.mass())[heavy][:, heavy].tocsc())
+
+    def _moved_by(self, push):
+        """M⁻¹ of a push on every row, for what is free: accelerations [m/s²] by forces; shape (rows, 3)."""
+        (at, mass), moved = self._inverse_mass, np.zeros((self.rows, 3))
+        moved.ravel()[at] = mass.solve(push.ravel()[at])
+        return moved
+
+    def kick(self, jump):
+        """Jump of all velocities where prescribed ones jump by ``jump`` [m/s]: consistent mass passes it on."""
+        return jump if self._spread is None else jump - self._moved_by(self._spread @ jump)
+
+    @cached_property
+    def links(self):
+        """The `refweb.links.Links` of what keeps distances."""
+        from .links import Links
+
+        return Links(self)
+
+    def balance(self, t, x, v):
+        """As `forces`, and with the forces of links; on supports less those that consistent mass takes to move.
+
+        What supports give is its negative.
+        """
+        force, out = self.forces(t, x, v)
+        if self.constraints:
+            force += self.links.force(x, v, force)
+        if self._spread is not None and not self.net.quasi_static:
+            force -= np.where(self.supported, self._spread @ self._moved_by(force), 0.0)
+        return force, out
 
     def momentum(self, v):
         """M v of every row [N s], shape (rows, 3)."""

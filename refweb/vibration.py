@@ -33,7 +33,8 @@ class Modes(Solution):
     Attributes
     ----------
     spectra : list of refweb.spectrum.Spectrum
-        Modes at each load step; of a dynamic scene one, at its equilibrium at t = 0.
+        Modes at each load step, the last with its shapes, the others without (None); of a dynamic scene one, at its
+        equilibrium at t = 0.
     """
 
     spectra: list = field(default_factory=list)

@@ -24,7 +24,7 @@ import numpy as np
 
 from .errors import SolverError
 from .inputs import InputError, nearest, real, shown
-from .io import check_folder, clear, write_atomically, write_text
+from .io import as_toml, check_folder, clear, write_atomically, write_text
 from .ladders import Dynamics, OverBudget, Statics, trials
 from .observables import DEFAULT, LINE, NODAL
 from .runner import versions, web_of
@@ -144,14 +144,12 @@ class Cost:
         InputError
             Where the folder is not empty or cannot be written.
         """
-        import tomli_w
-
         check_folder(folder, force)
         folder = pathlib.Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / "run.json", json.dumps(self.summary(), indent=1, ensure_ascii=False) + "\n")
         clear(folder)
-        write_text(folder / "scene.toml", tomli_w.dumps(self.scene.to_dict()))
+        write_text(folder / "scene.toml", as_toml(self.scene.to_dict()))
         lines = [",".join(map(str, row)) for row in (COLUMNS, *self.rows())]
         write_text(folder / "cost.csv", "\n".join(lines) + "\n")
         write_atomically(folder / "cost.png", self.draw().savefig)

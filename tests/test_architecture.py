@@ -28,14 +28,14 @@ LAYERS = [
     ["stepping"],
     ["pattern", "factor"],
     ["effects"],
-    ["lengths"],
+    ["lengths", "links"],
     ["effects.elasticity", "effects.gravity", "effects.load", "effects.motion", "effects.point_mass"]
     + ["effects.velocity", "effects.body", "effects.contact"]
     + ["effects.damping", "effects.bending"]
     + ["effects.frame", "effects.pressure", "effects.thrust"]
     + ["effects.reel", "effects.temperature", "effects.link"],
     ["system"],
-    ["certificate", "interior", "spectrum", "spin_limit", "follower_loads", "massless", "links"],
+    ["certificate", "interior", "spectrum", "spin_limit", "follower_loads", "massless"],
     ["statics", "central_difference"],
     ["nystrom"],
     ["implicit"],

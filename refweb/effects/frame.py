@@ -5,7 +5,8 @@ In axes that turn with the angular velocity Ω about a line through the origin a
     m (Ω²I − ΩΩᵀ) r − 2 m Ω × v,      with the potential −½ m |Ω × r|² of the first part.
 
 Coriolis forces do no work: kinetic energy and potentials, this one among them, keep their sum, the Jacobi integral. The
-moment of inertia I of a body whose rotation is followed feels −I Ω × ω, ω its angular velocity in these axes.
+moment of inertia I of a sphere whose rotation is followed feels −I Ω × ω, ω its angular velocity in these axes; a ring
+keeps its plane in these axes and turns about its normal, which that does not change.
 
 Consistent mass couples the nodes of an element here as it does in M v': the force is that of the position between them.
 """
@@ -20,6 +21,7 @@ import numpy as np
 
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import Table, vector
+from ..shapes import RING
 from . import Family, column
 
 MASS = 3
@@ -136,7 +138,7 @@ class Frame(Table):
 
         The centrifugal force lowers frequencies and makes no step of an explicit method shorter: it needs no bound.
         """
-        heavy, spins = net.heavy, np.arange(len(net.mass) - net.spins, len(net.mass))
+        heavy, spins = net.heavy, np.array([b.spin for b in net.bodies if b.spin is not None and b.kind != RING], int)
         pulled = column(heavy), self._numbers(net.mass[heavy], net.points[heavy])
         halves = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
         rows = np.concatenate([heavy, spins])
