@@ -267,7 +267,7 @@ class CentralDifference:
         for event in events:
             begins(event, values[int(event[SLOT])])
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
-        state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0])
+        state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0, np.inf])
         none, recent = np.zeros(len(signs)), np.full((len(signs), 4), np.nan)
         recent[:, 2], recent[:, 3] = 0.0, values
         return Run(state, saved, values, none, where[:, 0].copy(), book, np.zeros(3), events, recent)
@@ -295,20 +295,21 @@ class CentralDifference:
         Raises
         ------
         OpenBook
-            Where the energy drift exceeds `DRIFT`.
+            Where the energy drift exceeds `DRIFT` and does not fall.
         SolverError
             At the first number that is not finite; names node, line and time.
         """
         ends = np.atleast_1d(np.asarray(ends, dtype=float))
         history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
         step, start, linear = self.step_size or 0.0, run.time, self.system.rows - self.system.net.spins
+        least = 1.0 if self.step_size else 0.5 / self.safety
         work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
         done, part, breath = 0, np.zeros(2, dtype=np.int64), max(BREATH // max(work, 1), 1)
         carried = self._carried()
         try:
             while True:
                 more = rows_ahead(
-                    ends[done:], breath, part, *carried, self.safety * self.stretch, step, self.finer, DRIFT,
+                    ends[done:], breath, part, *carried, self.safety * self.stretch, least, step, self.finer, DRIFT,
                     self.kicks, self.drifts, run.state, run.saved, linear, *self._masses, self._moving, *self._ends,
                     *self._forces, self._seen, *self._energies, self._bounds, self._dampings, *self._drives,
                     self._corners, *self._peaks(run), self._watch, run.events, history[done:],
@@ -371,8 +372,19 @@ class CentralDifference:
             place = f"line {system.net.line[np.isin(system.net.cells, of.cells[cell]).sum(axis=1).argmax()]}"
         else:
             place = self.system.row_name(of.cells[cell, 0])
-        smaller = f"step_size than {self.step_size:g}" if self.step_size else f"safety than {self.safety:g}"
         raise OpenBook(
             f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, limit "
-            f"{DRIFT:g}: energy came in with {of.name} at {place}; use a smaller {smaller}"
+            f"{DRIFT:g}: energy came in with {of.name} at {place}; {self._remedy}"
         )
+
+    @property
+    def _remedy(self):
+        step = self.step_size
+        return f"use a smaller step_size than {step:g}" if step else f"use a smaller safety than {self.safety:g}"
+
+    def judge(self, run):
+        """Refuse a whole run whose energy drift exceeds `DRIFT`; `OpenBook`."""
+        if not run.drift <= DRIFT:
+            raise OpenBook(
+                f"energy drift {run.drift:.3g} of the largest energy of the run, limit {DRIFT:g}: {self._remedy}"
+            )

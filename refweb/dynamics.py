@@ -10,11 +10,12 @@ import numpy as np
 
 from . import probes
 from .errors import OpenBook
+from .inputs import InputError
 from .laws import SMOOTH
 from .observables import LINE, NODAL, TOTAL, Observe, Result
 from .solution import SOLVER
 from .state import State, floor_remark, strength_remark
-from .stepping import AT_ONCE, SIDE, TIME
+from .stepping import AT_ONCE, MOST, SIDE, TIME
 
 _VECTORS = ("momentum", "support_impulse")
 
@@ -103,6 +104,11 @@ def blocks(solver, run, times, stops, first=0):
     Yields
     ------
     (first row, rows of the solver)
+
+    Raises
+    ------
+    OpenBook
+        At the end, for a run whose energy drift exceeds its limit.
     """
     size = 1
     while first < len(times):
@@ -113,6 +119,9 @@ def blocks(solver, run, times, stops, first=0):
         first += count
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.05 else int(size * 0.1 / spent), 10000))
+        if run.stopped:
+            break
+    solver.judge(run)
 
 
 SPREAD = 3.0
@@ -203,8 +212,6 @@ class _Twin:
             rows = []
             for _, history in blocks(solver, run, *motion._times()):
                 rows.append(motion.table(history)[:, : 1 + len(motion.scene.observables)])
-                if run.stopped:
-                    break
                 if self._stop.is_set():
                     return
             self._ended = run, np.concatenate(rows)
@@ -263,6 +270,11 @@ class Motion:
         self.columns += [f"{name} [J]" for name in self.energies]
         self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
         self.explicit = scene.solve.method in ("central-difference", "explicit")
+        step, row = scene.solve.step_size, min(scene.output.interval, scene.solve.duration)
+        if step is not None and row > MOST * step:
+            raise InputError(
+                f"[solve] step_size = {step:g} must be ≥ {row / MOST:g} [s]: a row takes at most {MOST:g} steps"
+            )
         self._own = self._hidden()
         self._events = [self._event(event) for event in scene.event]
         self._accuracy = scene.solve.safety if self.explicit else scene.solve.rtol
@@ -416,7 +428,7 @@ class Motion:
             accuracy *= self._climb(max(falling))
             self._again(accuracy, folder)
             accuracy = self._closed(accuracy, folder, tell)
-            if solution.solver["nsteps"] < 1.1 * steps:  # rows shorter than steps: nothing was changed
+            if solution.solver["nsteps"] < 1.1 * steps:  # something else limits them: nothing was changed
                 before = self._missing = {}
         for name, share in missing_digits(solution.reduced, scene.accuracy.digits).items():
             falls = before.get(name, np.inf) > STUCK * share
@@ -502,8 +514,6 @@ class Motion:
                 if last in stops or run.stopped:
                     self._frame(last, folder, run)
                 tell((last + 1) / len(times))
-                if run.stopped:
-                    break
         finally:
             self._note(run)
         return self.results(run, self.rows[-1])

@@ -86,8 +86,6 @@ def _ensemble(motion, count, tell):
         run = solver.start(*_moved(motion, seed))
         for _, history in blocks(solver, run, *motion._times()):
             last = history[-1:]
-            if run.stopped:
-                break
         values.append([r.value for r in motion.results(run, motion.table(last)[0]).values()])
         tell("ensemble", seed / count)
     mean, spread = np.mean(values, axis=0), np.std(values, axis=0, ddof=1)

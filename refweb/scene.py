@@ -44,6 +44,17 @@ EFFECTS = {
     "reel": "refweb.effects.reel:Reel",
     "temperature": "refweb.effects.temperature:Temperature",
 }
+KINDS = {
+    "cable": ("Cable",),
+    "supports": ("Supports", "NoneType"),
+    "support": ("Supports",),
+    "solve": ("Static", "Dynamic"),
+    "output": ("Output",),
+    "accuracy": ("Accuracy", "NoneType"),
+    "observe": ("Observe",),
+    "event": ("Event",),
+}
+"""Classes of the other parts of a scene."""
 LISTS = ("load", "motion", "point_mass", "velocity", "body", "link", "pressure", "thrust", "reel")
 """Effects whose table may stand several times, ``[[load]]``."""
 STARTS = ("web", "equilibrium")
@@ -116,6 +127,14 @@ class Scene:
             object.__setattr__(self, key, tuple(getattr(self, key)))
         for effect in self.effects:
             table_of(effect)
+        for key, kinds in KINDS.items():
+            value = getattr(self, key)
+            for one in value if isinstance(value, tuple) else [value]:
+                if type(one).__name__ not in kinds:
+                    names = " or ".join(f"refweb.{kind}" for kind in kinds if kind != "NoneType")
+                    raise InputError(f"{key} = {shown(one)} must be {names}")
+        if type(self.web).__name__ != "Web" and not (isinstance(self.web, Table) and hasattr(self.web, "web")):
+            raise InputError(f"web = {shown(self.web)} must be a refweb.Web, or one of the tables that make one")
         self._fill()
 
     def _fill(self):
@@ -149,6 +168,8 @@ class Scene:
         InputError
             Where there is no such file or scene, or it is wrong.
         """
+        if not isinstance(source, (str, os.PathLike)):
+            raise InputError(f"scene = {shown(source)} must be a Scene, a scene file or the name of a shipped scene")
         path, shipped = pathlib.Path(source), sorted(SHIPPED.glob("*.toml"))
         if not os.path.isfile(path):
             known = [p.stem for p in shipped]

@@ -11,7 +11,11 @@ from .lines import LENGTH
 from .probes import PLACE
 
 DRIFT = 1e-2
-"""Largest energy drift of a run whose result is returned."""
+"""Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
+CLOSING = 0.9
+"""Factor by which a drift above `DRIFT` has to fall from row to row, over the largest energy until then, for the run to
+go on: where a load rises from zero on a web at rest, the first rows hold a few steps' errors against next to nothing.
+"""
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
 MOST = 1e8
@@ -326,7 +330,7 @@ def ended_by(events):
 
 @kernel()
 def rows_ahead(
-    ends, breath, part, power, pull, safety, step_size, finer, limit, kicks, drifts,
+    ends, breath, part, power, pull, safety, least, step_size, finer, limit, kicks, drifts,
     state, saved, linear, mass, inverse, free, held, driven, working, powers, still, viscous,
     kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives,
     drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data,
@@ -335,11 +339,13 @@ def rows_ahead(
 ):  # fmt: skip
     """Advance to each time of ``ends`` and write a row of ``history`` there.
 
-    ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift). Returns the rows that are
-    done: fewer than asked for where a number is not finite or the drift is above ``limit``; then ``saved`` holds
-    x, v and f at the row before; −1 where a row takes more than `MOST` steps. Where an event ends the run, that row is
-    the last, and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is
-    felt; ``part`` then holds the steps taken of a row and the steps of it, and is (0, ...) between rows.
+    ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift, drift at the last row over
+    the largest energy). Returns the rows that are done: fewer than asked for where a number is not finite, or the drift
+    is above ``limit`` and does not fall (`CLOSING`); then ``saved`` holds x, v and f at the row before; −1 where a row
+    takes more than `MOST` steps. A row takes ``least`` steps at least, so that a smaller ``safety`` makes them shorter
+    there as well where rows are. Where an event ends the run, that row is the last, and its time that of the event.
+    After ``breath`` steps it returns as well, so that an interruption is felt; ``part`` then holds the steps taken of a
+    row and the steps of it, and is (0, ...) between rows.
 
     ``corners`` are the times at which a factor of natural lengths has a corner, increasing, then ∞ for the end of a row
     if there are such factors, then −∞ for its start. The step of a row is safe at all of them: in between a length is a
@@ -382,7 +388,7 @@ def rows_ahead(
             if steps > MOST:
                 state[2] = interval / steps
                 return -1
-            count = max(int(math.ceil(steps * (1.0 - 1e-9))), 1)
+            count = max(int(math.ceil(max(steps, least) * (1.0 - 1e-9))), 1)
             if finer > 1.0:
                 count = int(math.ceil(finer * count))
             part[1] = count
@@ -427,8 +433,13 @@ def rows_ahead(
         state[4] = max(state[4], stored)
         drift = abs(energy - total[total.size - 2] - state[3])
         state[5] = max(state[5], drift)
-        if not math.isfinite(drift) or (drift > limit * state[4]):
+        if not math.isfinite(drift):
             return n
+        if state[4] > 0.0:
+            share, before = drift / state[4], state[6]
+            state[6] = share
+            if share > limit and share > CLOSING * before:
+                return n
         if stopped:
             return n + 1
     return ends.size

@@ -4,11 +4,13 @@ Central differences note an event at the end of the step that it happens in; CVO
 interpolation, as exactly as that is. Either says by ± how far off that may be.
 """
 
+import dataclasses
 import json
 
 import meshio
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import refweb
 
@@ -95,6 +97,46 @@ def test_first_touch_of_falling_balls(solve):
     for name, exact in (("None", low), ("low", low), ("high", high)):
         agrees(solution, name, exact, within=1e-9)
     assert times(solution)["past"] is None
+
+
+@pytest.mark.parametrize("solve", METHODS, ids=NAMES)
+def test_a_contact_that_is_there_at_the_start(solve):
+    """A body inside of the web touches it at t = 0; a run that ends there has that row and no other."""
+    deep = ball(position=(0.0, 0.0, 0.0999), velocity=(0.0, 0.0, 1.0))
+    for stop in (False, True):
+        event = [refweb.Event(name="touch", kind="contact", stop=stop)]
+        solution = refweb.run(scene(event, solve, 0.01, **held_line(effects=[deep, refweb.Contact(stiffness=1e4)])))
+        assert solution.events == [{"name": "touch", "time": 0.0, "error": 0.0}]
+        assert solution.history["time"][-1] == solution.state.time == (0.0 if stop else 0.01)
+
+
+@pytest.mark.parametrize("solve", METHODS, ids=NAMES)
+def test_first_touch_in_a_turning_frame(solve):
+    """A ball falls on a line along x that turns about z: seen from outside it flies straight on.
+
+    What the frame adds to its forces is not contact: before the touch that is zero, afterwards not.
+    """
+    speed, height = 10.0, 0.1 + 0.03
+    web = refweb.Inline(points=[[0.2, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])
+    falling = ball(position=(0.5, 0.0, height), velocity=(0.0, 0.0, -1.0))
+    fields = dict(web=web, cable=cable(density=200.0), effects=[falling, refweb.Contact(stiffness=1e4)])
+    fields["effects"].append(refweb.Frame(angular_velocity=(0.0, 0.0, speed)))
+    force = refweb.Observe(name="force", quantity="reaction", body="ball", reduce="final")
+
+    def gap(t):
+        outside = np.array([0.5, 0.5 * speed * t])
+        aside = np.cos(speed * t) * outside[1] - np.sin(speed * t) * outside[0]
+        return np.hypot(aside, height - t) - 0.1
+
+    touch = brentq(gap, 0.01, 0.05)
+    assert touch > height - 0.1 + 1e-5  # it has moved aside
+    solution = refweb.run(scene([refweb.Event(name="touch", kind="contact")], solve, 0.05, [force], **fields))
+    agrees(solution, "touch", touch, within=1e-8)
+    history = solution.history
+    before = history["time"] <= touch
+    assert np.abs(history["force"][before]).max() < 1e-12 and (history["force"][~before] > 0.1).all()
+    body = solution.state.system.net.bodies[0].row
+    np.testing.assert_allclose(history["force"][-1], np.linalg.norm(solution.state.reaction[body]), rtol=1e-9)
 
 
 # A line that snaps taut
@@ -266,6 +308,27 @@ def test_a_run_stops_at_its_event(solve, tmp_path):
     below = kept.results["x"].value * RATE
     assert -0.5 - STEP < below <= -0.5 + PHASE
     assert kept.results["y"].value == kept.results["x"].value
+
+
+def test_an_event_that_ends_one_of_two_runs():
+    """A value between the peaks of a run and its twin: one of them passes it, and no difference says anything."""
+    largest = refweb.Observe(name="x", quantity="displacement", node=1, component="x", reduce="max")
+    period, peaks = 2.0 * np.pi / RATE, []
+    for steps in (41, 58):  # ⌈√2 · 41⌉
+        solve = dict(method="central-difference", step_size=period / steps * (1.0 + 1e-12))
+        run = refweb.run(oscillator((), solve, [largest], period, interval=period, error="none"))
+        assert run.solver["nsteps"] == steps
+        peaks.append(run.results["x"].value)
+    assert abs(peaks[1] - peaks[0]) > 1e-6 * peaks[0]
+    event = [refweb.Event(name="far", kind="threshold", observe="x", value=np.mean(peaks), stop=True)]
+    solve = dict(method="central-difference", step_size=period / 41 * (1.0 + 1e-12))
+    solution = refweb.run(
+        oscillator(event, solve, [largest, dataclasses.replace(PLACE, name="last")], period, interval=period)
+    )
+    assert [result.error for result in solution.results.values()] == [None, None]
+    (warning,) = solution.warnings
+    which = "the run" if solution.events[0]["time"] is not None else "its twin of a smaller error"
+    assert warning == f"no errors are known: an event ends {which} and not the other of the two"
 
 
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)

@@ -3,6 +3,7 @@
 What is left opens, says that it is not solved, and goes on with ``refweb resume``.
 """
 
+import errno
 import json
 import os
 import pathlib
@@ -314,6 +315,40 @@ def test_solved_and_static_runs_are_not_resumed(tmp_path, capsys, interrupted):
     (tmp_path / "static" / "run.json").write_text(text.replace('"solved"', '"interrupted"'))
     assert main(["resume", str(tmp_path / "static")]) == 2
     assert "no dynamic run" in capsys.readouterr().err
+
+
+def test_a_diagram_is_not_resumed(tmp_path, capsys, interrupted):
+    """The folder of ``refweb cost`` holds no run to go on with, and keeps what it holds."""
+    folder = tmp_path / "run"
+    shutil.copytree(interrupted, folder)
+    (folder / "run.json").write_text(json.dumps({**summary_of(folder), "kind": "cost"}))
+    (folder / "cost.csv").write_text("method\n")
+    before = files(folder)
+    assert main(["resume", str(folder)]) == 2
+    assert "no dynamic run" in capsys.readouterr().err and files(folder) == before
+
+
+@pytest.mark.parametrize("name, content", [("checkpoint.npz", None), ("run.json", b"[]"), ("run.json", b"{")])
+def test_a_spoilt_folder_is_still_drawn(tmp_path, interrupted, name, content):
+    """Supports and title are then those that frames and the folder's name tell."""
+    folder = tmp_path / "run"
+    shutil.copytree(interrupted, folder)
+    path = folder / name
+    path.write_bytes(path.read_bytes()[:-100] if content is None else content)
+    assert main(["picture", str(folder)]) == 0
+    assert (folder / "web.png").stat().st_size > 10_000
+
+
+def test_a_static_row_that_cannot_be_written(tmp_path, monkeypatch, capsys):
+    """The first one: the message is that of the disk."""
+
+    def full(self, numbers):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(refweb.io.Folder, "row", full)
+    assert main(["run", "square-load", "--out", str(tmp_path / "out")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "No space left on device" in err
 
 
 def test_other_versions_are_told(tmp_path, interrupted):

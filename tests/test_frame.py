@@ -295,6 +295,26 @@ def test_radial_arm_and_the_force_on_its_rail():
         assert abs(slope(error, 1.0 / counts) - 2.0) < 0.05
 
 
+def test_a_ring_keeps_turning_about_its_normal():
+    """It keeps its plane in the frame, whose gyroscopic moment changes the plane alone; a sphere's spin turns back."""
+    normal = np.array([1.0, 0.0, 0.0])
+    for shape, expected in (("ring", lambda t: 5.0 * normal), ("sphere", None)):
+        body = dict(normal=normal) if shape == "ring" else {}
+        body = refweb.Body(
+            name="b", shape=shape, radius=0.05, mass=1.0, position=(0, 0, 0.5), angular_velocity=5.0 * normal, **body
+        )
+        net = lines.build(arm(), cable())
+        effects = [Elasticity(), body, refweb.Contact(stiffness=1e4, friction=0.3)]
+        system = System(net, [*effects, refweb.Frame(angular_velocity=(0, 0, 1.0))], np.ones((2, 3), dtype=bool))
+        _, v, _ = at_time(system, 0.5, CentralDifference)
+        spin = v[system.net.bodies[0].spin]
+        if expected is None:
+            # Of order 2 in steps of ... of the turn.
+            np.testing.assert_allclose(spin, 5.0 * np.array([np.cos(0.5), -np.sin(0.5), 0.0]), atol=5e-3)
+        else:
+            np.testing.assert_array_equal(spin, expected(0.5))
+
+
 def wheel(speed, frame, consistent=False):
     """A free taut web of 0.8 m with a kick, seen from the frame it turns in or from outside: system, x and v."""
     web = refweb.Layers(mesh="hexagon", layers=2, cell_area=0.04).web()

@@ -2,6 +2,9 @@
 
 import csv
 import json
+import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 
 import meshio
@@ -330,6 +333,22 @@ def test_a_save_that_is_cut_short_is_marked(tmp_path, solution, monkeypatch):
     with pytest.raises(refweb.SolverError, match="disk full"):
         solution.save(tmp_path / "out")
     assert read_json(tmp_path / "out")["status"] == "running" and listed(tmp_path / "out") == []
+
+
+def test_a_folder_saved_onto_itself_stays(tmp_path):
+    solution = refweb.run(scene(), out=tmp_path / "out")
+    before = contents(tmp_path / "out")
+    solution.save(tmp_path / "out", force=True)
+    assert contents(tmp_path / "out") == before
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions are those of POSIX")
+def test_files_have_the_permissions_of_the_user(tmp_path):
+    """In a process of its own, whose mask counts."""
+    code = f"import os, refweb; os.umask(0o077); refweb.run('square-load', out={str(tmp_path / 'out')!r})"
+    subprocess.run([sys.executable, "-c", code], check=True)
+    files = [path for path in (tmp_path / "out").rglob("*") if path.is_file()]
+    assert len(files) > 4 and {path.stat().st_mode & 0o777 for path in files} == {0o600}
 
 
 def test_nothing_is_left_of_a_refused_run(tmp_path):

@@ -569,6 +569,14 @@ UNFIT = {
         ['equilibrum": is no folder; it must be "web", "equilibrium" or a result folder'],
     ),
     "file": ({"solve.start": "scene.toml"}, ['scene.toml": is no folder']),
+    "refine": (
+        {"solve.start": "nowhere", "accuracy": {"refine": True}},
+        ['[accuracy] refine = true must be false with [solve] start = "nowhere"', "finer ones have other nodes"],
+    ),
+    "step": (
+        {"solve.step_size": 1e-15},
+        ["[solve] step_size = 1e-15 must be ≥ 1e-11 [s]: a row takes at most 1e+08 steps"],
+    ),
     "no result": ({"solve.start": "."}, ["checkpoint.npz cannot be read: No such file", "a result folder"]),
 }
 
@@ -648,6 +656,12 @@ def test_scene_in_python():
         refweb.Scene(web=web, cable=cable, title="a\nb")
     with pytest.raises(refweb.InputError, match="str is no effect"):
         refweb.Scene(web=web, cable=cable, effects=["gravity"])
+    wrong = {"web": {"kind": "window"}, "cable": None, "solve": "static", "output": None, "accuracy": 4}
+    for key, value in {**wrong, "observe": [3], "event": [None], "support": [[0]], "supports": [0]}.items():
+        with pytest.raises(refweb.InputError, match=rf"^{key} = .* must be a? ?refweb\."):
+            refweb.Scene(**{"web": web, "cable": cable, key: value})
+    with pytest.raises(refweb.InputError, match="scene = 5 must be a Scene, a scene file or the name of a shipped"):
+        refweb.run(5)
     gravity = refweb.Gravity(acceleration=(0, 0, -1))
     with pytest.raises(refweb.InputError, match="stands 2 times"):
         refweb.Scene(web=web, cable=cable, effects=[gravity, gravity]).build()
