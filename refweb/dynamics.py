@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import threading
 import time
@@ -278,7 +279,7 @@ class Motion:
         self._own = self._hidden()
         self._events = [self._event(event) for event in scene.event]
         self._accuracy = scene.solve.safety if self.explicit else scene.solve.rtol
-        self._repeated, self._missing, self._kept = 0, {}, kept
+        self._first, self._repeated, self._missing, self._kept = self._accuracy, 0, {}, kept
         if kept is not None:
             self._accuracy, self._repeated = float(kept["accuracy"]), int(kept["repeated"])
             self._missing = dict(zip(kept["missing"].tolist(), kept["shares"].tolist(), strict=True))
@@ -462,9 +463,10 @@ class Motion:
         scene, solution = self.scene, self.solution
         for attempt in range(self._repeated, 3):
             self._repeated = attempt
+            text = "running" if accuracy == self._first else f"running with {self._key} = {accuracy:g}"
             with _Twin(self, accuracy, scene.accuracy.error == "twin") as twin:
                 try:
-                    results = self._run(self._solver, folder, lambda share: tell("running", share))
+                    results = self._run(self._solver, folder, functools.partial(tell, text))
                 except OpenBook as error:
                     if attempt == 2 or scene.solve.step_size is not None:
                         raise

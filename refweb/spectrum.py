@@ -9,6 +9,10 @@ without mass have no frequency and follow the others.
 With M definite there is an eigenvalue within ‖Kφ − ω²Mφ‖ of ω², in the norm of M⁻¹ and with φᵀMφ = 1. To this bound
 come the rounding of K, and what the error that is left in the equilibrium changes in ω²: K is assembled once more after
 another Newton step.
+
+In a frame that turns K has the centrifugal force, and Coriolis forces are left out: ω²Mφ = (K + iωG)φ with G of the
+norm 2Ω has by Weyl's inequality its frequencies between √(Ω² + ω²) ± Ω, which the bound holds for every mode that they
+act on. Those along the axis feel none.
 """
 
 from __future__ import annotations
@@ -244,6 +248,17 @@ class _Pencil:
         left = np.linalg.norm(vectors.T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too
         return residual, residual + _EPS * rounding + left
 
+    def _turned(self, squared, vectors):
+        """How far Coriolis forces may move ω²."""
+        system = self.system
+        turning = next((f.data[0, :3] for f in system.families if f.name == "frame"), np.zeros(3))
+        shapes = np.zeros((vectors.shape[1], system.rows, 3))
+        shapes.reshape(len(shapes), -1)[:, system.free] = vectors.T
+        force = np.where(system.supported, 0.0, np.cross(turning, shapes))
+        speed = np.linalg.norm(turning)
+        felt = abs(force).max(axis=(1, 2)) > 1e-9 * speed * abs(shapes).max(axis=(1, 2))
+        return np.where(felt, 2.0 * speed * (speed + np.sqrt(speed**2 + np.maximum(squared, 0.0))), 0.0)
+
     def described(self, vectors, unstable, zero):
         """The `Spectrum` of vectors."""
         system = self.system
@@ -251,6 +266,7 @@ class _Pencil:
         squared = (vectors * (self.K @ vectors)).sum(axis=0)
         vectors, squared = vectors[:, (order := np.argsort(squared))], squared[order]
         residual, bound = self._bounds(squared, vectors)
+        bound = bound + self._turned(squared, vectors)
         modes = np.arange(len(squared))
         shapes = np.zeros((len(modes), system.rows, 3))
         shapes.reshape(len(modes), -1)[:, system.free] = vectors.T

@@ -251,8 +251,9 @@ def _remarks(here, state):
 
 def _notices(system):
     """What the modes leave out."""
-    still = np.zeros((system.rows, 3))
-    if system.damping(0.0, still, still) is not None:
-        yield "forces that depend on velocity, damping or Coriolis forces, are left out"
+    if system.turns:
+        yield "Coriolis forces are left out: ± holds how far they may move the frequency of a mode that they act on"
+    if any(family.damping is not None and family.name != "frame" for family in system.families):
+        yield "forces that depend on velocity, such as damping, are left out"
     if free := [body.name for body in system.net.bodies if not body.fixed]:
         yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

@@ -91,13 +91,14 @@ class Cost:
     def price(self, digits, method=None):
         """The cheapest `Trial` from which on a method keeps so many digits of the observable, None where none does.
 
-        Of one method, or of all. What the references cannot tell counts as none; other smoothings than the scene's are
-        other laws, and not among the methods.
+        Of one method, or of all but DOP853, which no scene can ask for. What the references cannot tell counts as none;
+        other smoothings than the scene's are other laws, and not among the methods.
         """
         limit, best = self.scale * 10.0**-digits, []
         if not self.trust[0] <= limit:
             return None
-        for name in {t.method for t in self.trials if t.key != "smoothing" and method in (None, t.method)}:
+        methods = {t.method for t in self.trials if t.key != "smoothing"}
+        for name in methods - {"dop853"} if method is None else methods & {method}:
             ladder = [t for t in self.trials if t.method == name and t.status == "solved"]
             best += takewhile(lambda t: t.error_observable <= limit, reversed(ladder))
         return min(best, key=lambda t: t.cpu_s, default=None)
