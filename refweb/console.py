@@ -204,7 +204,8 @@ def _modes(step):
 
 
 def _equal(one, other):
-    return abs(one["value"] - other["value"]) <= max(one["error"] + other["error"], 1e-9 * abs(one["value"]))
+    within = min(one["error"] + other["error"], 1e-6 * abs(one["value"]))  # in a turning frame ± says nothing of that
+    return abs(one["value"] - other["value"]) <= max(within, 1e-9 * abs(one["value"]))
 
 
 def work_precision(summary):
