@@ -63,7 +63,7 @@ def shown(value):
     if isinstance(value, bool):
         return str(value).lower()
     try:
-        return short(str(value))
+        return short(str(list(value) if isinstance(value, tuple) else value))
     except (ValueError, RecursionError):  # a number of thousands of digits, lists in lists in lists
         return f"a {type(value).__name__} too large to show"
 

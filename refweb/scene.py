@@ -344,7 +344,7 @@ class Scene:
             here = f'kind = "{self.solve.kind}" and method = "{self.solve.method}"'
             raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = "ida", not {here}')
         if self.solve.start == "equilibrium":
-            raise InputError('[solve] start = "equilibrium" must be "web" or a result folder with [[link]]')
+            raise InputError('[solve] start = "equilibrium" knows no [[link]]: it must be "web" or a result folder')
 
     def _check_event(self, event, number, system):
         if event.name in (names := [e.name for e in self.event])[:number]:

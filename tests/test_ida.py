@@ -403,7 +403,7 @@ def test_other_solvers_refuse_links():
 def test_no_links_in_an_equilibrium_to_start_from():
     solve = dict(kind="dynamic", duration=1.0, method="ida")
     refweb.Scene.from_dict({**SCENE, "solve": solve}).build()
-    with pytest.raises(InputError, match='start = "equilibrium" must be "web" or a result folder'):
+    with pytest.raises(InputError, match='start = "equilibrium" knows no'):
         refweb.Scene.from_dict({**SCENE, "solve": {**solve, "start": "equilibrium"}}).build()
 
 

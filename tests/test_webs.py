@@ -343,7 +343,7 @@ def test_arrays_are_typed_and_read_only():
         (dict(names={"tip": 7}), "names.tip[0] = 7 must be 0 … 2"),
         (dict(names={"tip": 0.5}), "names.tip = 0.5 must be a whole number ≥ 0"),
         (dict(names=3), "names = 3 must be a table of node numbers, such as {tip = 3}"),
-        (dict(names={"rim": 0}), "names.rim = (0,): centre, rim, corners, all have a meaning of their own"),
+        (dict(names={"rim": 0}), "names.rim = [0]: centre, rim, corners, all have a meaning of their own"),
         (dict(groups=["a"]), "groups has 1 entries for 3 lines"),
     ],
 )
