@@ -14,7 +14,28 @@ _DENSE = dict(at_least=0, unit="kg/m³")
 
 @dataclass(frozen=True, kw_only=True)
 class Group(Table):
-    """What may differ from `Cable` on the lines of one group; None keeps the cable's value."""
+    """What may differ from `Cable` on the lines of one group; None keeps the cable's value.
+
+    Parameters
+    ----------
+    modulus : float, optional
+        Asymptotic modulus E [Pa], > 0.
+    area : float, optional
+        Cross section A [m²], > 0.
+    density : float, optional
+        ρ [kg/m³], ≥ 0.
+    slackness, smoothing : float, optional
+        ε0 and η of the smooth law [1], ≥ 0.
+    prestrain : float, optional
+        Natural length = distance/(1 + prestrain) [1], > −1.
+    strength : float, optional
+        Stress at which a line breaks [Pa], > 0.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite or out of these bounds.
+    """
 
     modulus: float | None = real(None, above=0, unit="Pa")
     area: float | None = real(None, above=0, unit="m²")
@@ -60,6 +81,13 @@ class Cable(Table):
         Elements per line.
     groups : dict of str to Group
         Values that differ by group of lines.
+
+    Raises
+    ------
+    InputError
+        For an unknown law or order, a number out of these bounds, and slackness or smoothing, of a group as well, with
+        another law than the smooth one; from ``properties``, for a group that no line has, prestrain of a web whose
+        natural lengths are given, and a line whose stiffness or mass is above `refweb.inputs.LARGEST`.
     """
 
     law: str = choice(*NAMES, default="smooth")

@@ -101,6 +101,11 @@ class Paper(Table):
         755, 1677 and 3554 nodes.
     cable_length : float
         Total length of cable [m]; the paper's webs share one.
+
+    Raises
+    ------
+    InputError
+        For an unknown mesh, and a length that is not finite and > 0.
     """
 
     kind: str = choice("paper", default="paper")
@@ -149,6 +154,7 @@ class Window(Table):
     side: float = real(above=0, unit="m")
 
     def check(self):
+        """Refuse sizes at which nothing hangs together, and more than a million cells."""
         for name, least in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
             if getattr(self, name) < least:
                 raise InputError(f'{name} = {getattr(self, name)} must be ≥ {least} for mesh = "{self.mesh}"')
@@ -172,6 +178,11 @@ class Layers(Table):
         N ≥ 1.
     cell_area : float
         Area A of a mesh [m²].
+
+    Raises
+    ------
+    InputError
+        For an unknown mesh, layers < 1, and an area that is not finite and > 0; from ``web``, above a million cells.
     """
 
     kind: str = choice("layers", default="layers")

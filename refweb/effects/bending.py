@@ -172,6 +172,17 @@ class Bending(Table):
     ----------
     stiffness : float
         B = E I [N m²]. Springs are those of the natural lengths that the web is made with.
+
+    Raises
+    ------
+    InputError
+        For a stiffness that is not > 0; from ``on``, for elements of an order above 1, and a web in which no element
+        continues another within 30°.
+
+    References
+    ----------
+    The springs B/L̄ are those of the multi-particle model of *Dynamic modelling and analysis of space webs*, Sci
+    China-Phys Mech Astron 54 (2011), section 2.3.
     """
 
     stiffness: float = real(above=0, unit="N·m²")

@@ -184,6 +184,13 @@ class Contact(Table):
         explicit method are in proportion to it where friction rules them.
     bodies : dict of str to BodyContact
         What differs for a body.
+
+    Raises
+    ------
+    InputError
+        For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from
+        ``extend``, for a body that turns and has no friction; from ``on``, without a body, and for one of ``bodies``
+        that is none.
     """
 
     stiffness: float = real(above=0, unit="N/m")

@@ -112,6 +112,18 @@ class Pressure(Table):
     factor : sequence of (t, factor), optional
         Multiplies p; linear in between, end values held. Without it p acts in full, or, in statics, times the load
         step.
+
+    Raises
+    ------
+    InputError
+        For a normal that is zero, numbers that are not finite, and a factor without rows or whose times do not
+        increase; from ``on``, for a line or a group that the web does not have, and a line that has the point on
+        neither side.
+
+    References
+    ----------
+    K. Schweizerhof, E. Ramm, "Displacement dependent pressure loads in nonlinear finite element analyses", Comput.
+    Struct. 18 (1984) 1099–1114: stiffness of such loads, and when they have a potential.
     """
 
     lines: object = field(_lines)
@@ -121,6 +133,7 @@ class Pressure(Table):
     factor: tuple | None = rows(2, None, increasing=True)
 
     def check(self):
+        """Refuse a normal without direction."""
         if not any(self.normal):
             raise InputError("normal = [0, 0, 0] must have a direction")
 

@@ -45,6 +45,12 @@ class Temperature(Table):
         and end values held. In statics t is the load step.
     groups : dict of str to GroupTemperature
         Values that differ by group of lines.
+
+    Raises
+    ------
+    InputError
+        For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines; from
+        ``on``, for a group that no line has.
     """
 
     expansion: float = real(unit="1/K")

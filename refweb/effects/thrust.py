@@ -98,6 +98,12 @@ class Thrust(Table):
     factor : sequence of (t, factor), optional
         Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
         times the load step.
+
+    Raises
+    ------
+    InputError
+        For a force that is not finite, and a factor without rows or whose times do not increase; from ``on``, for what
+        is not one node of the web, and a line that does not end at it.
     """
 
     node: object = nodes()
