@@ -133,13 +133,13 @@ def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARG
     return field(read, default, unit)
 
 
-def integer(default=MISSING, *, at_least=None, at_most=None, unit=""):
+def integer(default=MISSING, *, at_least=None, at_most=None):
     """A whole number within bounds."""
 
     def read(name, value):
-        return _bounded(name, _whole(name, value), unit, None, at_least, None, at_most)
+        return _bounded(name, _whole(name, value), "", None, at_least, None, at_most)
 
-    return field(read, default, unit)
+    return field(read, default)
 
 
 def choice(*names, default=MISSING):
@@ -219,7 +219,7 @@ def node_number(name, value):
     return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
 
 
-def numbers_list(default=MISSING, *, unit="", number=_number, empty=False):
+def numbers_list(default=MISSING, *, number=_number, empty=False):
     """A list of numbers; ``number=node_number`` for whole numbers ≥ 0."""
 
     def read(name, value):
@@ -228,7 +228,7 @@ def numbers_list(default=MISSING, *, unit="", number=_number, empty=False):
             _refuse(name, value, "a list with at least one number")
         return tuple(number(f"{name}[{i}]", x) for i, x in enumerate(value))
 
-    return field(read, default, unit)
+    return field(read, default)
 
 
 def texts(default=MISSING):
