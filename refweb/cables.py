@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .inputs import LARGEST, InputError, Table, choice, field, integer, nearest, real, short, shown
+from .inputs import LARGEST, InputError, Table, by_group, choice, integer, nearest, real, shown
 from .laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")
@@ -44,15 +44,6 @@ class Group(Table):
     smoothing: float | None = real(None, at_least=0, unit="1")
     prestrain: float | None = real(None, above=-1, unit="1")
     strength: float | None = real(None, above=0, unit="Pa")
-
-
-def _groups(name, value):
-    if not isinstance(value, dict):
-        raise InputError(f"{name} = {shown(value)} must be a table of groups, [cable.groups.NAME]")
-    return {
-        key: group if isinstance(group, Group) else Group.read(f"{name}.{short(key)}", group)
-        for key, group in value.items()
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +91,7 @@ class Cable(Table):
     strength: float | None = real(None, above=0, unit="Pa")
     order: int = choice(1, 2, 3, default=1)
     subdivide: int = integer(1, at_least=1, at_most=1000)
-    groups: dict = field(_groups, factory=dict)
+    groups: dict = by_group(Group, "cable")
 
     def check(self):
         """Fill in the smooth law's parameters; refuse them for other laws."""

@@ -340,3 +340,17 @@ class Table:
 
         pairs = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
         return {name: plain(value) for name, value in pairs if value is not None}
+
+
+def by_group(kind, where):
+    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
+
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")
+        return {
+            key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
+            for key, group in value.items()
+        }
+
+    return field(read, factory=dict)

@@ -17,7 +17,7 @@ from refweb.inputs import Table
 
 LAYERS = [
     ["inputs", "errors", "compiled"],
-    ["shapes", "memory"],
+    ["shapes", "memory", "vectors"],
     ["contact_points", "bodies"],
     ["shape_contacts"],
     ["penalty"],

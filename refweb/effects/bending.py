@@ -22,22 +22,13 @@ import numpy as np
 
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import InputError, Table, real
+from ..vectors import cross, dot
 from . import Family
 
 LARGEST = math.radians(30.0)
 """Largest angle between elements that continue each other in the web's position."""
 ROUNDING = 1e-9
 """Angles that differ by less are the same [rad]."""
-
-
-@kernel()
-def cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel()
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel()

@@ -20,7 +20,7 @@ import numpy as np
 from ..compiled import BOUND, FORCE, STIFFNESS, kernel
 from ..inputs import InputError, Table, field, nearest, node_number, numbers_list, real, rows, shown, vector
 from ..lines import REFERENCE
-from ..time_tables import factor, factor_at
+from ..time_tables import factor, factor_at, largest
 from . import Family
 
 # Columns of data: p n; dX/dξ; the largest |factor|; the factor.
@@ -144,9 +144,7 @@ class Pressure(Table):
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
         pushed = self.value * sides[net.line[at], None] * normal
-        times = factor(self.factor, net.quasi_static)
-        most = max((abs(row[1]) for row in self.factor or ()), default=1.0)
-        numbers = np.tile([most, *times], (len(at), 1))
+        numbers = np.tile([largest(self.factor), *factor(self.factor, net.quasi_static)], (len(at), 1))
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         return Family(
             name="pressure",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs import InputError, Table, field, nearest, real, rows, short, shown
+from ..inputs import InputError, Table, by_group, field, nearest, real, rows, short, shown
 from ..lengths import scaled
 
 
@@ -21,15 +21,6 @@ class GroupTemperature(Table):
 
     expansion: float | None = real(None, unit="1/K")
     change: object = field(_change, None)
-
-
-def _groups(name, value):
-    if not isinstance(value, dict):
-        raise InputError(f"{name} = {shown(value)} must be a table of groups, [temperature.groups.NAME]")
-    return {
-        key: group if isinstance(group, GroupTemperature) else GroupTemperature.read(f"{name}.{short(key)}", group)
-        for key, group in value.items()
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +46,7 @@ class Temperature(Table):
 
     expansion: float = real(unit="1/K")
     change: object = field(_change, unit="K")
-    groups: dict = field(_groups, factory=dict)
+    groups: dict = by_group(GroupTemperature, "temperature")
 
     def check(self):
         """Refuse a natural length that is not positive."""
