@@ -16,7 +16,7 @@ import refweb
 from refweb.inputs import Table
 
 LAYERS = [
-    ["inputs", "errors", "compiled"],
+    ["inputs", "errors", "compiled", "units"],
     ["shapes", "memory", "vectors"],
     ["contact_points", "bodies"],
     ["shape_contacts"],
