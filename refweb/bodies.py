@@ -89,8 +89,9 @@ def _corners(body, normals):
     return side * body.core
 
 
-def _sphere(level=24):
+def _sphere():
     """Unit sphere as points and triangles."""
+    level = 24
     polar = np.linspace(0.0, np.pi, level // 2 + 1)[1:-1]
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)
     rings = np.stack(
@@ -112,9 +113,9 @@ def _sphere(level=24):
     return points, np.vstack(triangles)
 
 
-def _tube(radius, level=48, sides=8):
+def _tube(radius):
     """Ring about the third axis as points and triangles; its outer edge has the radius."""
-    thin = TUBE * radius
+    level, sides, thin = 48, 8, TUBE * radius
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)[:, None]
     across = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     out = radius - thin + thin * np.cos(across)

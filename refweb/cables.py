@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from .inputs import LARGEST, InputError, Table, choice, field, integer, nearest, real, short, shown
+from .inputs import LARGEST, InputError, Table, by_group, choice, integer, nearest, real, shown
 from .laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")
@@ -14,7 +14,28 @@ _DENSE = dict(at_least=0, unit="kg/m³")
 
 @dataclass(frozen=True, kw_only=True)
 class Group(Table):
-    """What may differ from `Cable` on the lines of one group; None keeps the cable's value."""
+    """What may differ from `Cable` on the lines of one group; None keeps the cable's value.
+
+    Parameters
+    ----------
+    modulus : float, optional
+        Asymptotic modulus E [Pa], > 0.
+    area : float, optional
+        Cross section A [m²], > 0.
+    density : float, optional
+        ρ [kg/m³], ≥ 0.
+    slackness, smoothing : float, optional
+        ε0 and η of the smooth law [1], ≥ 0.
+    prestrain : float, optional
+        Natural length = distance/(1 + prestrain) [1], > −1.
+    strength : float, optional
+        Stress at which a line breaks [Pa], > 0.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite or out of these bounds.
+    """
 
     modulus: float | None = real(None, above=0, unit="Pa")
     area: float | None = real(None, above=0, unit="m²")
@@ -23,15 +44,6 @@ class Group(Table):
     smoothing: float | None = real(None, at_least=0, unit="1")
     prestrain: float | None = real(None, above=-1, unit="1")
     strength: float | None = real(None, above=0, unit="Pa")
-
-
-def _groups(name, value):
-    if not isinstance(value, dict):
-        raise InputError(f"{name} = {shown(value)} must be a table of groups, [cable.groups.NAME]")
-    return {
-        key: group if isinstance(group, Group) else Group.read(f"{name}.{short(key)}", group)
-        for key, group in value.items()
-    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,6 +72,13 @@ class Cable(Table):
         Elements per line.
     groups : dict of str to Group
         Values that differ by group of lines.
+
+    Raises
+    ------
+    InputError
+        For an unknown law or order, a number out of these bounds, and slackness or smoothing, of a group as well, with
+        another law than the smooth one; from ``properties``, for a group that no line has, prestrain of a web whose
+        natural lengths are given, and a line whose stiffness or mass is above `refweb.inputs.LARGEST`.
     """
 
     law: str = choice(*NAMES, default="smooth")
@@ -72,7 +91,7 @@ class Cable(Table):
     strength: float | None = real(None, above=0, unit="Pa")
     order: int = choice(1, 2, 3, default=1)
     subdivide: int = integer(1, at_least=1, at_most=1000)
-    groups: dict = field(_groups, factory=dict)
+    groups: dict = by_group(Group, "cable")
 
     def check(self):
         """Fill in the smooth law's parameters; refuse them for other laws."""

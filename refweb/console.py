@@ -13,8 +13,8 @@ from rich.text import Text
 
 from .runner import web_of
 from .scene import table_of
+from .units import prefixed
 
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
 
 
@@ -22,7 +22,7 @@ def shown(value, error, unit):
     """A value with its error in a readable unit: ``31.4848 mm``, ``2.997291 ± 0.0000017 N``."""
     factor, prefix = 1.0, ""
     if unit in _SCALED and value:
-        factor, prefix = next(((f, p) for f, p in PREFIXES if abs(value) >= f), PREFIXES[-1])
+        factor, prefix = prefixed(abs(value))
     name = "" if unit == "1" else f" {prefix}{unit}"
     value = value / factor
     if not error:

@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from .compiled import kernel
+from .vectors import dot
 
 RADIUS, PENALTY, AWAY = 0, 1, 2
 """Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
@@ -65,11 +66,6 @@ def point(x, cells, data, c, nodes, functions, place):
 
 
 @kernel()
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel()
 def share(a, nodes, functions, place):
     """(N, N') of node a."""
     value = slope = 0.0
@@ -77,6 +73,20 @@ def share(a, nodes, functions, place):
         slope = slope * place + value
         value = value * place + functions[n * nodes + a]
     return value, slope
+
+
+@kernel()
+def lightness(mass, cells, c, nodes):
+    """√(lightest node/body), at most 1: scaling the unknowns of a body by it makes its share of a node's row small.
+
+    Nodes without mass are supported and have no row; 0 for a body without one.
+    """
+    least, body = 0.0, mass[cells[c, nodes]]
+    for a in range(nodes):
+        own = mass[cells[c, a]]
+        if own > 0.0 and (least == 0.0 or own < least):
+            least = own
+    return min(math.sqrt(least / body), 1.0) if body > 0.0 else 0.0
 
 
 @kernel(forceinline=True)

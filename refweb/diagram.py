@@ -19,7 +19,7 @@ STYLES = {
 """Colour and marker of each method."""
 
 
-def diagram(cost, title=True):
+def diagram(cost):
     """Draw the two errors of a `refweb.work_precision.Cost`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
 
@@ -38,8 +38,7 @@ def diagram(cost, title=True):
     halves[1].set_xlabel("CPU time [s]")
     told = halves[0].get_legend_handles_labels()
     page.legend(*told, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
-    if title:
-        page.suptitle(cost.scene.title, fontsize=11)
+    page.suptitle(cost.scene.title, fontsize=11)
     return page
 
 

@@ -56,6 +56,12 @@ class Inline(Table):
         Names for nodes.
     groups : list of str, optional
         Group of each line.
+
+    Raises
+    ------
+    InputError
+        For rows that are not of three, or two, numbers, a natural length that is not > 0, a name without nodes, and a
+        support that is none of the nodes; from ``web``, for whatever `refweb.Web` refuses.
     """
 
     kind: str = choice("inline", default="inline")
@@ -67,6 +73,7 @@ class Inline(Table):
     groups: tuple | None = inputs.texts(None)
 
     def check(self):
+        """Refuse supports that are none of the nodes."""
         in_range("supports", np.array(self.supports, dtype=np.int64), len(self.points))
 
     def web(self, base=None):

@@ -133,13 +133,13 @@ def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARG
     return field(read, default, unit)
 
 
-def integer(default=MISSING, *, at_least=None, at_most=None, unit=""):
+def integer(default=MISSING, *, at_least=None, at_most=None):
     """A whole number within bounds."""
 
     def read(name, value):
-        return _bounded(name, _whole(name, value), unit, None, at_least, None, at_most)
+        return _bounded(name, _whole(name, value), "", None, at_least, None, at_most)
 
-    return field(read, default, unit)
+    return field(read, default)
 
 
 def choice(*names, default=MISSING):
@@ -219,7 +219,7 @@ def node_number(name, value):
     return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
 
 
-def numbers_list(default=MISSING, *, unit="", number=_number, empty=False):
+def numbers_list(default=MISSING, *, number=_number, empty=False):
     """A list of numbers; ``number=node_number`` for whole numbers ≥ 0."""
 
     def read(name, value):
@@ -228,7 +228,7 @@ def numbers_list(default=MISSING, *, unit="", number=_number, empty=False):
             _refuse(name, value, "a list with at least one number")
         return tuple(number(f"{name}[{i}]", x) for i, x in enumerate(value))
 
-    return field(read, default, unit)
+    return field(read, default)
 
 
 def texts(default=MISSING):
@@ -340,3 +340,17 @@ class Table:
 
         pairs = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
         return {name: plain(value) for name, value in pairs if value is not None}
+
+
+def by_group(kind, where):
+    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
+
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")
+        return {
+            key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
+            for key, group in value.items()
+        }
+
+    return field(read, factory=dict)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 
@@ -101,6 +100,11 @@ class Paper(Table):
         755, 1677 and 3554 nodes.
     cable_length : float
         Total length of cable [m]; the paper's webs share one.
+
+    Raises
+    ------
+    InputError
+        For an unknown mesh, and a length that is not finite and > 0.
     """
 
     kind: str = choice("paper", default="paper")
@@ -149,6 +153,7 @@ class Window(Table):
     side: float = real(above=0, unit="m")
 
     def check(self):
+        """Refuse sizes at which nothing hangs together, and more than a million cells."""
         for name, least in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
             if getattr(self, name) < least:
                 raise InputError(f'{name} = {getattr(self, name)} must be ≥ {least} for mesh = "{self.mesh}"')
@@ -172,6 +177,16 @@ class Layers(Table):
         N ≥ 1.
     cell_area : float
         Area A of a mesh [m²].
+
+    Raises
+    ------
+    InputError
+        For an unknown mesh, layers < 1, and an area that is not finite and > 0; from ``web``, above a million cells.
+
+    Notes
+    -----
+    N layers of hexagons have 3N² − 3N + 1 cells and 9N² − 3N lines; the paper's section 3.1.3 repeats the formulas of
+    the square. The limit of the length-area ratio that it states is that of hexagons.
     """
 
     kind: str = choice("layers", default="layers")
@@ -182,7 +197,7 @@ class Layers(Table):
     def web(self, base=None):
         """The `refweb.webs.Web`; refused above a million cells."""
         n = self.layers
-        cells = _counts(self.mesh, n)[0]
+        cells = _cells(self.mesh, n)
         if cells > _MOST_CELLS:
             raise InputError(f"layers = {n} makes {cells} cells, must be ≤ {_MOST_CELLS}")
         if self.mesh == "triangle":
@@ -198,60 +213,12 @@ class Layers(Table):
         return Web(points, lines, rim=np.unique(lines[frame]), kind="layers", cells=len(polygons))
 
 
-class ClosedForm(NamedTuple):
-    """Cells, lines and nodes of a layered web, its cable length [m], area [m²] and their ratio [1/m]."""
-
-    cells: int
-    lines: int
-    nodes: int
-    length: float
-    area: float
-    ratio: float
-
-
 def _side(mesh, cell_area):
     return sqrt(cell_area / AREA[mesh])
 
 
-def _counts(mesh, n):
-    """Cells, lines and nodes of n layers."""
-    if mesh == "triangle":
-        return (3 * n - 2) ** 2, 3 * (3 * n - 2) * (3 * n - 1) // 2, 3 * n * (3 * n - 1) // 2
-    if mesh == "square":
-        return (2 * n - 1) ** 2, 4 * n * (2 * n - 1), 4 * n * n
-    return 3 * n * n - 3 * n + 1, 9 * n * n - 3 * n, 6 * n * n
-
-
-def closed_form(mesh, layers, cell_area):
-    """Counts, length, area and length-area ratio of `Layers` in closed form (section 3.1).
-
-    Parameters
-    ----------
-    mesh, layers, cell_area
-        As of `Layers`.
-
-    Returns
-    -------
-    ClosedForm
-
-    Raises
-    ------
-    InputError
-        For what `Layers` refuses.
-
-    Notes
-    -----
-    Triangle: (3N − 2)² cells, L = 3·3^(−1/4) √A (3N − 1)(3N − 2). Square: (2N − 1)² cells, L = 4N(2N − 1) √A.
-    Hexagon: 3N² − 3N + 1 cells, 9N² − 3N lines, 6N² nodes. The paper's section 3.1.3 repeats the square's formulas;
-    these are the right ones for hexagons, and their limit is the one the paper states.
-    """
-    Layers(mesh=mesh, layers=layers, cell_area=cell_area)
-    cells, lines, nodes = _counts(mesh, layers)
-    length, area = lines * _side(mesh, cell_area), cells * cell_area
-    return ClosedForm(cells, lines, nodes, length, area, length / area)
-
-
-def limit_ratio(mesh):
-    """√A times the length-area ratio of infinitely many layers [1] (section 3.1): 3^(3/4), 2 and √2·3^(1/4)."""
-    Layers(mesh=mesh, layers=1, cell_area=1.0)
-    return {"triangle": 3**0.75, "square": 2.0, "hexagon": sqrt(2) * 3**0.25}[mesh]
+def _cells(mesh, layers):
+    """Number of cells."""
+    if mesh == "hexagon":
+        return 3 * layers * layers - 3 * layers + 1
+    return (3 * layers - 2 if mesh == "triangle" else 2 * layers - 1) ** 2

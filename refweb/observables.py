@@ -93,6 +93,13 @@ class Observe(Table):
         Axis of a nodal quantity; without it the magnitude.
     reduce : {"max", "min", "final"}
         Reduction over time.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, a node, body, line or axis that the quantity does not have, a node beside a body, and a
+        name with commas or quotes or above 80 characters; from ``on``, for what the net does not have, an energy whose
+        effect is not in the scene, and in statics what needs velocity, or work that depends on the path.
     """
 
     name: str = text(most=80)

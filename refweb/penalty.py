@@ -16,9 +16,10 @@ import math
 import numpy as np
 
 from .compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from .contact_points import AWAY, CORE, GROWTH, KIND, PENALTY, POWER, dot, point, share
+from .contact_points import AWAY, CORE, GROWTH, KIND, PENALTY, POWER, lightness, point, share
 from .shape_contacts import PLACES, bent, contacts, deepest, from_axes, moves, window, within
 from .shapes import SPHERE
+from .vectors import dot
 
 SHALLOW = 0.05
 """Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
@@ -57,20 +58,6 @@ def thickness(data, c, nodes):
     """Least distance from the middle of the body to its surface [m]."""
     at = AWAY + 3 * nodes
     return data[c, at + GROWTH] + min(data[c, at + CORE], data[c, at + CORE + 1], data[c, at + CORE + 2])
-
-
-@kernel()
-def lightness(mass, cells, c, nodes):
-    """√(lightest node/body), at most 1: scaling the unknowns of a body by it makes its share of a node's row small.
-
-    Nodes without mass are supported and have no row; 0 for a body without one.
-    """
-    least, body = 0.0, mass[cells[c, nodes]]
-    for a in range(nodes):
-        own = mass[cells[c, a]]
-        if own > 0.0 and (least == 0.0 or own < least):
-            least = own
-    return min(math.sqrt(least / body), 1.0) if body > 0.0 else 0.0
 
 
 @kernel()

@@ -19,6 +19,7 @@ from . import drawing, shots, views
 from .drawing import Balls, Surface, Tubes
 from .inputs import InputError, nearest
 from .io import read_summary, write_atomically
+from .units import prefixed
 
 SIZE, FILM_SIZE = (1600, 1000), (1200, 750)
 DARK, PALE, BEFORE, SUPPORT, SLACK = "#333333", "#888888", "#999999", (0.25, 0.25, 0.27), (0.80, 0.80, 0.81)
@@ -26,7 +27,6 @@ BODIES = ((0.45, 0.55, 0.68), (0.70, 0.55, 0.45), (0.55, 0.62, 0.50))
 GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 
 
 def picture(folder, frame=None, field=None, out=None):
@@ -303,7 +303,7 @@ def _scaled_unit(field, largest):
     if not unit or largest == 0:
         return 1.0, unit
     scale, unit = (1e3, "g") if unit == "kg" else (1.0, unit)
-    value, prefix = next((p for p in PREFIXES if largest * scale >= 0.9999 * p[0]), PREFIXES[-1])
+    value, prefix = prefixed(largest * scale / 0.9999)
     return scale / value, prefix + unit
 
 

@@ -25,15 +25,11 @@ import math
 import numpy as np
 
 from .compiled import BOUND, FORCE, STIFFNESS, kernel
-from .contact_points import AWAY, FRICTION, KIND, LOSS, PENALTY, SLIP, dot, share
-from .penalty import SHALLOW, foreseen, lightness, lowered, raised, thickness, turn
+from .contact_points import AWAY, FRICTION, KIND, LOSS, PENALTY, SLIP, lightness, share
+from .penalty import SHALLOW, foreseen, lowered, raised, thickness, turn
 from .shape_contacts import PLACES, along_axes, bent, contacts, from_axes, moves, window, within
 from .shapes import RING, SPHERE
-
-
-@kernel()
-def cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+from .vectors import cross, dot
 
 
 @kernel()
@@ -121,7 +117,7 @@ def by_place(data, c, nodes, push, steep, g, bend, u, matrix):
 def spread(most, mass, rates, cells, data, c, nodes, spins):
     """Add the row sums of the contacts of an element, with ∂F/∂u, or ∂F/∂y, of at most ``most`` each.
 
-    Unknowns of the body are scaled as in `refweb.penalty.lightness`, and its rotation likewise.
+    Unknowns of the body are scaled as in `refweb.contact_points.lightness`, and its rotation likewise.
     """
     delta, thick, b = lightness(mass, cells, c, nodes), thickness(data, c, nodes), cells[c, nodes]
     most *= 1.0 if nodes == 2 else float(nodes * nodes)

@@ -101,6 +101,13 @@ class Scene:
         Title; for a file without one the file's name.
     seed : int
         Seed of whatever is random.
+
+    Raises
+    ------
+    InputError
+        For an empty title or one above 200 characters, a negative seed, what is no list or no effect among them; in
+        statics for an interval, digits, a horizon and events; in dynamics for an interval above the duration, or one
+        that makes more than `ROWS` rows. What does not fit the web or together is refused by `build`.
     """
 
     web: object

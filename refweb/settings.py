@@ -23,7 +23,21 @@ from .inputs import (
 
 @dataclass(frozen=True, kw_only=True)
 class Supports(Table):
-    """Nodes whose displacement is held at zero in some components."""
+    """Nodes whose displacement is held at zero in some components.
+
+    Parameters
+    ----------
+    nodes : int, str or list
+        Nodes, by number or name; an empty list holds none.
+    components : sequence of {0, 1, 2, "x", "y", "z"}
+        Axes along which they are held, by default all three.
+
+    Raises
+    ------
+    InputError
+        For a negative number of a node, what is no axis, and an empty list of axes; from `Scene.build`, for a node that
+        the web does not have.
+    """
 
     nodes: object = nodes(empty=True)
     components: tuple = components(("x", "y", "z"))
@@ -41,6 +55,11 @@ class Static(Table):
         Values of t.
     mass : {"lumped", "consistent"}
         The weight is the same with either; the modes at the equilibrium and the centrifugal forces are not.
+
+    Raises
+    ------
+    InputError
+        For an unknown method or mass, and load steps that are none, not finite or more than 100 000.
     """
 
     kind: str = choice("static", default="static")
@@ -49,6 +68,7 @@ class Static(Table):
     mass: str = choice("lumped", "consistent", default="lumped")
 
     def check(self):
+        """Refuse more load steps than 100 000."""
         if len(self.load_steps) > 100_000:
             raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
 
@@ -97,6 +117,12 @@ class Dynamic(Table):
     start : {"web", "equilibrium"} or path
         State at t = 0: the web as it is, its equilibrium under what acts at t = 0 (free bodies do not), or the last
         state in a result folder.
+
+    Raises
+    ------
+    InputError
+        For a duration, step or tolerance that is not > 0, a safety above 1 and an rtol that is not 1e-13 … 0.1; for a
+        key of another method, order 5, a BDF method of an order above 5, and the fixed-point solver with IDA.
     """
 
     kind: str = choice("dynamic", default="dynamic")
@@ -154,6 +180,13 @@ class Event(Table):
         Its threshold, in the observable's unit.
     stop : bool
         Whether the run ends there.
+
+    Raises
+    ------
+    InputError
+        Where the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind;
+        from `Scene.build`, for a body, line or observable that the scene does not have, "contact" without a contact,
+        and two events of one name.
     """
 
     name: str = text(most=80)
@@ -186,6 +219,12 @@ class Output(Table):
         the rows.
     frames : int, optional
         A VTU every this many rows, the first and the last state always; 10 by default, in statics 1.
+
+    Raises
+    ------
+    InputError
+        For an interval that is not > 0 and frames < 1; from `Scene`, for an interval in statics, one above the duration
+        or one that makes more than `refweb.scene.ROWS` rows.
     """
 
     interval: float | None = real(None, above=0, unit="s")
@@ -210,6 +249,12 @@ class Accuracy(Table):
         Of dynamics: whether it is found how long the motion is determined, see `refweb.horizon`.
     ensemble : int, optional
         With ``horizon``: number of runs that mean and spread of results are taken of.
+
+    Raises
+    ------
+    InputError
+        For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, and digits without a
+        twin; from `Scene`, for digits and horizon in statics.
     """
 
     error: str = choice("twin", "none", default="twin")

@@ -18,8 +18,9 @@ from __future__ import annotations
 import math
 
 from .compiled import kernel
-from .contact_points import AWAY, AXES, CORE, GROWTH, KIND, POWER, SAMPLES, dot, far, point, share
+from .contact_points import AWAY, AXES, CORE, GROWTH, KIND, POWER, SAMPLES, far, point, share
 from .shapes import CYLINDER, SPHERE
+from .vectors import dot
 
 PLACES = 3
 """Largest number of contacts of an element."""

@@ -43,6 +43,7 @@ class SingleCable(Table):
     sag: tuple | None = vector(None)
 
     def check(self):
+        """Refuse ends at one place, a direction that is none, and one line that is longer than the distance."""
         with np.errstate(over="ignore"):
             distance = np.linalg.norm(np.subtract(self.end, self.start))
         if not 0 < distance < np.inf:

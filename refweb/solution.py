@@ -37,6 +37,8 @@ class Solution:
         Results and solver figures of each load step.
     solver, cost, web : dict
         As in ``run.json``.
+    versions : dict of str to str
+        Versions of refweb, Python and the libraries that solved it, by name.
     status : {"running", "solved", "failed", "interrupted"}
         How it ended; ``message`` says why.
     warnings : list of str

@@ -52,3 +52,8 @@ def factor(table, quasi_static):
         True in statics.
     """
     return [0.0, 1.0, *flattened(table or ())] if quasi_static else [1.0, 0.0, *flattened(table or ())]
+
+
+def largest(table):
+    """Largest size of the factor of a load, 1 without a table."""
+    return max((abs(factor) for _, factor in table or ()), default=1.0)

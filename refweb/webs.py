@@ -169,15 +169,13 @@ class Web:
             found = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
 
-    def find_lines(self, selection, name="lines"):
+    def find_lines(self, selection):
         """Line numbers of a selection.
 
         Parameters
         ----------
         selection : int, str or list of them
             Line numbers, groups, "rim" (the lines between two nodes of the rim) or "all".
-        name : str
-            What messages call the selection.
 
         Returns
         -------
@@ -190,9 +188,9 @@ class Web:
             For a number out of range, or a name that is that of no line.
         """
         if isinstance(selection, (list, tuple, np.ndarray)):
-            found = [self._find_lines(f"{name}[{i}]", one) for i, one in enumerate(selection)]
+            found = [self._find_lines(f"lines[{i}]", one) for i, one in enumerate(selection)]
         else:
-            found = [self._find_lines(name, selection)]
+            found = [self._find_lines("lines", selection)]
         return np.unique(np.concatenate(found)).astype(np.int64)
 
     def _find_lines(self, name, one):

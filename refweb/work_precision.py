@@ -56,7 +56,11 @@ class Cost:
         What is compared, at every history row or load step.
     trials : list of refweb.ladders.Trial
         All runs; ``error_observable`` [unit of the observable] is the largest difference over the rows, and
-        ``error_state`` [m] that of the displacements at the end.
+        ``error_state`` [m] that of the displacements at the end. Of each ``values`` is the observable, shape (rows,),
+        and ``x`` the displacement at the end [m], shape (rows of the system, 3).
+    web : dict
+        What is written of the web to ``run.json``: numbers of ``nodes``, ``lines`` and ``cells``, ``cable_length`` [m],
+        ``area`` [m²] and ``mass`` [kg].
     references : tuple of refweb.ladders.Trial
         The two runs that errors are measured with; empty where there are no two.
     independent : bool
@@ -68,6 +72,12 @@ class Cost:
         below that means nothing.
     scale : float
         Largest value of the observable over time, which digits are relative to.
+    status : {"running", "solved", "failed", "interrupted"}
+        How it ended: "solved" where one run at least is.
+    message : str
+        Why it failed, else empty.
+    cost : dict of str to float
+        ``cpu_s`` and ``wall_s`` of all of it [s].
     """
 
     scene: object

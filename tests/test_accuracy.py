@@ -3,11 +3,9 @@
 import json
 
 import mpmath
-import numpy as np
 import pytest
 
 import refweb
-from refweb.dynamics import CLIMBS
 from refweb.inputs import InputError
 
 EA = 7e3
@@ -201,7 +199,6 @@ def test_digits_that_cannot_be_had():
     assert solution.status == "solved"
     (text,) = (text for text in solution.warnings if "digits" in text)
     assert text.startswith("x has not the 3 digits asked for") and "not determined" in text
-    assert CLIMBS > 2
 
 
 def test_bad_input():
@@ -211,4 +208,3 @@ def test_bad_input():
         refweb.Accuracy(digits=13)
     with pytest.raises(InputError, match=r"\[accuracy\] digits = 3 has no meaning in statics"):
         catenary(8, accuracy=refweb.Accuracy(digits=3)).build()
-    np.testing.assert_equal(catenary(8).accuracy.digits, None)

@@ -13,10 +13,11 @@ import re
 import pytest
 
 import refweb
+from refweb.inputs import Table
 
 LAYERS = [
-    ["inputs", "errors", "compiled"],
-    ["shapes", "memory"],
+    ["inputs", "errors", "compiled", "units"],
+    ["shapes", "memory", "vectors"],
     ["contact_points", "bodies"],
     ["shape_contacts"],
     ["penalty"],
@@ -168,3 +169,13 @@ def test_imports_from_outside(name):
 def test_names_say_something():
     parts = {part for name in MODULES for part in name.split(".")}
     assert not parts & {"utils", "util", "helpers", "helper", "common", "manager", "misc"}
+
+
+@pytest.mark.parametrize("name", refweb.__all__)
+def test_exported_classes_are_described(name):
+    """Their fields; of tables and their ``check`` what they refuse."""
+    found = getattr(refweb, name)
+    if isinstance(found, type) and not issubclass(found, Exception):
+        assert re.search(r"\n    (Parameters|Attributes)\n    -{10}\n", found.__doc__)
+        assert not issubclass(found, Table) or "\n    Raises\n    ------\n    InputError\n" in found.__doc__
+        assert "check" not in vars(found) or found.check.__doc__

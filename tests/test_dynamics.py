@@ -698,10 +698,6 @@ def test_where_rows_are_shorter_than_steps_safety_divides_rows():
     assert counts == [100, 200, 400]
 
 
-def test_the_limit_of_the_drift():
-    assert central_difference.DRIFT == 1e-2
-
-
 def test_step_above_the_bound_is_refused(tmp_path):
     """The bound of a square web is L/c, to which contact adds: five lines' stiffnesses and that of the contact."""
     plain = scene(effects=[refweb.Velocity(node="centre", value=(0, 0, 1))])

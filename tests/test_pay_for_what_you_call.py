@@ -48,7 +48,8 @@ METHOD = {
     "ida": DYNAMICS | {"implicit", "cvode", "ida", "pattern", "factor"},
 }
 BELOW = {name: {"time_tables"} for name in ("load", "motion", "pressure", "thrust")}
-BELOW |= {name: {"time_tables", "lengths"} for name in ("reel", "temperature")} | {"contact": {"contact_points"}}
+BELOW |= {name: {"time_tables", "lengths"} for name in ("reel", "temperature")}
+BELOW |= {"contact": {"contact_points", "vectors"}, "bending": {"vectors"}}
 """What effects are made of besides their own file."""
 BASE = ("numpy", "scipy.sparse", "numba", "numba.core.typing.cffi_utils", "skfem")
 """Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""

@@ -8,6 +8,7 @@ import pytest
 
 import refweb
 from refweb.scene import EFFECTS, SHIPPED
+from refweb.stepping import DRIFT
 
 README = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -18,9 +19,18 @@ def block(language):
 
 def test_python_example(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    exec(compile(block("python"), "README", "exec"), {})
-    assert "max_tension" not in capsys.readouterr().err
+    exec(compile(block("python"), "README", "exec"), names := {})
+    printed, solution = capsys.readouterr(), names["solution"]
+    result, shape, tension, deflection = printed.out.splitlines()
+    assert result.startswith("Result(value=") and "unit='N'" in result and printed.err == ""
+    assert shape == f"({len(solution.scene.web.web().points)}, 3)"
+    assert float(tension) == solution.results["max_tension"].value
+    assert len(deflection.strip("[]").split()) == len(solution.scene.solve.load_steps)
     assert (tmp_path / "net" / "web.pvd").is_file()
+
+
+def test_the_limit_of_the_drift():
+    assert f"whose energy drifts by more than {100 * DRIFT:g} % is repeated" in README
 
 
 def test_scene_example():

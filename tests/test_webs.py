@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from refweb.given_webs import File, Inline
 from refweb.inputs import InputError
-from refweb.lattices import Layers, Paper, Window, closed_form, limit_ratio
+from refweb.lattices import Layers, Paper, Window
 from refweb.single_cable import SingleCable
 from refweb.webs import Web
 
@@ -186,19 +186,18 @@ def test_layers_equal_closed_form(mesh, layers):
     assert web.cable_length == pytest.approx(length, rel=1e-13)
     assert area == pytest.approx(cells * cell_area, rel=1e-12)
     assert web.cable_length / area == pytest.approx(length / (cells * cell_area), rel=1e-12)
-    expected = (cells, lines, nodes, length, cells * cell_area, length / (cells * cell_area))
-    assert closed_form(mesh, n, cell_area) == pytest.approx(expected, rel=1e-14)
     rim = {"triangle": 3 * (3 * n - 2), "square": 4 * (2 * n - 1), "hexagon": 12 * n - 6}[mesh]
     assert len(web.rim) == rim
     hull = {"triangle": 3, "square": 4, "hexagon": 6 if n == 1 else 12}[mesh]
     assert len(web.corners) == hull
 
 
-@pytest.mark.parametrize(("mesh", "limit"), [("triangle", 2.2795), ("square", 2.0), ("hexagon", 1.8612)])
+@pytest.mark.parametrize(("mesh", "limit"), [("triangle", 3**0.75), ("square", 2.0), ("hexagon", sqrt(2) * 3**0.25)])
 def test_ratio_converges_to_the_papers_limit(mesh, limit):
-    assert limit_ratio(mesh) == pytest.approx(limit, abs=1e-4)
-    excess = [closed_form(mesh, layers, 0.25).ratio * 0.5 - limit_ratio(mesh) for layers in (1000, 10000)]
-    assert np.log10(excess[0] / excess[1]) == pytest.approx(1.0, abs=1e-3)
+    """√A times the length-area ratio of generated webs, whose excess falls as 1/N."""
+    webs = [Layers(mesh=mesh, layers=layers, cell_area=0.25).web() for layers in (10, 100)]
+    excess = [0.5 * web.cable_length / (web.cells * 0.25) - limit for web in webs]
+    assert np.log10(excess[0] / excess[1]) == pytest.approx(1.0, abs=0.05)
 
 
 def test_layers_refuse():
@@ -207,9 +206,7 @@ def test_layers_refuse():
     with pytest.raises(InputError, match="layers = 501 makes 1002001 cells, must be ≤ 1000000"):
         Layers(mesh="square", layers=501, cell_area=1.0).web()
     with pytest.raises(InputError, match='mesh = "hexagn" must be one of .*did you mean "hexagon"'):
-        closed_form("hexagn", 2, 1.0)
-    with pytest.raises(InputError, match='mesh = "squares" must be one of .*did you mean "square"'):
-        limit_ratio("squares")
+        Layers(mesh="hexagn", layers=2, cell_area=1.0)
 
 
 @pytest.mark.parametrize("elements", [2, 3, 10, 101])

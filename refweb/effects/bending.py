@@ -22,22 +22,13 @@ import numpy as np
 
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..inputs import InputError, Table, real
+from ..vectors import cross, dot
 from . import Family
 
 LARGEST = math.radians(30.0)
 """Largest angle between elements that continue each other in the web's position."""
 ROUNDING = 1e-9
 """Angles that differ by less are the same [rad]."""
-
-
-@kernel()
-def cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel()
-def dot(a, b):
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel()
@@ -172,6 +163,17 @@ class Bending(Table):
     ----------
     stiffness : float
         B = E I [N m²]. Springs are those of the natural lengths that the web is made with.
+
+    Raises
+    ------
+    InputError
+        For a stiffness that is not > 0; from ``on``, for elements of an order above 1, and a web in which no element
+        continues another within 30°.
+
+    References
+    ----------
+    The springs B/L̄ are those of the multi-particle model of *Dynamic modelling and analysis of space webs*, Sci
+    China-Phys Mech Astron 54 (2011), section 2.3.
     """
 
     stiffness: float = real(above=0, unit="N·m²")

@@ -65,6 +65,14 @@ class Body(Table):
         Moment of inertia [kg m²], > 0, by default that of a solid sphere, 2/5 m r², or of a thin ring, m r².
     fixed : bool
         Whether it does not move.
+
+    Raises
+    ------
+    InputError
+        For a key that the shape lacks or does not have, sizes or a mass that are not > 0, axes that are zero or not at
+        right angles, a rounding above half the smallest size, and a name that is no file name; for a free body that has
+        no mass or is a box or a cylinder, a fixed one that moves, and a ring that turns about another axis than its
+        normal; from ``extend``, for a name that stands twice, and a free body in statics.
     """
 
     name: str = text(most=80)

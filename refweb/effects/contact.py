@@ -18,9 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..contact_points import AWAY, PENALTY, RADIUS, closest, dot, numbers, point, share, touched
+from ..contact_points import AWAY, PENALTY, RADIUS, closest, lightness, numbers, point, share, touched
 from ..inputs import InputError, Table, field, nearest, real, shown
 from ..shapes import SPHERE
+from ..vectors import dot
 from . import Family
 
 
@@ -108,14 +109,7 @@ def kernels(pieces, nodes, functions):
                 if distance - radius >= reach:
                     before = 0.0
                     continue
-                # Scaling the body's unknown by δ makes its share of a node's row small where the body is heavy. Nodes
-                # without mass are supported and have no row.
-                light = 0.0
-                for a in range(nodes):
-                    own = mass[cells[c, a]]
-                    if own > 0.0 and (light == 0.0 or own < light):
-                        light = own
-                delta = min(math.sqrt(light / mass[b]), 1.0) if mass[b] > 0.0 else 0.0
+                delta = lightness(mass, cells, c, nodes)
                 # The line turns under a push that slides along it, which adds by depth over length.
                 turn = own = 0.0
                 _, d, _ = point(x, cells, data, c, nodes, functions, place)
@@ -184,6 +178,13 @@ class Contact(Table):
         explicit method are in proportion to it where friction rules them.
     bodies : dict of str to BodyContact
         What differs for a body.
+
+    Raises
+    ------
+    InputError
+        For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from
+        ``extend``, for a body that turns and has no friction; from ``on``, without a body, and for one of ``bodies``
+        that is none.
     """
 
     stiffness: float = real(above=0, unit="N/m")

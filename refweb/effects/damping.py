@@ -191,6 +191,17 @@ class Damping(Table):
     rate : float
         Rate at which velocities fade [1/s], ≥ 0: a force −rate m v on every node, m its lumped mass, with consistent
         mass as well.
+
+    Raises
+    ------
+    InputError
+        For a time or a rate that is not finite or < 0, and where both are 0.
+
+    References
+    ----------
+    The material is that of Kelvin and Voigt, on the tangent of the law and without its push: W. Thomson, "On the
+    elasticity and viscosity of metals", Proc. R. Soc. Lond. 14 (1865) 289–297; W. Voigt, "Ueber innere Reibung fester
+    Körper, insbesondere der Metalle", Ann. Phys. 283 (1892) 671–693.
     """
 
     time: float = real(0.0, at_least=0, unit="s")

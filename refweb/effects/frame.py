@@ -129,6 +129,15 @@ class Frame(Table):
     ----------
     angular_velocity : sequence of 3 float
         Ω of the frame [rad/s], about an axis through the origin.
+
+    Raises
+    ------
+    InputError
+        For an angular velocity that is not three finite numbers.
+
+    References
+    ----------
+    L. D. Landau, E. M. Lifshitz, "Mechanics", 3rd ed. 1976, §39: the forces, and the energy that is kept.
     """
 
     angular_velocity: tuple = vector(unit="rad/s")

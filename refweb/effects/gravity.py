@@ -33,6 +33,11 @@ class Gravity(Table):
     ----------
     acceleration : sequence of 3 float
         g [m/s²].
+
+    Raises
+    ------
+    InputError
+        For an acceleration that is not three finite numbers.
     """
 
     acceleration: tuple = vector(unit="m/s²")

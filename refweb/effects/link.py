@@ -18,11 +18,18 @@ class Link(Table):
     ----------
     nodes : list
         Two nodes or more, by number or name; the length of each link is their distance in the web's position.
+
+    Raises
+    ------
+    InputError
+        For fewer than two nodes; from ``on``, for a name that is not one node of the web, and for neighbours in the
+        list that are at one place.
     """
 
     nodes: tuple = nodes()
 
     def check(self):
+        """Refuse fewer than two nodes."""
         if not isinstance(self.nodes, tuple) or len(self.nodes) < 2:
             raise InputError(f"nodes = {shown(self.nodes)} must be a list of two nodes or more")
 

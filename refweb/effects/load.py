@@ -42,6 +42,12 @@ class Load(Table):
     factor : sequence of (t, factor), optional
         Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
         times the load step.
+
+    Raises
+    ------
+    InputError
+        For a force that is not three finite numbers, and a factor without rows or whose times do not increase; from
+        ``on``, for a node that the web does not have.
     """
 
     node: object = nodes()

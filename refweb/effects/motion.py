@@ -29,6 +29,12 @@ class Motion(Table):
         Nodes, by number or name.
     displacement : sequence of (t, x, y, z)
         Displacement from the web's position [m]; linear in between, end values held. In statics t is the load step.
+
+    Raises
+    ------
+    InputError
+        For a table without rows, rows that are not four finite numbers, and times that do not increase; from ``on``,
+        for a node that the web does not have.
     """
 
     node: object = nodes()

@@ -19,6 +19,11 @@ class PointMass(Table):
         Nodes, by number or name.
     mass : float
         Mass on each node [kg], ≥ 0.
+
+    Raises
+    ------
+    InputError
+        For a mass that is not finite or < 0; from ``extend``, for a node that the web does not have.
     """
 
     node: object = nodes()

@@ -20,7 +20,7 @@ import numpy as np
 from ..compiled import BOUND, FORCE, STIFFNESS, kernel
 from ..inputs import InputError, Table, field, nearest, node_number, numbers_list, real, rows, shown, vector
 from ..lines import REFERENCE
-from ..time_tables import factor, factor_at
+from ..time_tables import factor, factor_at, largest
 from . import Family
 
 # Columns of data: p n; dX/dξ; the largest |factor|; the factor.
@@ -112,6 +112,18 @@ class Pressure(Table):
     factor : sequence of (t, factor), optional
         Multiplies p; linear in between, end values held. Without it p acts in full, or, in statics, times the load
         step.
+
+    Raises
+    ------
+    InputError
+        For a normal that is zero, numbers that are not finite, and a factor without rows or whose times do not
+        increase; from ``on``, for a line or a group that the web does not have, and a line that has the point on
+        neither side.
+
+    References
+    ----------
+    K. Schweizerhof, E. Ramm, "Displacement dependent pressure loads in nonlinear finite element analyses", Comput.
+    Struct. 18 (1984) 1099–1114: stiffness of such loads, and when they have a potential.
     """
 
     lines: object = field(_lines)
@@ -121,6 +133,7 @@ class Pressure(Table):
     factor: tuple | None = rows(2, None, increasing=True)
 
     def check(self):
+        """Refuse a normal without direction."""
         if not any(self.normal):
             raise InputError("normal = [0, 0, 0] must have a direction")
 
@@ -131,9 +144,7 @@ class Pressure(Table):
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
         pushed = self.value * sides[net.line[at], None] * normal
-        times = factor(self.factor, net.quasi_static)
-        most = max((abs(row[1]) for row in self.factor or ()), default=1.0)
-        numbers = np.tile([most, *times], (len(at), 1))
+        numbers = np.tile([largest(self.factor), *factor(self.factor, net.quasi_static)], (len(at), 1))
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         return Family(
             name="pressure",

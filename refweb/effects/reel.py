@@ -20,6 +20,12 @@ class Reel(Table):
         Lines, by number or group, "all", or "rim": those between two nodes of the rim.
     factor : sequence of (t, factor)
         Natural length over its own [1], > 0; linear in between, end values held. In statics t is the load step.
+
+    Raises
+    ------
+    InputError
+        For a factor that is not > 0, a table without rows, and times that do not increase; from ``on``, for a line or a
+        group that the web does not have, and "rim" where no line joins two of its nodes.
     """
 
     lines: object = nodes(what="line")

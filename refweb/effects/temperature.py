@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs import InputError, Table, field, nearest, real, rows, short, shown
+from ..inputs import InputError, Table, by_group, field, nearest, real, rows, short, shown
 from ..lengths import scaled
 
 
@@ -23,15 +23,6 @@ class GroupTemperature(Table):
     change: object = field(_change, None)
 
 
-def _groups(name, value):
-    if not isinstance(value, dict):
-        raise InputError(f"{name} = {shown(value)} must be a table of groups, [temperature.groups.NAME]")
-    return {
-        key: group if isinstance(group, GroupTemperature) else GroupTemperature.read(f"{name}.{short(key)}", group)
-        for key, group in value.items()
-    }
-
-
 @dataclass(frozen=True, kw_only=True)
 class Temperature(Table):
     """Thermal strain of the lines; mass, section and modulus stay.
@@ -45,11 +36,17 @@ class Temperature(Table):
         and end values held. In statics t is the load step.
     groups : dict of str to GroupTemperature
         Values that differ by group of lines.
+
+    Raises
+    ------
+    InputError
+        For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines; from
+        ``on``, for a group that no line has.
     """
 
     expansion: float = real(unit="1/K")
     change: object = field(_change, unit="K")
-    groups: dict = field(_groups, factory=dict)
+    groups: dict = by_group(GroupTemperature, "temperature")
 
     def check(self):
         """Refuse a natural length that is not positive."""

@@ -19,7 +19,7 @@ import numpy as np
 from ..compiled import BOUND, FORCE, STIFFNESS, kernel
 from ..inputs import InputError, Table, field, node_number, nodes, real, rows, shown
 from ..lines import REFERENCE
-from ..time_tables import factor, factor_at
+from ..time_tables import factor, factor_at, largest
 from . import Family
 
 SHORTER = 0.5
@@ -98,6 +98,12 @@ class Thrust(Table):
     factor : sequence of (t, factor), optional
         Multiplies the force; linear in between, end values held. Without it the force acts in full, or, in statics,
         times the load step.
+
+    Raises
+    ------
+    InputError
+        For a force that is not finite, and a factor without rows or whose times do not increase; from ``on``, for what
+        is not one node of the web, and a line that does not end at it.
     """
 
     node: object = nodes()
@@ -123,8 +129,7 @@ class Thrust(Table):
         functions = np.linalg.inv(np.vander(net.places, increasing=True))
         slopes = sign * (power[1:] * place ** (power[1:] - 1)) @ functions[1:]
         reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
-        most = max((abs(row[1]) for row in self.factor or ()), default=1.0)
-        numbers = [self.force, *reference, *slopes[order], most, *factor(self.factor, net.quasi_static)]
+        numbers = [self.force, *reference, *slopes[order], largest(self.factor), *factor(self.factor, net.quasi_static)]
         force, stiffness, bound = kernels(len(order))
         return Family(
             name="thrust",

@@ -17,6 +17,12 @@ class Velocity(Table):
         Nodes, by number or name.
     value : sequence of 3 float
         Velocity [m/s].
+
+    Raises
+    ------
+    InputError
+        For a velocity that is not three finite numbers; from ``start``, in statics, for a node that the web does not
+        have, and for one that is named and supported along a component that is not 0.
     """
 
     node: object = nodes()
