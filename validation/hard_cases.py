@@ -295,7 +295,8 @@ def matrix(groups, methods, prove, tolerance, reason, quick):
             for method in methods:
                 solution, why = attempt(members[name], method)
                 foreseen = members[name]["refused"].get(method)
-                if why if foreseen is None else foreseen not in why:
+                as_foreseen = foreseen in why if foreseen else not why
+                if not as_foreseen:
                     unforeseen.append(f"{name} by {method}")
                 if solution is None:
                     number = refusals.setdefault(why, len(refusals) + 1)
