@@ -8,8 +8,9 @@ import pytest
 import refweb
 from refweb.errors import OpenBook
 from refweb.stepping import DRIFT
+from validation import hard_cases
 from validation.balances import energy_left, momentum_left, unbalanced
-from validation.hard_cases import STATICS, attempt
+from validation.hard_cases import STATIC, STATICS, attempt, matrix
 from validation.random_scenes import near_the_limit, outcome, random_net
 
 
@@ -44,6 +45,32 @@ def test_relaxation_does_not_chatter():
         solution, why = attempt(STATICS["nets"][name], "relaxation")
         assert solution is not None, why
         assert solution.solver["nsteps"] < 100_000 and unbalanced(solution) < 1e-9
+
+
+def test_refusals_are_foreseen(monkeypatch):
+    """A group fails where a method refuses what it should solve, refuses for another reason, or does not refuse."""
+    few = {"nets": {name: STATICS["nets"][name] for name in ("one line taut", "without supports")}}
+
+    def passes():
+        (row,), _, _ = matrix(few, STATIC, unbalanced, 1e-7, "see the case", True)
+        return row.passes
+
+    assert passes()
+    foreseen = few["nets"]["without supports"]
+    for method in STATIC:
+
+        def tired(fields, other, method=method):
+            return (None, "tired") if other == method else attempt(fields, other)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(hard_cases, "attempt", tired)
+            assert not passes()
+        for refused in (foreseen["refused"] | {method: "tired"}, foreseen["refused"] | {method: None}):
+            few["nets"]["without supports"] = foreseen | {"refused": refused}
+            assert not passes()
+        few["nets"]["without supports"] = foreseen
+    few["nets"]["one line taut"] = few["nets"]["one line taut"] | {"refused": {STATIC[0]: "no equilibrium"}}
+    assert not passes()
 
 
 @pytest.mark.slow

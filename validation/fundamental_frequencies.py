@@ -12,18 +12,16 @@ Every line is one element, as in the paper, or several. Beside the fundamental s
 the loaded node: one that brings at least a twentieth of the displacement that a small further load makes there,
 φ²/(m ω²) of its flexibility.
 
-What comes out:
+What comes out (the table has the numbers; ``validation/open_parameters.py`` asserts the order of the three webs):
 
-- With one element per line the triangle web is not the highest: the hexagon web is 0.9 % above it. But 180 lines of the
-  triangle web are slack, and as single elements they burden their ends with their mass. In several elements they hang
-  loose and the frequency rises, towards 1.50 Hz at 1 N, 3 % above that of the hexagon web. The claim is true of the
-  cables, by very little, and not of the paper's own elements.
-- Both of these fundamentals move half of the mass or more up and down, the loaded node with it.
-- That of the square web is 25 % lower and of another kind: it stays in the four corners, where the tension is a
-  thousandth of that at the load. The load hangs on two cables that cross; the lowest mode that moves it is the 13th,
-  1.55 Hz at 1 N, above the other two webs.
-- It does not follow from stiffness: at the load the hexagon web gives way 1.8 times as far as the triangle web, the
-  stiffest of the three, and the square web 1.1 times. All frequencies rise with the cube root of the load.
+- With one element per line the hexagon web is the highest: slack lines of the triangle web burden their ends with their
+  mass. In several elements they hang loose, and the triangle web is the highest. The claim is true of the cables, by
+  little, and not of the paper's own elements.
+- Both of these fundamentals move much of the web up and down, the loaded node with it.
+- That of the square web is the lowest and of another kind: it stays in the four corners, where there is little tension.
+  The load hangs on two cables that cross, and the lowest mode that moves it lies above the other two webs.
+- It does not follow from stiffness: at the load the triangle web is the stiffest of the three, the hexagon web the
+  softest. All frequencies rise with the cube root of the load.
 """
 
 from __future__ import annotations

@@ -11,7 +11,8 @@ bodies that start inside of the web. Each is solved by every method that takes i
   it the balance of momentum: that of all masses, less that at the start, less the impulse of the supports and of dead
   loads, over the largest momentum.
 
-What is no result is a refusal, and its reason is listed.
+What is no result is a refusal, and its reason is listed. Which method refuses which case, and why, is foreseen in the
+table of cases: a method that refuses another, or takes one that it should refuse, fails the row of its group.
 
 The table of random trials counts nets of random lines, slack, supports and loads, and runs of slack nets that are
 thrown about and hit in steps just below the bound of stability. ``python -m pytest -m slow tests/test_hard_cases.py
@@ -43,6 +44,17 @@ STATIC = ("newton", "relaxation")
 DYNAMIC = ("central-difference", "explicit", "cvode", "ida")
 UP = (0.0, 0.0, 1.0)
 
+# What is foreseen to be refused: methods, and words of their reasons.
+CARRIED_OFF = dict.fromkeys(STATIC, "no equilibrium: a mechanism of 12 nodes")
+MASSLESS = dict.fromkeys(("central-difference", "explicit", "cvode"), "has no mass, which")
+ADRIFT = {**MASSLESS, "ida": "it has no mass, and no tension holds it"}
+MOVED = {"explicit": "takes nothing that is moved"}
+
+
+def not_explicit(effect):
+    """Steps of high order refuse an effect whose force is not one of displacement alone, or does work."""
+    return {"explicit": f"takes no [{effect}]"}
+
 
 def cable(law="tension-only", **changes):
     return refweb.Cable(**{"law": law, "modulus": 7e7, "area": 1e-4, "density": 200.0, **changes})
@@ -63,8 +75,9 @@ def pull(force, node="centre"):
 # Statics
 
 
-def static(*effects, web=None, steps=(1.0,), supports=None, **law):
+def static(*effects, web=None, steps=(1.0,), supports=None, refused=None, **law):
     return dict(
+        refused=refused or {},
         web=web or window(),
         cable=cable(**law),
         effects=effects,
@@ -126,7 +139,7 @@ STATICS = {
                                              natural_length=0.99)),
         "pushed along, a mechanism": static(refweb.Load(node=1, force=(1.0, 0.0, 0.0)),
                                             web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [0])),
-        "without supports": static(pull(1.0), supports=refweb.Supports(nodes=[])),
+        "without supports": static(pull(1.0), supports=refweb.Supports(nodes=[]), refused=CARRIED_OFF),
     },
     "loads": {
         "in the plane": static(refweb.Load(node="centre", force=(1.0, 0.3, 0.0))),
@@ -150,9 +163,10 @@ def ball(position=(0.01, 0.003, -0.101), velocity=(0.0, 0.0, 2.0), **changes):
     return refweb.Body(**{**own, **changes})
 
 
-def hit(*effects, stiffness=1e4, duration=0.02, web=None, contact=None, supports=None, **law):
+def hit(*effects, stiffness=1e4, duration=0.02, web=None, contact=None, supports=None, refused=None, **law):
     bodies = effects or (ball(),)
     return dict(
+        refused=refused or {},
         web=web or window(),
         cable=cable(**law),
         effects=(*bodies, refweb.Contact(stiffness=stiffness, **(contact or {}))),
@@ -161,8 +175,9 @@ def hit(*effects, stiffness=1e4, duration=0.02, web=None, contact=None, supports
     )
 
 
-def free(*effects, web=None, duration=0.02, supports=None, **law):
+def free(*effects, web=None, duration=0.02, supports=None, refused=None, **law):
     return dict(
+        refused=refused or {},
         web=web or window(),
         cable=cable(**law),
         effects=effects,
@@ -178,6 +193,7 @@ def thrown(web, supports, velocity=UP, node=1, **more):
 
 
 THROWN = refweb.Velocity(node="centre", value=UP)
+MASS = refweb.PointMass(node="centre", mass=1.0), THROWN
 CRITICAL = 0.2 / (7e7 / 200.0) ** 0.5
 """Time constant of damping that is critical for the highest frequency 2c/L of lines of 0.2 m [s]."""
 HUB = tuple(float(x) for x in -NODE + [0.0, 0.0, -0.101])
@@ -206,10 +222,15 @@ MOTIONS = {
         "a free web": hit(supports=refweb.Supports(nodes=[])),
         "a node of 200 lines": hit(ball(position=HUB, mass=0.1), web=WHEEL, duration=2e-3),
     },
-    "friction": {m: hit(ball(velocity=(1.0, 0.0, 2.0)), contact=dict(friction=m)) for m in (0.0, 0.1, 1.0, 10.0)},
-    "damping of contact [s/m]": {d: hit(contact=dict(damping=d)) for d in (0.0, 0.1, 10.0)},
+    "friction": {
+        m: hit(ball(velocity=(1.0, 0.0, 2.0)), contact=dict(friction=m), refused=m and not_explicit("contact"))
+        for m in (0.0, 0.1, 1.0, 10.0)
+    },
+    "damping of contact [s/m]": {
+        d: hit(contact=dict(damping=d), refused=d and not_explicit("contact")) for d in (0.0, 0.1, 10.0)
+    },
     "damping of lines over critical": {
-        z: free(refweb.Damping(time=z * CRITICAL), THROWN, supports=RIM)
+        z: free(refweb.Damping(time=z * CRITICAL), THROWN, supports=RIM, refused=not_explicit("damping"))
         for z in (1e-3, 0.1, 1.0, 10.0)
     },
     "modulus [Pa]": {
@@ -218,22 +239,24 @@ MOTIONS = {
     "motion": {
         "all lines snap taut": free(*OUTWARD, web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [], natural_length=1.1),
                                     duration=0.2),
-        "an end that jumps": free(JUMP, supports=RIM),
+        "an end that jumps": free(JUMP, supports=RIM, refused=MOVED),
         "lengths 1 : 1e6": thrown(SHORT, (0, 3), duration=1e-4),
         "a slack line of no length": thrown(MET, (0, 3)),
         "a line through its neighbour": thrown(CROSSED, (0, 2, 3, 5), (0.0, 0.0, -10.0)),
         "a dangling end": thrown(DANGLING, (0, 3), node=4),
         "two components": thrown(APART, (0, 3, 4)),
         "density 1e-6 kg/m³": thrown(window(), ("rim",), node="centre", density=1e-6, duration=1e-6),
-        "no density, prestressed": free(pull(1.0), density=0.0, prestrain=0.01, supports=RIM),
-        "no density, without tension": free(pull(1.0), density=0.0, supports=RIM),
+        "no density, loaded": free(pull(1.0), density=0.0, prestrain=0.01, supports=RIM,
+                                   refused={**MASSLESS, **not_explicit("load")}),
+        "no density, a mass thrown": free(*MASS, density=0.0, prestrain=0.01, supports=RIM, refused=MASSLESS),
+        "no density, without tension": free(*MASS, density=0.0, supports=RIM, refused=ADRIFT),
     },
 }  # fmt: skip
 
 
 def scene_of(fields, method):
     """The scene of a case by a method."""
-    fields = dict(fields)
+    fields = {name: value for name, value in fields.items() if name != "refused"}
     solve = fields.pop("solve")(method)
     if solve.kind == "dynamic":
         fields["output"] = refweb.Output(interval=solve.duration / 20, frames=20)
@@ -260,17 +283,21 @@ def struck():
     return Row("momentum that a ball of 7 km/s loses", given[0], given[1], "CVODE", 1e-2, why, "N s")
 
 
-def matrix(groups, methods, prove, tolerance, reason, quick, unsolved):
-    """Rows, cells and reasons of a matrix of cases and methods; ``unsolved`` are those that no method has to solve."""
-    rows, cells, refusals, open_cases = [], [], {}, set()
+def matrix(groups, methods, prove, tolerance, reason, quick):
+    """Rows, cells and reasons of a matrix of cases and methods; a group's row fails where a refusal is not foreseen."""
+    rows, cells, refusals = [], [], {}
     for group, members in groups.items():
-        worst = 0.0
+        worst, unforeseen = 0.0, []
         names = list(members)
         ends = names[:: max(len(names) - 1, 1)]
         for name in ends if quick and isinstance(names[0], float) else names:
             line = [f"{group}: {name:g}" if isinstance(name, float) else name]
             for method in methods:
                 solution, why = attempt(members[name], method)
+                foreseen = members[name]["refused"].get(method)
+                as_foreseen = foreseen in why if foreseen else not why
+                if not as_foreseen:
+                    unforeseen.append(f"{name} by {method}")
                 if solution is None:
                     number = refusals.setdefault(why, len(refusals) + 1)
                     line.append(f"refused ({number})")
@@ -279,11 +306,9 @@ def matrix(groups, methods, prove, tolerance, reason, quick, unsolved):
                 worst = max(worst, proof if np.isfinite(proof) else np.inf)
                 line.append(f"{proof:.1e}")
             cells.append(line)
-            if all(cell.startswith("refused") for cell in line[1:]):
-                open_cases.add(name)
+        if unforeseen:
+            group, worst = f"{group}, refused or solved against the table: {'; '.join(unforeseen)}", np.inf
         rows.append(Row(group, worst, 0.0, "own balance of the state", tolerance, reason, scale=1.0))
-    wrong, why = len(open_cases ^ unsolved), f"every method refuses {' and '.join(sorted(unsolved))}, and nothing else"
-    rows.append(Row("cases solved by none, or unexpectedly", wrong, 0.0, "counted", 0.0, why, scale=1.0))
     reasons = [[str(number), why] for why, number in refusals.items()]
     return rows, cells, reasons
 
@@ -353,20 +378,17 @@ def random_trials(nets, runs):
 
 def case(quick):
     tolerance, reason = 1e-7, "Newton and relaxation end below 1e-9 of their own scale, which may be 100 times larger"
-    unsolved = {"without supports"}
-    rows, cells, reasons = matrix(STATICS, STATIC, unbalanced, tolerance, reason, quick, unsolved)
+    rows, cells, reasons = matrix(STATICS, STATIC, unbalanced, tolerance, reason, quick)
     tables = [Table("Statics: force left over scale", ["case", *STATIC], cells)]
     tables.append(Table("Statics: reasons of refusals", ["number", "reason"], reasons))
-    methods, massless = (DYNAMIC[:1], {"no density, prestressed"}) if quick else (DYNAMIC, set())
 
     def prove(solution):
         return max(energy_left(solution), momentum_left(solution))
 
-    unsolved = {"no density, without tension"} | massless
     reason = "the budget of energy of a run"
-    more, cells, reasons = matrix(MOTIONS, methods, prove, DRIFT, reason, quick, unsolved)
+    more, cells, reasons = matrix(MOTIONS, DYNAMIC, prove, DRIFT, reason, quick)
     rows += more
-    tables.append(Table("Dynamics: energy or momentum left", ["case", *methods], cells))
+    tables.append(Table("Dynamics: energy or momentum left", ["case", *DYNAMIC], cells))
     tables.append(Table("Dynamics: reasons of refusals", ["number", "reason"], reasons))
     rows.append(struck())
     for method in ("central-difference",) if quick else ("central-difference", "cvode", "ida"):
