@@ -492,9 +492,20 @@ class Motion:
                 if found["time"] is not None and np.isfinite(time):
                     off = abs(found["time"] - float(time))
                     found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
+            if self._stopped and len(own) > 1:
+                self._add_lateness(own[-2:])
         if failure:
             solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
         return accuracy
+
+    def _add_lateness(self, own):
+        """Add to ± of results at the end what they change in that of the time of the event there; from two rows."""
+        solution, end = self.solution, own[1, 0]
+        late = max((event["error"] or 0.0 for event in solution.events if event["time"] == end), default=0.0)
+        change = late * np.abs(own[1] - own[0]) / (end - own[0, 0])
+        for i, (name, result) in enumerate(solution.reduced.items(), 1):
+            if result.time == end:
+                solution.reduced[name] = result._replace(error=result.error + float(change[i]))
 
     def _run(self, solver, folder, tell):
         """One run from start to end, with rows and frames; returns its results."""

@@ -307,6 +307,7 @@ def test_a_run_stops_at_its_event(solve, tmp_path):
     np.testing.assert_array_equal(frame.point_data["displacement"][1], kept.state.x[1])
     below = kept.results["x"].value * RATE
     assert -0.5 - STEP < below <= -0.5 + PHASE
+    assert abs(below + 0.5) <= kept.results["x"].error * RATE  # ± of the time is in that of what has its value there
     assert kept.results["y"].value == kept.results["x"].value
 
 
