@@ -41,7 +41,8 @@ from .stepping import (
 )
 
 TRAVEL = 0.2
-"""Largest share of a body's thickness that anything may move in a step, so that nothing passes through."""
+"""Largest share of a body's thickness that anything may move in a step, so that nothing passes through; where bodies
+are further away, half of that distance."""
 PATIENCE = 1000
 """Number of steps in turn of which a row would take more than `MOST`; at a start they are short, and grow."""
 UNEVEN = 1e-3
@@ -153,7 +154,9 @@ class Implicit:
         self._held, self._fixed = system.supported, np.flatnonzero(system.supported)
         times = [t for part in (*families, *system.drives, *system.line_drives) for t in part.times]
         self._breaks = np.unique(np.array(times, dtype=float))
-        self._thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
+        bodies = system.net.bodies
+        self._thickness = min((body.thickness for body in bodies), default=np.inf)
+        self._outreach = np.array([body.radius + np.linalg.norm(body.core) for body in bodies])
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a solver brings
@@ -265,7 +268,8 @@ class Implicit:
         if np.isfinite(self._thickness):
             moving = run.v[: self.system.rows - self.system.net.spins]
             speed = 2.0 * np.sqrt((moving**2).sum(axis=1).max())
-            stop = min(stop, run.time + TRAVEL * self._thickness / speed) if speed > 0.0 else stop
+            way = max(TRAVEL * self._thickness, 0.5 * self._gap(run.x))
+            stop = min(stop, run.time + way / speed) if speed > 0.0 else stop
         if stop - run.time < 1e-12 * end:
             stop = run.time + 1e-12 * end
         self._wrong = None
@@ -286,6 +290,15 @@ class Implicit:
                 f"the steps at t = {run.time:.6g} s are {run.step:.3g} s, more than {MOST:g} to the next row: raise "
                 f"rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
             )
+
+    def _gap(self, x):
+        """At most the least distance between a body and a node [m]: that of balls around and a box around."""
+        net = self.system.net
+        place = net.points + x
+        low, high = place[: net.nodes].min(axis=0), place[: net.nodes].max(axis=0)
+        middles = place[[body.row for body in net.bodies]]
+        apart = np.maximum(np.maximum(low - middles, middles - high), 0.0)
+        return (np.linalg.norm(apart, axis=1) - self._outreach).min()
 
     def _at(self, t):
         """Displacement and velocity of all rows at a time within the last step."""

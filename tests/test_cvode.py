@@ -462,6 +462,21 @@ def test_reactions_change_the_momentum_of_the_whole_web(mass):
     np.testing.assert_allclose(shown, force, atol=1e-9 * np.abs(force).max())
 
 
+@pytest.mark.parametrize("method", ["cvode", "ida"])
+def test_a_body_far_away_asks_for_no_short_steps(method):
+    """It falls for 10 s, to 98 m/s and 490 m: in steps of a fifth of its thickness that would be 25 000 and more."""
+    far = refweb.Body(name="far", radius=0.1, mass=1.0, position=(0.0, 0.0, -1.0))
+    place = refweb.Observe(name="z", quantity="position", body="far", component="z")
+    falling = [far, refweb.Contact(stiffness=1e4), refweb.Gravity(acceleration=(0.0, 0.0, -9.81))]
+    changes = dict(family=None) if method == "ida" else {}
+    stiff = cable(prestrain=0.01, law="linear")
+    held = refweb.Supports(nodes=["all"])
+    free = scene(falling, 10.0, 1.0, cable=stiff, support=[held], observe=[place], method=method, rtol=1e-6, **changes)
+    solution = refweb.run(free)
+    assert solution.solver["nsteps"] < 1000
+    assert abs(solution.results["z"].value + 1.0 + 0.5 * 9.81 * 100.0) < 1e-4 * 490.0
+
+
 def drift_at(rtol):
     return refweb.run(scene(ball(), rtol=rtol)).solver["energy_drift"]
 
