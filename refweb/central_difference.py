@@ -33,6 +33,7 @@ from .stepping import (
     event_table,
     no_bound,
     no_energy,
+    refuse_open,
     rows_ahead,
     set_lengths,
     step_bound,
@@ -384,7 +385,4 @@ class CentralDifference:
 
     def judge(self, run):
         """Refuse a whole run whose energy drift exceeds `DRIFT`; `OpenBook`."""
-        if not run.drift <= DRIFT:
-            raise OpenBook(
-                f"energy drift {run.drift:.3g} of the largest energy of the run, limit {DRIFT:g}: {self._remedy}"
-            )
+        refuse_open(run, DRIFT, self._remedy)

@@ -55,7 +55,7 @@ def decided(scene, system):
     if net.order > 1 or net.spread is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
         return _of(scene, "cvode", rtol=tolerance, family=family), f"{what} is not for explicit steps"
-    system = _untouched(system)
+    system = _undamped(system, "contact")  # its bound of damping and friction is that of all lines touched at once
     bound = _bound(system)
     steps = scene.solve.duration / (0.5 * bound)
     seconds = steps * step_price(system)
@@ -80,10 +80,10 @@ def decided(scene, system):
     return _of(scene, "central-difference"), price
 
 
-def _untouched(system):
-    """The system without the bound of contact's damping and friction, which is that of all lines touched at once."""
+def _undamped(system, only=None):
+    """The system without the bounds of damping: of an effect, by its name, or of all."""
     calm = copy.copy(system)
-    calm.families = [replace(f, damping_bound=None) if f.name == "contact" else f for f in system.families]
+    calm.families = [replace(f, damping_bound=None) if only in (None, f.name) else f for f in system.families]
     return calm
 
 
@@ -100,9 +100,7 @@ def step_price(system):
 
 def _damped(system, bound):
     """By what factor damping makes the bound of stability smaller."""
-    undamped = copy.copy(system)
-    undamped.families = [replace(f, damping_bound=None) for f in system.families]
-    return _bound(undamped) / bound
+    return _bound(_undamped(system)) / bound
 
 
 def _of(scene, method, **keys):

@@ -34,16 +34,12 @@ def _weights(system, quantity):
 
 def _outer(system, rows):
     """What bodies feel besides contact, g + B x + C v: g [N], B and C where a frame turns; shape (rows, 3 or 21)."""
-    still, families = np.zeros((system.rows, 3)), [f for f in system.families if not f.internal]
-
-    def force(x, v):
-        return sum((system.force_of(family, 0.0, x, v) for family in families), start=still)[rows]
-
-    parts, rest = [force(still, still)], []
+    parts, still = [system.outer_force(0.0)[rows]], np.zeros((system.rows, 3))
     if system.turns:
-        for unit in np.eye(3):
-            rest.append((force(still + unit, still) - parts[0], force(still, still + unit) - parts[0]))
-        parts += [np.stack(side, axis=-1).reshape(len(rows), 9) for side in zip(*rest, strict=True)]
+        moved = ([(still + unit, still) for unit in np.eye(3)], [(still, still + unit) for unit in np.eye(3)])
+        for states in moved:
+            slopes = [system.outer_force(0.0, x, v)[rows] - parts[0] for x, v in states]
+            parts.append(np.stack(slopes, axis=-1).reshape(len(rows), 9))
     return np.hstack(parts)
 
 
@@ -466,7 +462,7 @@ class Motion:
             text = "running" if accuracy == self._first else f"running with {self._key} = {accuracy:g}"
             with _Twin(self, accuracy, scene.accuracy.error == "twin") as twin:
                 try:
-                    results = self._run(self._solver, folder, functools.partial(tell, text))
+                    results, run = self._run(self._solver, folder, functools.partial(tell, text))
                 except OpenBook as error:
                     if attempt == 2 or scene.solve.step_size is not None:
                         raise
@@ -478,21 +474,21 @@ class Motion:
                 other, ended, rows, failure = twin.results()
             break
         solution.reduced, self._repeated = results, 0
-        if other and self._stopped != ended.stopped:
-            which = "the run" if self._stopped else "its twin of a smaller error"
+        if other and run.stopped != ended.stopped:
+            which = "the run" if run.stopped else "its twin of a smaller error"
             solution.warnings.append(f"no errors are known: an event ends {which} and not the other of the two")
         elif other:
             less = FINER ** (-2.0 / 3.0)
             if self.explicit:
-                less = (self._density / (ended.nsteps / ended.time)) ** 2 if ended.nsteps else 0.5
+                less = (run.nsteps / run.time / (ended.nsteps / ended.time)) ** 2 if ended.nsteps else 0.5
             factor = 1.0 / (1.0 - less)
             own = np.array(self.rows) if folder is None else folder.rows()
             solution.reduced = with_errors(results, other, own[:, : rows.shape[1]], rows, factor)
-            for found, width, time in zip(solution.events, self._widths, ended.events[:, TIME], strict=True):
+            for found, width, time in zip(solution.events, run.events[:, SIDE], ended.events[:, TIME], strict=True):
                 if found["time"] is not None and np.isfinite(time):
                     off = abs(found["time"] - float(time))
                     found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
-            if self._stopped and len(own) > 1:
+            if run.stopped and len(own) > 1:
                 self._add_lateness(own[-2:])
         if failure:
             solution.warnings.append(f"no errors are known: the twin run failed: {failure}")
@@ -508,7 +504,7 @@ class Motion:
                 solution.reduced[name] = result._replace(error=result.error + float(change[i]))
 
     def _run(self, solver, folder, tell):
-        """One run from start to end, with rows and frames; returns its results."""
+        """One run from start to end, with rows and frames; returns its results and its end."""
         times, stops = self._times()
         run, ahead = self._set_off(solver, folder, times, stops)
         tell(ahead / len(times))
@@ -529,7 +525,7 @@ class Motion:
                 tell((last + 1) / len(times))
         finally:
             self._note(run)
-        return self.results(run, self.rows[-1])
+        return self.results(run, self.rows[-1]), run
 
     def _set_off(self, solver, folder, times, stops):
         """The run at its start, or where its checkpoint has it, and the number of the row ahead."""
@@ -558,8 +554,6 @@ class Motion:
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
             for event, time in zip(self.scene.event, run.events[:, TIME], strict=True)
         ]
-        self._widths, self._stopped = run.events[:, SIDE].copy(), run.stopped
-        self._density = run.nsteps / run.time if run.time else 0.0
         figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.figures(run))
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **self._choice, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None

@@ -268,7 +268,6 @@ class Ida(Implicit):
         return run
 
     def _begin(self, t, x, v):
-        from scipy.sparse.linalg import splu
         from sksundae.ida import IDA
 
         n, heavy, count = self.unknowns, self._heavy, self._count
@@ -277,9 +276,9 @@ class Ida(Implicit):
         if self._links:
             slope, multipliers = self._links.start(*rows, force)
         else:
-            slope, multipliers = force.ravel()[self.system.free[heavy]], np.zeros(0)
+            slope, multipliers = np.zeros(0), np.zeros(0)
             if len(heavy):
-                slope = splu(self._M[heavy][:, heavy].tocsc()).solve(slope)
+                slope = self.system.moved_by(force).ravel()[self.system.free[heavy]]
         algebraic = np.concatenate([self._bare, n + len(heavy) + np.arange(2 * count)])
         self._solver = IDA(
             self._residual,

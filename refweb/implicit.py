@@ -38,6 +38,7 @@ from .stepping import (
     event_table,
     no_energy,
     passes,
+    refuse_open,
 )
 
 TRAVEL = 0.2
@@ -487,18 +488,18 @@ class Implicit:
         if not share <= max(DRIFT, CLOSING * run.share):
             raise OpenBook(
                 f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, "
-                f"limit {DRIFT:g}: use a smaller rtol than {self.rtol:g}"
+                f"limit {DRIFT:g}: {self._remedy}"
             )
         if run.largest > 0.0:
             run.share = share
 
     def judge(self, run):
         """Refuse a whole run whose energy drift exceeds `refweb.stepping.DRIFT`; `OpenBook`."""
-        if not run.drift <= DRIFT:
-            raise OpenBook(
-                f"energy drift {run.drift:.3g} of the largest energy of the run, limit {DRIFT:g}: use a smaller rtol "
-                f"than {self.rtol:g}"
-            )
+        refuse_open(run, DRIFT, self._remedy)
+
+    @property
+    def _remedy(self):
+        return f"use a smaller rtol than {self.rtol:g}"
 
     @contextlib.contextmanager
     def _reported(self, run):

@@ -216,7 +216,6 @@ class Dynamics:
     def _outside(self, trial, deadline):
         """Run scipy's DOP853 with the forces of the system."""
         from scipy.integrate import DOP853
-        from scipy.sparse.linalg import splu
 
         from .implicit import TRAVEL, scales
 
@@ -227,7 +226,7 @@ class Dynamics:
         system.drive(0.0, x, v)
         mass, held = np.repeat(system.net.mass, 3)[free], np.where(system.supported, x, 0.0)
         consistent = system.net.spread is not None
-        over_mass = splu(system.pattern.matrix(system.mass())).solve if consistent else lambda f: f / mass
+        over_mass = system.inverse_mass[1].solve if consistent else lambda f: f / mass
 
         def rows(t, y):
             x, v = held.copy(), np.zeros((system.rows, 3))

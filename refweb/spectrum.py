@@ -248,12 +248,10 @@ class _Pencil:
         left = np.linalg.norm(vectors.T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too
         return residual, residual + _EPS * rounding + left
 
-    def _turned(self, squared, vectors):
+    def _turned(self, squared, shapes):
         """How far Coriolis forces may move ω²."""
         system = self.system
         turning = next((f.data[0, :3] for f in system.families if f.name == "frame"), np.zeros(3))
-        shapes = np.zeros((vectors.shape[1], system.rows, 3))
-        shapes.reshape(len(shapes), -1)[:, system.free] = vectors.T
         force = np.where(system.supported, 0.0, np.cross(turning, shapes))
         speed = np.linalg.norm(turning)
         felt = abs(force).max(axis=(1, 2)) > 1e-9 * speed * abs(shapes).max(axis=(1, 2))
@@ -266,10 +264,10 @@ class _Pencil:
         squared = (vectors * (self.K @ vectors)).sum(axis=0)
         vectors, squared = vectors[:, (order := np.argsort(squared))], squared[order]
         residual, bound = self._bounds(squared, vectors)
-        bound = bound + self._turned(squared, vectors)
         modes = np.arange(len(squared))
         shapes = np.zeros((len(modes), system.rows, 3))
         shapes.reshape(len(modes), -1)[:, system.free] = vectors.T
+        bound = bound + self._turned(squared, shapes)
         kinetic = np.zeros_like(shapes)
         kinetic.reshape(len(modes), -1)[:, system.free] = (vectors * (self.M @ vectors)).T
         size = np.linalg.norm(shapes, axis=2)

@@ -80,8 +80,7 @@ def check_supported(system, t):
     """Refuse a load that no support carries, a frame that turns too fast, and links."""
     if system.constraints:
         raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
-    still = np.zeros((system.rows, 3))
-    outer = sum((system.force_of(f, t, still) for f in system.families if not f.internal), start=still)
+    outer = system.outer_force(t)
     for rows, axis in system.loose:
         resultant = np.sum(outer[rows, axis])
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
@@ -344,8 +343,7 @@ def _by_interior_point(newton, t, x, spent):
 def _by_stiffening(newton, t, x, spent):
     """Equilibrium from those of softer nets, in which no line snaps taut; slack parts turn far under tiny loads."""
     system, data = newton.system, newton.system.net.line_data
-    own, still = data[:, AXIAL_STIFFNESS].copy(), np.zeros((system.rows, 3))
-    load = np.abs(sum(system.force_of(f, t, still) for f in system.families if not f.internal)).max()
+    own, load = data[:, AXIAL_STIFFNESS].copy(), np.abs(system.outer_force(t)).max()
     softer = SOFTEST * newton.axial / load if load > 0.0 else 1.0
     try:
         while softer > 1.0:

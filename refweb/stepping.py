@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .compiled import BOUND, ENERGY, kernel
+from .errors import OpenBook
 from .lines import LENGTH
 from .probes import PLACE
 
@@ -27,6 +28,12 @@ SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
 and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts, and
 whether being above at t = 0 does (`AT_ONCE`); whether the run ends there; time of the event, infinite before."""
 AT_ONCE = 2.0
+
+
+def refuse_open(run, limit, remedy):
+    """Refuse a whole run whose energy drift exceeds a limit; `OpenBook`."""
+    if not run.drift <= limit:
+        raise OpenBook(f"energy drift {run.drift:.3g} of the largest energy of the run, limit {limit:g}: {remedy}")
 
 
 def event_table(events):

@@ -80,7 +80,7 @@ class System:
         if not waiting and all(family.at_rest for family in self.families):
             return self
         rest = copy.copy(self)
-        for kept in ("pattern", "loose", "_inverse_mass"):
+        for kept in ("pattern", "loose", "inverse_mass"):
             rest.__dict__.pop(kept, None)
         rest.supported = self.supported.copy()
         rest.supported[waiting] = True
@@ -187,6 +187,14 @@ class System:
         family.force(t, x, self._rest if v is None else v, f, family.cells, family.data, out)
         return f
 
+    def outer_force(self, t, x=None, v=None):
+        """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
+        outer, x = np.zeros((self.rows, 3)), self._rest if x is None else x
+        for family in self.families:
+            if not family.internal:
+                outer += self.force_of(family, t, x, v)
+        return outer
+
     def lengths(self, t, x):
         """Natural length of each element [m], and ∂E/∂L [N]; the work of their change is the integral of both."""
         self.prepare(t)
@@ -207,22 +215,22 @@ class System:
         return coo_array((net.spread.ravel(), pairs), shape=(self.rows, self.rows)).tocsr()
 
     @cached_property
-    def _inverse_mass(self):
+    def inverse_mass(self):
         """Free components that have mass, and the factorized mass matrix of these."""
         from scipy.sparse.linalg import splu
 
         heavy = np.repeat(self.net.mass, 3)[self.free] > 0.0
         return self.free[heavy], splu(self.pattern.matrix(self.mass())[heavy][:, heavy].tocsc())
 
-    def _moved_by(self, push):
+    def moved_by(self, push):
         """M⁻¹ of a push on every row, for what is free: accelerations [m/s²] by forces; shape (rows, 3)."""
-        (at, mass), moved = self._inverse_mass, np.zeros((self.rows, 3))
+        (at, mass), moved = self.inverse_mass, np.zeros((self.rows, 3))
         moved.ravel()[at] = mass.solve(push.ravel()[at])
         return moved
 
     def kick(self, jump):
         """Jump of all velocities where prescribed ones jump by ``jump`` [m/s]: consistent mass passes it on."""
-        return jump if self._spread is None else jump - self._moved_by(self._spread @ jump)
+        return jump if self._spread is None else jump - self.moved_by(self._spread @ jump)
 
     @cached_property
     def links(self):
@@ -240,7 +248,7 @@ class System:
         if self.constraints:
             force += self.links.force(x, v, force)
         if self._spread is not None and not self.net.quasi_static:
-            force -= np.where(self.supported, self._spread @ self._moved_by(force), 0.0)
+            force -= np.where(self.supported, self._spread @ self.moved_by(force), 0.0)
         return force, out
 
     def momentum(self, v):
