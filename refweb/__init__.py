@@ -8,34 +8,34 @@ __version__ = "0.1.0"
 _HOME = {
     "run": "runner",
     "resume": "runner",
-    "modes": "vibration",
-    "Modes": "vibration",
-    "cost": "work_precision",
-    "Cost": "work_precision",
+    "modes": "studies.modes",
+    "Modes": "studies.modes",
+    "cost": "studies.work_precision",
+    "Cost": "studies.work_precision",
     "Scene": "scene",
     "Static": "settings",
     "Dynamic": "settings",
     "Supports": "settings",
     "Output": "settings",
-    "Observe": "observables",
-    "Solution": "solution",
-    "Cable": "cables",
-    "Group": "cables",
-    "Law": "laws",
-    "Web": "webs",
-    "SingleCable": "single_cable",
-    "Inline": "given_webs",
-    "File": "given_webs",
-    "Paper": "lattices",
-    "Window": "lattices",
-    "Layers": "lattices",
+    "Observe": "results.observables",
+    "Solution": "results.solution",
+    "Cable": "net.cable",
+    "Group": "net.cable",
+    "Law": "net.tension_laws",
+    "Web": "net.web",
+    "SingleCable": "net.single_cable",
+    "Inline": "net.inline",
+    "File": "net.inline",
+    "Paper": "net.lattices",
+    "Window": "net.lattices",
+    "Layers": "net.lattices",
     "Gravity": "effects.gravity",
     "Load": "effects.load",
     "Motion": "effects.motion",
     "PointMass": "effects.point_mass",
     "Velocity": "effects.velocity",
     "Body": "effects.body",
-    "Contact": "effects.contact",
+    "Contact": "effects.contact.table",
     "Link": "effects.link",
     "Frame": "effects.frame",
     "Pressure": "effects.pressure",
@@ -46,7 +46,7 @@ _HOME = {
     "Temperature": "effects.temperature",
     "Accuracy": "settings",
     "Event": "settings",
-    "InputError": "inputs",
+    "InputError": "errors",
     "SolverError": "errors",
 }
 __all__ = sorted(_HOME)
@@ -56,7 +56,7 @@ def __getattr__(name):
     import importlib
 
     if name not in _HOME:
-        from .inputs import nearest
+        from .tables import nearest
 
         raise AttributeError(f"module 'refweb' has no attribute {name!r}, {nearest(name, _HOME)}")
     return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -15,7 +15,7 @@ import threading
 import warnings
 from dataclasses import replace
 
-from .inputs import InputError
+from .errors import InputError
 
 
 def parser():
@@ -92,9 +92,9 @@ def _resume(arguments):
 
 def _check(arguments):
     from .console import before
+    from .results.solution import Solution
     from .runner import follower_of
     from .scene import Scene
-    from .solution import Solution
 
     scene = Scene.load(arguments.scene)
     system = scene.build()
@@ -106,7 +106,7 @@ def _info(arguments):
     import json
 
     from .console import before, modal, stored, work_precision
-    from .runner import web_of
+    from .results.provenance import web_of
     from .scene import Scene
 
     folder = pathlib.Path(arguments.source)
@@ -136,7 +136,7 @@ def _info(arguments):
 
 def _picture(arguments):
     from .console import progress
-    from .pictures import animate, picture
+    from .pictures.pictures import animate, picture
 
     if arguments.animate:
         if arguments.frame is not None:
@@ -152,7 +152,7 @@ def _picture(arguments):
 def _modes(arguments):
     from .console import before, modal, progress
     from .scene import Scene, slug
-    from .vibration import modes
+    from .studies.modes import modes
 
     scene = Scene.load(arguments.scene)
     out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
@@ -165,7 +165,7 @@ def _modes(arguments):
 def _cost(arguments):
     from .console import before, progress, work_precision
     from .scene import Scene
-    from .work_precision import cost
+    from .studies.work_precision import cost
 
     scene, out = Scene.load(arguments.scene), arguments.out
     options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}

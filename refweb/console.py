@@ -11,9 +11,9 @@ from rich.panel import Panel
 from rich.table import Table as Grid
 from rich.text import Text
 
-from .runner import web_of
+from .results.provenance import web_of
+from .results.units import prefixed
 from .scene import table_of
-from .units import prefixed
 
 _SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
 
@@ -63,7 +63,7 @@ def before(scene, system):
     groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
     how = f"{solve.kind}, {solve.method}, "
     if solve.method == "auto":
-        from .choice import decided
+        from .dynamics.method_choice import decided
 
         solve, why = decided(scene, system)
         how = f"{solve.kind}, {solve.method} ({why}), "

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import sys
 
-from .inputs import InputError
+from .errors import InputError
 
 EXPLICIT, IMPLICIT, CONTACT, KEPT = 1e3, 6e3, 3e2, 2e2
 """Bytes for each element of order 1: of explicit methods and of others, for each body that it may touch, and of each

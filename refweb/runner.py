@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import pathlib
-import sys
 import time
 
 import numpy as np
 
-from . import __version__
-from .errors import SolverError
-from .inputs import InputError, short
-from .io import Folder, check_folder, read_summary
-from .laws import LINEAR, SMOOTH
-from .observables import Result
+from .errors import InputError, SolverError
+from .net.tension_laws import LINEAR, SMOOTH
+from .results.folder import Folder, check_folder, read_summary
+from .results.observables import Result
+from .results.provenance import versions, web_of
+from .results.solution import SOLVER, Solution, as_history
+from .results.state import State, floor_remark, strength_remark
 from .scene import Scene, in_file
-from .solution import SOLVER, Solution, as_history
-from .state import State, floor_remark, strength_remark
+from .tables import short
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):
@@ -77,7 +75,7 @@ def resume(folder, progress=None, announce=None):
     SolverError
         See `run`.
     """
-    from .starts import checkpoint
+    from .dynamics.initial_state import checkpoint
 
     folder = pathlib.Path(folder)
     name = f"result folder {short(str(folder))}:"
@@ -120,7 +118,7 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
             tell("finding the errors of elements", 1.0)
             _refine(scene, solution)
         if scene.accuracy.horizon:
-            from .horizon import horizon
+            from .studies.predictability import horizon
 
             solution.horizon = horizon(follower, solution.results, scene.accuracy.ensemble, tell)
         solution.status = "solved"
@@ -148,7 +146,7 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
 
 def _refine(scene, solution):
     """Add the errors of elements to the results."""
-    from .accuracy import discretisation_errors
+    from .statics.smoothing_error import discretisation_errors
 
     def results(solution):
         return [step["results"] for step in solution.steps] or [solution.reduced]
@@ -177,7 +175,7 @@ def follower_of(scene, system, solution, kept=None):
     with in_file(scene.file):
         if scene.solve.kind == "static":
             return _LoadSteps(scene, system, solution)
-        from .dynamics import Motion
+        from .dynamics.simulation import Motion
 
         return Motion(scene, system, solution, kept)
 
@@ -198,10 +196,10 @@ class _LoadSteps:
 
     def _solver(self):
         if self.scene.solve.method == "relaxation":
-            from . import relaxation
+            from .statics import dynamic_relaxation as relaxation
 
             return relaxation.solve
-        from . import statics
+        from .statics import newton as statics
 
         return statics.solve
 
@@ -216,7 +214,7 @@ class _LoadSteps:
 
         smoothing = None
         if self.system.net.law.number == SMOOTH and scene.solve.method == "newton" and scene.accuracy.error != "none":
-            from .accuracy import Smoothing
+            from .statics.smoothing_error import Smoothing
 
             smoothing = Smoothing(scene)
         totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
@@ -264,25 +262,6 @@ class _LoadSteps:
         for made in self._remarks.values():
             steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
             yield made[-1][1] + (f" (load step {steps})" if len(made) < len(self.rows) else "")
-
-
-def web_of(system):
-    """Sizes of the web, as `run.json` holds them."""
-    web, net = system.net.web, system.net
-    return {
-        "nodes": len(web.points),
-        "lines": len(web.lines),
-        "cells": int(web.cells),
-        "cable_length": float(np.sum(net.natural_length)),
-        "area": float(web.area),
-        "mass": net.cable_mass,
-    }
-
-
-def versions():
-    names = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
-    own = {"refweb": __version__, "python": sys.version.split()[0]}
-    return {**own, **{name: importlib.metadata.version(name) for name in names}}
 
 
 def _notices(scene, system):

@@ -16,16 +16,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .inputs import InputError, Table, choice, integer, nearest, short, shown, text
+from .errors import InputError
 from .settings import Accuracy, Dynamic, Event, Output, Static, Supports
+from .tables import Table, choice, integer, nearest, short, shown, text
 
 WEBS = {
-    "paper": "refweb.lattices:Paper",
-    "window": "refweb.lattices:Window",
-    "layers": "refweb.lattices:Layers",
-    "cable": "refweb.single_cable:SingleCable",
-    "inline": "refweb.given_webs:Inline",
-    "file": "refweb.given_webs:File",
+    "paper": "refweb.net.lattices:Paper",
+    "window": "refweb.net.lattices:Window",
+    "layers": "refweb.net.lattices:Layers",
+    "cable": "refweb.net.single_cable:SingleCable",
+    "inline": "refweb.net.inline:Inline",
+    "file": "refweb.net.inline:File",
 }
 EFFECTS = {
     "gravity": "refweb.effects.gravity:Gravity",
@@ -34,7 +35,7 @@ EFFECTS = {
     "point_mass": "refweb.effects.point_mass:PointMass",
     "velocity": "refweb.effects.velocity:Velocity",
     "body": "refweb.effects.body:Body",
-    "contact": "refweb.effects.contact:Contact",
+    "contact": "refweb.effects.contact.table:Contact",
     "link": "refweb.effects.link:Link",
     "frame": "refweb.effects.frame:Frame",
     "pressure": "refweb.effects.pressure:Pressure",
@@ -77,7 +78,7 @@ class Scene:
 
     Parameters
     ----------
-    web : refweb.webs.Web or a table that makes one
+    web : refweb.net.web.Web or a table that makes one
         Nodes, lines and natural lengths.
     cable : refweb.Cable
         Material and section.
@@ -94,7 +95,7 @@ class Scene:
     accuracy : Accuracy, optional
         How errors are found.
     observe : sequence of refweb.Observe
-        Numbers to follow; `refweb.observables.DEFAULT` without any.
+        Numbers to follow; `refweb.results.observables.DEFAULT` without any.
     event : sequence of Event
         Moments to find, in dynamics.
     title : str
@@ -197,8 +198,8 @@ class Scene:
 
         ``file`` is the name that begins the messages of `build`.
         """
-        single = {"cable": "refweb.cables:Cable", "supports": Supports, "output": Output, "accuracy": Accuracy}
-        several = {"support": Supports, "observe": "refweb.observables:Observe", "event": Event}
+        single = {"cable": "refweb.net.cable:Cable", "supports": Supports, "output": Output, "accuracy": Accuracy}
+        several = {"support": Supports, "observe": "refweb.results.observables:Observe", "event": Event}
         known = ["schema", "title", "seed", "web", "solve", *single, *several, *EFFECTS]
         for key in given:
             if key not in known:
@@ -256,7 +257,7 @@ class Scene:
     @property
     def observables(self):
         """The observables, or the default ones."""
-        from .observables import DEFAULT
+        from .results.observables import DEFAULT
 
         return tuple(self.observe) or DEFAULT
 
@@ -271,7 +272,7 @@ class Scene:
         return replace(self, **changes)
 
     def build(self):
-        """The `refweb.system.System` of this scene.
+        """The `refweb.system.system.System` of this scene.
 
         Raises
         ------
@@ -282,9 +283,9 @@ class Scene:
             return self._build()
 
     def _build(self):
-        from . import lines
         from .effects.elasticity import Elasticity
-        from .system import System
+        from .net import net as lines
+        from .system.system import System
 
         web = self.web
         if isinstance(web, Table):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .inputs import (
-    InputError,
+from .errors import InputError
+from .tables import (
     Table,
     boolean,
     choice,
@@ -92,7 +92,7 @@ class Dynamic(Table):
     ----------
     method : {"central-difference", "explicit", "cvode", "ida", "auto"}
         Explicit central differences, explicit steps of higher order, or CVODE or IDA of SUNDIALS with steps that follow
-        from the error; "auto" chooses by what the scene is, see `refweb.choice`.
+        from the error; "auto" chooses by what the scene is, see `refweb.dynamics.method_choice`.
     duration : float
         Time to simulate [s].
     safety : float
@@ -100,7 +100,7 @@ class Dynamic(Table):
     step_size : float, optional
         Instead: largest step [s]; the step used is the largest below it that divides a history row.
     order : {4, 6}
-        Of "explicit": order of the steps, 6 by default, see `refweb.nystrom`.
+        Of "explicit": order of the steps, 6 by default, see `refweb.dynamics.integrators.splitting`.
     rtol : float
         Of CVODE and IDA: relative tolerance of displacements and velocities, 1e-6 by default.
     atol_position, atol_velocity : float, optional
@@ -111,7 +111,7 @@ class Dynamic(Table):
     max_order : int, optional
         Highest order: 2 by default, of Adams methods 12.
     linear_solver : {"auto", "block", "sparse", "dense", "fixed-point"}
-        How linear systems are solved, see `refweb.cvode`.
+        How linear systems are solved, see `refweb.dynamics.integrators.cvode`.
     mass : {"lumped", "consistent"}
         Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
     start : {"web", "equilibrium"} or path
@@ -246,7 +246,7 @@ class Accuracy(Table):
     refine : bool
         Whether the error of elements is found, by two more runs with two and four times as many.
     horizon : bool
-        Of dynamics: whether it is found how long the motion is determined, see `refweb.horizon`.
+        Of dynamics: whether it is found how long the motion is determined, see `refweb.studies.predictability`.
     ensemble : int, optional
         With ``horizon``: number of runs that mean and spread of results are taken of.
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from refweb import lines
-from refweb.cables import Cable
 from refweb.effects.elasticity import Elasticity
-from refweb.system import System
-from refweb.webs import Web
+from refweb.net import net as lines
+from refweb.net.cable import Cable
+from refweb.net.web import Web
+from refweb.system.system import System
 
 LAWS = {
     "smooth": dict(law="smooth", slackness=2e-3, smoothing=1e-2),

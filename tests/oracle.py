@@ -5,7 +5,7 @@ Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, T = A σ(
     internal force   ∫ T t·δx' ds
     tangent          ∫ [A σ' (t·δx')(t·dx') + T/λ (δx'·dx' − (t·δx')(t·dx'))] ds
 
-scikit-fem sees natural arc length through the mapping of `refweb.lines.basis` and numbers the components of nodes in
+scikit-fem sees natural arc length through the mapping of `refweb.net.net.basis` and numbers the components of nodes in
 its own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs from the
 numbering that scenes promise: the web's nodes, then those that order and subdivision add, line by line and along each
 line.
@@ -15,8 +15,8 @@ import numpy as np
 import skfem
 from skfem.helpers import dot
 
-from refweb import lines
-from refweb.elements import line_element
+from refweb.net import net as lines
+from refweb.net.elements import line_element
 
 
 def along(u):
@@ -83,9 +83,9 @@ class Oracle:
 
     Parameters
     ----------
-    web : refweb.webs.Web
+    web : refweb.net.web.Web
         The web.
-    cable : refweb.cables.Cable
+    cable : refweb.net.cable.Cable
         Its material, order and subdivision.
 
     Attributes

@@ -1,9 +1,9 @@
-"""The order of the modules, read off their imports.
+"""The house: rooms from the ground up, read off the imports themselves.
 
-`LAYERS` stands from the bottom to the top. A module imports only modules of layers below its own, at its head and
-inside its functions alike: what a solver sees is the system, what an effect sees is the net, and a scene alone knows
-every effect's name. The package itself, ``refweb/__init__.py``, is below all of them: it holds the version, and the
-names it exports are imported when they are used.
+`ROOMS` stands from the bottom to the top, a row a room: its modules import only what stands above their row, or beside
+them in the same room, and no chain of imports comes back to where it began. What a package knows and must not know is
+the first sentence of its docstring. ``refweb/__init__.py`` is below all of them: it holds the version, and the names
+that it exports are imported when they are used.
 """
 
 import ast
@@ -13,53 +13,48 @@ import re
 import pytest
 
 import refweb
-from refweb.inputs import Table
+from refweb.scene import EFFECTS
+from refweb.tables import Table
 
-LAYERS = [
-    ["inputs", "errors", "compiled", "units"],
-    ["shapes", "memory", "vectors"],
-    ["contact_points", "bodies"],
-    ["shape_contacts"],
-    ["penalty"],
-    ["rubbing"],
-    ["laws", "time_tables", "probes", "webs"],
-    ["lattices", "single_cable", "given_webs", "cables", "settings"],
-    ["elements"],
-    ["lines"],
-    ["stepping"],
-    ["pattern", "factor"],
-    ["effects"],
-    ["lengths", "links"],
-    ["effects.elasticity", "effects.gravity", "effects.load", "effects.motion", "effects.point_mass"]
-    + ["effects.velocity", "effects.body", "effects.contact"]
-    + ["effects.damping", "effects.bending"]
-    + ["effects.frame", "effects.pressure", "effects.thrust"]
-    + ["effects.reel", "effects.temperature", "effects.link"],
-    ["system"],
-    ["certificate", "interior", "spectrum", "spin_limit", "follower_loads", "massless"],
-    ["statics", "central_difference"],
-    ["nystrom"],
-    ["implicit"],
-    ["cvode"],
-    ["ida"],
-    ["relaxation"],
-    ["state"],
-    ["observables"],
-    ["io"],
-    ["solution"],
-    ["scene", "starts", "choice"],
-    ["dynamics"],
-    ["accuracy", "horizon"],
-    ["runner"],
-    ["vibration", "ladders", "diagram"],
-    ["work_precision"],
-    ["views", "shots", "drawing"],
-    ["console", "pictures"],
-    ["__main__"],
+ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of its docstring
+    ("the ground floor", "errors tables kernels memory settings registry", ""),
+    (
+        "net",
+        "*",
+        "What is there: nodes, lines, lengths, laws, elements, mass, bodies; it knows no forces, time or solvers.",
+    ),
+    ("effects", "*", "What acts on a net, one file an effect; no effect knows another, a global matrix or a solver."),
+    (
+        "effects.contact",
+        "*",
+        "Contact of lines with bodies: where they touch, how deep, and the forces of penalty, damping and friction.",
+    ),
+    (
+        "system",
+        "*",
+        "M v' = f assembled: force, tangent, mass, links and factorizations; it knows no scene, method or file.",
+    ),
+    (
+        "results",
+        "*",
+        "One instant, its observables, the solution and the result folder; it does not know how they were computed.",
+    ),
+    ("pictures", "*", "A result folder drawn; it knows folders, and nothing of what made them."),
+    ("the scene", "build scene", ""),
+    ("statics", "*", "Equilibria and their bounds; it knows no time and no events."),
+    (
+        "dynamics.integrators",
+        "*",
+        "One system through time, seen by probes; it knows no scene, no files and no errors of results.",
+    ),
+    ("dynamics", "*", "A scene through time: start, rows, frames, errors; it does not know the command line."),
+    ("studies", "*", "Runs about runs: errors of elements, horizons, modes and what digits cost."),
+    ("the desk", "solution runner console", ""),
+    ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
+    ("the door", "__main__", ""),
 ]
-LEVEL = {"": -1, **{name: level for level, names in enumerate(LAYERS) for name in names}}
 ROOT = pathlib.Path(refweb.__file__).parent
-EFFECT = re.compile(r"(?:refweb\.)?effects\.(\w+)")
+EFFECT = re.compile(r"(?:refweb\.)?effects\.([\w.]+)")
 
 
 def name_of(path):
@@ -69,7 +64,7 @@ def name_of(path):
 
 
 MODULES = {name_of(path): ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))}
-PACKAGES = {"", "effects"}
+PACKAGES = {name_of(path) for path in ROOT.rglob("__init__.py")}
 
 
 def imported(name, node):
@@ -117,44 +112,81 @@ def texts(name):
     return [node.value for node in nodes if isinstance(node.value, str)]
 
 
-def test_every_module_has_a_layer():
-    for name in MODULES:
-        assert name in LEVEL, f"refweb/{name.replace('.', '/')}.py has no layer: give it its place in LAYERS"
-    for name in LEVEL:
-        assert name in MODULES, f"LAYERS names {name!r}, which is no module of refweb"
-    assert len(LEVEL) == 1 + sum(map(len, LAYERS)), "a module stands twice in LAYERS"
+def room_of(name):
+    """Number of the room of a module: that of the longest package that has one, or of the root."""
+    if name in ROOT_ROOMS:
+        return ROOT_ROOMS[name]
+    parts = name.split(".")
+    return next(FOLDERS[p] for p in (".".join(parts[:end]) for end in range(len(parts), 0, -1)) if p in FOLDERS)
 
 
-@pytest.mark.parametrize("name", sorted(MODULES.keys() - {""}))
-def test_imports_go_downwards(name):
-    for used in uses(name):
-        assert LEVEL[used] < LEVEL[name], f"{name} imports {used}, which is not below it"
+FOLDERS = {room: number for number, (room, modules, _) in enumerate(ROOMS) if modules == "*"}
+ROOT_ROOMS = {m: number for number, (_, modules, _) in enumerate(ROOMS) if modules != "*" for m in modules.split()}
+INSIDE = sorted(MODULES.keys() - {""})
+
+
+def test_every_module_has_a_room():
+    root = {name for name in INSIDE if "." not in name} - PACKAGES
+    assert root <= ROOT_ROOMS.keys(), f"no room for {root - ROOT_ROOMS.keys()}"
+    assert len(root) <= 14, "a dozen files at the root: what is more belongs into a room"
+    assert PACKAGES - {""} == FOLDERS.keys()
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_no_arrow_goes_upwards(name):
+    for used in uses(name) - {""}:
+        assert room_of(used) <= room_of(name), f"{name} imports {used}, which stands above it"
+
+
+def test_no_circle():
+    """Packages count as what their ``__init__`` imports."""
+    graph, done, path = {name: uses(name) - {"", name} for name in INSIDE}, set(), []
+
+    def visit(name):
+        assert name not in path, f"a circle of imports: {' → '.join([*path[path.index(name) :], name])}"
+        if name not in done:
+            path.append(name)
+            for used in graph[name]:
+                visit(used)
+            done.add(path.pop())
+
+    for name in INSIDE:
+        visit(name)
+
+
+@pytest.mark.parametrize("room", [room for room, *_ in ROOMS if room in PACKAGES])
+def test_a_package_says_what_it_knows(room):
+    sentence = next(sentence for name, _, sentence in ROOMS if name == room)
+    assert sentence and " ".join(ast.get_docstring(MODULES[room]).split()).startswith(sentence)
 
 
 def test_the_package_imports_nothing_at_its_head():
     head = [node for node in MODULES[""].body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert head == [] and uses("") == {"inputs"}
+    assert head == [] and uses("") == {"tables"}
 
 
-def test_no_effect_knows_another():
-    effects = {name for name in MODULES if name.startswith("effects.")}
-    for name in effects:
-        assert not uses(name) & effects - {name}, f"{name} imports another effect"
-        assert not any(EFFECT.fullmatch(text) for text in texts(name))
+OWNERS = {reference.split(":")[0].removeprefix("refweb.") for reference in EFFECTS.values()} | {"effects.elasticity"}
+"""Modules that hold an effect each."""
 
 
-def test_only_the_scene_names_the_effects():
+def named(name):
+    """Effects that a module imports or names in a text of its code."""
+    found = {used for used in uses(name) if used in OWNERS}
+    return found | {f"effects.{match}" for text in texts(name) for match in EFFECT.findall(text)} & OWNERS
+
+
+@pytest.mark.parametrize("name", sorted(OWNERS))
+def test_no_effect_knows_another(name):
+    assert not named(name) - {name}
+
+
+def test_one_table_names_the_effects():
     """The package exports them by name; elasticity, which every net has, is known to what reads lines as well."""
-    named = {}
-    for name in MODULES:
-        found = {used.removeprefix("effects.") for used in uses(name) if used.startswith("effects.")}
-        found |= {match for text in texts(name) for match in EFFECT.findall(text)}
-        if found and not name.startswith("effects"):
-            named[name] = found
-    assert set(named) - {"", "scene"} <= {"state", "interior", "certificate", "system"}
-    assert all(found == {"elasticity"} for name, found in named.items() if name not in ("", "scene"))
-    effects = {name.removeprefix("effects.") for name in MODULES if name.startswith("effects.")}
-    assert named["scene"] == effects and named[""] <= effects - {"elasticity"}
+    found = {name: named(name) for name in INSIDE if not name.startswith("effects") and named(name)}
+    assert found.pop("scene") == OWNERS
+    assert found.keys() <= {"results.state", "statics.interior_point", "statics.duality_bound", "system.system"}
+    assert all(names == {"effects.elasticity"} for names in found.values())
+    assert named("") == OWNERS - {"effects.elasticity"}
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))

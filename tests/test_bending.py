@@ -11,13 +11,13 @@ from nets import skew_cable, skew_web
 from scipy.optimize import brentq
 
 import refweb
-from refweb import lines
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.bending import Bending, springs
-from refweb.ida import Ida
-from refweb.inputs import InputError
-from refweb.system import System
+from refweb.errors import InputError
+from refweb.net import net as lines
+from refweb.system.system import System
 
 
 def slope(errors, steps):

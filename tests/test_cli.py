@@ -9,8 +9,9 @@ import tomllib
 import pytest
 
 import refweb
-from refweb import scene, statics
+from refweb import scene
 from refweb.__main__ import main
+from refweb.statics.newton import newton as statics
 
 SCENE = """
 title = "Small web"
@@ -299,7 +300,7 @@ def test_help_imports_nothing_heavy():
     done = python("-X", "importtime", "-m", "refweb", "--help")
     assert done.returncode == 0 and "run" in done.stdout and "picture" in done.stdout
     names = {line.split("|")[-1].strip() for line in done.stderr.splitlines() if line.startswith("import time:")}
-    assert "argparse" in names and "refweb.inputs" in names
+    assert "argparse" in names and "refweb.tables" in names
     heavy = {"numpy", "scipy", "numba", "skfem", "meshio", "pyvista", "matplotlib", "sksundae", "rich", "qdldl"}
     assert not heavy & {name.split(".")[0] for name in names}
 
@@ -321,8 +322,8 @@ def test_a_run_loads_only_what_its_scene_calls_for(tmp_path):
     names = loaded(code, cwd=tmp_path)
     assert not {"pyvista", "vtk", "matplotlib", "sksundae"} & names
     effects = {name.removeprefix("refweb.effects.") for name in names if name.startswith("refweb.effects.")}
-    assert effects == {"elasticity", "gravity"}
-    assert not {"refweb.pictures", "refweb.lattices"} & names
+    assert effects == {"base", "elasticity", "gravity"}
+    assert not {"refweb.pictures.pictures", "refweb.net.lattices"} & names
 
 
 def test_statuses_as_the_shell_sees_them(tmp_path):

@@ -10,10 +10,10 @@ from scipy.optimize import brentq
 from scipy.special import beta
 
 import refweb
-from refweb.bodies import surface
-from refweb.central_difference import CentralDifference
-from refweb.shape_contacts import depth
-from refweb.state import State
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.effects.contact.signed_distance import depth
+from refweb.net.rigid_body import surface
+from refweb.results.state import State
 
 GRAVITY = 9.81
 RADIUS = 0.1

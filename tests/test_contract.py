@@ -18,12 +18,13 @@ from nets import LAWS, skew_net
 
 import refweb
 import refweb.effects
-from refweb import lines
-from refweb.central_difference import CentralDifference
-from refweb.effects import Drive, elasticity
-from refweb.inputs import InputError
-from refweb.shapes import SPHERE
-from refweb.system import System
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.effects import elasticity
+from refweb.effects.base import Drive
+from refweb.errors import InputError
+from refweb.net import net as lines
+from refweb.net.shapes import SPHERE
+from refweb.system.system import System
 
 EXAMPLES = {
     "Elasticity": [{}],
@@ -81,8 +82,8 @@ ROLES = ("on", "extend", "start")
 
 def effect_classes():
     found = {}
-    for module in pkgutil.iter_modules(refweb.effects.__path__):
-        content = importlib.import_module(f"refweb.effects.{module.name}")
+    for module in pkgutil.walk_packages(refweb.effects.__path__, "refweb.effects."):
+        content = importlib.import_module(module.name)
         for name, value in inspect.getmembers(content, inspect.isclass):
             if value.__module__ == content.__name__ and any(hasattr(value, role) for role in ROLES):
                 found[name] = value

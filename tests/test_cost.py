@@ -11,10 +11,10 @@ import pytest
 import refweb
 from refweb import scene as scenes
 from refweb.__main__ import main
-from refweb.choice import decided
-from refweb.dynamics import Motion
-from refweb.ladders import DYNAMIC, KIND, Trial
-from refweb.work_precision import COLUMNS, Cost, _compare
+from refweb.dynamics.method_choice import decided
+from refweb.dynamics.simulation import Motion
+from refweb.studies.trials import DYNAMIC, KIND, Trial
+from refweb.studies.work_precision import COLUMNS, Cost, _compare
 
 TAUT = dict(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=1e-2)
 THROWN = refweb.Velocity(node="centre", value=(0.5, 0.2, 2.0))

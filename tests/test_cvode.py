@@ -17,14 +17,17 @@ from scipy.integrate import solve_ivp
 from scipy.sparse.linalg import splu
 
 import refweb
-from refweb import cvode, dynamics, implicit, lines
 from refweb.__main__ import main
-from refweb.central_difference import CentralDifference, OpenBook
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators import cvode
+from refweb.dynamics.integrators import step_observer as implicit
+from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
+from refweb.dynamics.simulation import simulation as dynamics
 from refweb.effects.elasticity import Elasticity
-from refweb.ida import Ida
-from refweb.state import State
-from refweb.system import System
+from refweb.net import net as lines
+from refweb.results.state import State
+from refweb.system.system import System
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
 SOLVERS = ("block", "sparse", "dense", "fixed-point")
@@ -188,7 +191,7 @@ def test_adams_of_order_two_is_the_trapezoidal_rule():
 def test_trapezoidal_rule_on_an_oscillator():
     """It turns the phase by 2 atan(½ωh) in each step and keeps the energy, to the rounding of a linear equation."""
     web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]]).web()
-    net = refweb.lines.build(web, cable(law="linear"))
+    net = refweb.net.net.build(web, cable(law="linear"))
     supported = np.array([[True] * 3, [False, True, True]])
     system = System(net, [Elasticity()], supported)
     rate = np.sqrt(MODULUS * AREA / net.mass[1])
@@ -667,7 +670,7 @@ def test_a_run_may_end_before_it_has_begun(tmp_path):
 import gc, sys
 sys.path.insert(0, {tests!r})
 import test_cvode
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.cvode import Cvode
 def fault(self, t, y, yp):
     raise ZeroDivisionError
 own, Cvode._right_side = Cvode._right_side, fault

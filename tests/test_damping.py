@@ -10,14 +10,14 @@ from nets import LAWS, skew_net
 from scipy.integrate import solve_ivp
 
 import refweb
-from refweb import lines
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
-from refweb.ida import Ida
-from refweb.inputs import InputError
-from refweb.state import State
-from refweb.system import System
+from refweb.errors import InputError
+from refweb.net import net as lines
+from refweb.results.state import State
+from refweb.system.system import System
 
 OMEGA, MASSES, REDUCED, SPEED = 100.0, (1.0, 3.0), 0.75, 0.6
 APART = np.array([[-0.2, 0.0, 0.0], [0.4, 0.0, 0.0]])

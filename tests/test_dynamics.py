@@ -15,11 +15,12 @@ import pytest
 from scipy.integrate import DOP853
 
 import refweb
-from refweb import central_difference, dynamics
 from refweb.__main__ import main
-from refweb.central_difference import CentralDifference, OpenBook
-from refweb.dynamics import SPREAD
-from refweb.state import State
+from refweb.dynamics.integrators import central_difference
+from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
+from refweb.dynamics.simulation import SPREAD
+from refweb.dynamics.simulation import simulation as dynamics
+from refweb.results.state import State
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
 SOUND = np.sqrt(MODULUS / DENSITY)

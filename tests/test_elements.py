@@ -9,10 +9,11 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
-from refweb import elements, lines
-from refweb.cables import Cable
-from refweb.state import State
-from refweb.webs import Web
+from refweb.net import elements
+from refweb.net import net as lines
+from refweb.net.cable import Cable
+from refweb.net.web import Web
+from refweb.results.state import State
 
 # Both ways sum some dozen products of numbers with a relative rounding of 1e-16 each, and the oracle's strain λ − 1 is
 # rounded to 1e-16 of a largest strain near 0.1: 1e-15 of the largest entry, and a factor of 100 to be safe.

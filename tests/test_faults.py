@@ -22,8 +22,9 @@ import pytest
 import tomli_w
 
 import refweb
-from refweb import central_difference, implicit
 from refweb.__main__ import main
+from refweb.dynamics.integrators import central_difference
+from refweb.dynamics.integrators import step_observer as implicit
 
 WEB = refweb.Window(mesh="hexagon", rows=4, columns=3, side=0.2)
 CABLE = refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
@@ -248,7 +249,7 @@ def test_a_resumed_run_can_be_resumed(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(refweb.dynamics, "with_errors", lost)
+        patch.setattr(refweb.dynamics.simulation, "with_errors", lost)
         with pytest.raises(KeyboardInterrupt):
             refweb.resume(cut)
     assert opens(cut) == 31
@@ -345,7 +346,7 @@ def test_a_static_row_that_cannot_be_written(tmp_path, monkeypatch, capsys):
     def full(self, numbers):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(refweb.io.Folder, "row", full)
+    monkeypatch.setattr(refweb.results.folder.Folder, "row", full)
     assert main(["run", "square-load", "--out", str(tmp_path / "out")]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and "No space left on device" in err

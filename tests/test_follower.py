@@ -7,14 +7,17 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import refweb
-from refweb import elements, lines, relaxation, statics
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
-from refweb.factor import Factor
-from refweb.ida import Ida
-from refweb.system import System
-from refweb.webs import Web
+from refweb.net import elements
+from refweb.net import net as lines
+from refweb.net.web import Web
+from refweb.statics.newton import dynamic_relaxation as relaxation
+from refweb.statics.newton import newton as statics
+from refweb.system.factorization import Factor
+from refweb.system.system import System
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
 EA = MODULUS * AREA

@@ -9,14 +9,16 @@ import scipy.linalg
 from scipy.spatial.transform import Rotation
 
 import refweb
-from refweb import lines, relaxation, statics
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
-from refweb.ida import Ida
+from refweb.net import net as lines
+from refweb.net.web import Web
 from refweb.scene import SHIPPED
-from refweb.system import System
-from refweb.webs import Web
+from refweb.statics.newton import dynamic_relaxation as relaxation
+from refweb.statics.newton import newton as statics
+from refweb.system.system import System
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
 EA = MODULUS * AREA

@@ -23,7 +23,7 @@ from hypothesis import HealthCheck, given, settings
 
 import refweb
 from refweb.__main__ import main
-from refweb.central_difference import CentralDifference
+from refweb.dynamics.integrators.central_difference import CentralDifference
 
 LONGEST = 150
 """Time that a small scene may take [s]: some milliseconds, or that to compile what it calls for first."""

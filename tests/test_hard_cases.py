@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb.dynamics.integrators.explicit_loop import DRIFT
 from refweb.errors import OpenBook
-from refweb.stepping import DRIFT
 from validation import hard_cases
 from validation.balances import energy_left, momentum_left, unbalanced
 from validation.hard_cases import STATIC, STATICS, attempt, matrix

@@ -7,8 +7,8 @@ import pytest
 
 import refweb
 from refweb.__main__ import main
-from refweb.horizon import PERTURBATION
-from refweb.inputs import InputError
+from refweb.errors import InputError
+from refweb.studies.predictability import PERTURBATION
 
 
 def oscillator(prestrain, duration, **accuracy):

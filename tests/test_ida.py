@@ -7,16 +7,17 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import refweb
-from refweb import lines, probes, statics
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.damping import Damping
 from refweb.effects.elasticity import Elasticity
 from refweb.effects.link import Link
-from refweb.errors import SolverError
-from refweb.ida import Ida
-from refweb.inputs import InputError
-from refweb.system import System
+from refweb.errors import InputError, SolverError
+from refweb.net import net as lines
+from refweb.results import probes
+from refweb.statics.newton import newton as statics
+from refweb.system.system import System
 
 SOLVERS = ["block", "sparse", "dense"]
 GRAVITY = 9.81

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import refweb
-from refweb.central_difference import CentralDifference
+from refweb.dynamics.integrators.central_difference import CentralDifference
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
 SOUND = np.sqrt(MODULUS / DENSITY)

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from refweb.laws import LINEAR, SMOOTH, TENSION_ONLY, Law, above_floor, curvature
+from refweb.net.tension_laws import LINEAR, SMOOTH, TENSION_ONLY, Law, above_floor, curvature
 
 mpmath.mp.dps = 60
 STRAINS = np.concatenate([s * np.logspace(-15, 0, 31) for s in (1, -1)] + [[0.0]])

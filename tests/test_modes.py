@@ -14,9 +14,9 @@ import scipy.special
 from test_cli import SCENE, files, refused
 
 import refweb
-from refweb import spectrum
 from refweb.__main__ import main
-from refweb.system import System
+from refweb.studies import spectrum
+from refweb.system.system import System
 
 CLOSED = 1e-15
 """Sines, products and a root: a few roundings of 1.1e-16 each."""

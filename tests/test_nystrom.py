@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import refweb
-from refweb.central_difference import CentralDifference
-from refweb.inputs import InputError
-from refweb.nystrom import Nystrom, splitting, stability
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.splitting import Nystrom, splitting, stability
+from refweb.errors import InputError
 
 ORDERS = [4, 6]
 END = 0.02

@@ -18,12 +18,14 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 import refweb
-from refweb import elements, lines, statics
-from refweb.cables import Cable
 from refweb.effects.elasticity import Elasticity
-from refweb.state import State
-from refweb.system import System
-from refweb.webs import Web
+from refweb.net import elements
+from refweb.net import net as lines
+from refweb.net.cable import Cable
+from refweb.net.web import Web
+from refweb.results.state import State
+from refweb.statics.newton import newton as statics
+from refweb.system.system import System
 
 MODULUS, AREA, GRAVITY = 7e7, 1e-4, 9.81
 EA = MODULUS * AREA

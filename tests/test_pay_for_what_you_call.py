@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import refweb
-from refweb import central_difference
+from refweb.dynamics.integrators import central_difference
 from refweb.scene import EFFECTS, LISTS, SHIPPED, WEBS
 
 ROOT = pathlib.Path(refweb.__file__).parent
@@ -24,32 +24,28 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 
 # Modules
 
-EVERY = {"inputs", "errors", "compiled", "settings", "laws", "cables", "webs", "elements", "lines", "shapes", "bodies"}
-EVERY |= {
-    "effects",
-    "effects.elasticity",
-    "system",
-    "state",
-    "observables",
-    "scene",
-    "memory",
-    "io",
-    "solution",
-    "runner",
-}
+EVERY = {"errors", "tables", "kernels", "memory", "settings", "scene", "runner"}
+EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.shapes", "net.rigid_body"}
+EVERY |= {"effects", "effects.base", "effects.elasticity", "system", "system.system"}
+EVERY |= {f"results.{name}" for name in ("state", "observables", "solution", "folder", "provenance")} | {"results"}
 """What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
-NEWTON = {"statics", "factor", "pattern"}
-DYNAMICS = {"dynamics", "probes", "stepping"}
+NEWTON = {"statics", "statics.newton", "system.factorization", "system.sparsity"}
+DYNAMICS = {"dynamics", "dynamics.simulation", "results.probes", "dynamics.integrators"}
+DYNAMICS |= {"dynamics.integrators.explicit_loop"}
+SUNDIALS = {"dynamics.integrators.step_observer", "dynamics.integrators.cvode"}
+SUNDIALS |= {"system.sparsity", "system.factorization"}
 METHOD = {
     "newton": NEWTON,
-    "relaxation": NEWTON | {"relaxation"},
-    "central-difference": DYNAMICS | {"central_difference"},
-    "cvode": DYNAMICS | {"implicit", "cvode", "pattern", "factor"},
-    "ida": DYNAMICS | {"implicit", "cvode", "ida", "pattern", "factor"},
+    "relaxation": NEWTON | {"statics.dynamic_relaxation"},
+    "central-difference": DYNAMICS | {"dynamics.integrators.central_difference"},
+    "cvode": DYNAMICS | SUNDIALS,
+    "ida": DYNAMICS | SUNDIALS | {"dynamics.integrators.ida"},
 }
-BELOW = {name: {"time_tables"} for name in ("load", "motion", "pressure", "thrust")}
-BELOW |= {name: {"time_tables", "lengths"} for name in ("reel", "temperature")}
-BELOW |= {"contact": {"contact_points", "vectors"}, "bending": {"vectors"}}
+TABLES_OF_TIME = {"effects.time_tables"}
+BELOW = {name: TABLES_OF_TIME for name in ("load", "motion", "pressure", "thrust")}
+BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
+VECTORS = {"effects.vectors"}
+BELOW |= {"contact": {"effects.contact", "effects.contact.nearest_point", *VECTORS}, "bending": VECTORS}
 """What effects are made of besides their own file."""
 BASE = ("numpy", "scipy.sparse", "numba", "numba.core.typing.cffi_utils", "skfem")
 """Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""
@@ -82,25 +78,25 @@ def called(given):
     modules, outside = EVERY | METHOD[method], list(BASE)
     modules.add(WEBS[web].split(":")[0].removeprefix("refweb."))
     for effect in given.keys() & EFFECTS.keys():
-        modules |= {f"effects.{effect}"} | BELOW.get(effect, set())
+        modules |= {EFFECTS[effect].split(":")[0].removeprefix("refweb.")} | BELOW.get(effect, set())
     if "contact" in given:
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
         rubs = keys & {"damping", "friction"}
         if rubs or "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"]):
-            modules |= {"shape_contacts", "penalty"}
+            modules |= {"effects.contact.signed_distance", "effects.contact.penalty"}
         if rubs:
-            modules.add("rubbing")
+            modules.add("effects.contact.friction")
     rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
     if solve.get("start", "web") != "web":
-        modules.add("starts")
+        modules.add("dynamics.initial_state")
     if rests:
         modules |= NEWTON
         if "frame" in given:
-            modules.add("spin_limit")
+            modules.add("statics.critical_speed")
         elif tension_only:
-            modules.add("certificate")
+            modules.add("statics.duality_bound")
         if given.keys() & {"pressure", "thrust"}:
-            modules.add("follower_loads")
+            modules.add("statics.follower_loads")
     if rests or method in ("cvode", "ida"):
         outside.append("qdldl")
     if method in ("cvode", "ida"):

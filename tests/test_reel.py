@@ -11,13 +11,14 @@ from scipy.optimize import brentq
 from scipy.special import jv, yv
 
 import refweb
-from refweb import relaxation, statics
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
-from refweb.ida import Ida
-from refweb.inputs import InputError
-from refweb.starts import equilibrium
-from refweb.state import State
+from refweb.dynamics.initial_state import equilibrium
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.ida import Ida
+from refweb.errors import InputError
+from refweb.results.state import State
+from refweb.statics.newton import dynamic_relaxation as relaxation
+from refweb.statics.newton import newton as statics
 
 AXIAL, GRAVITY, LENGTH, SPEED = 1e3, 9.81, 1.0, 0.2
 """EA of a massless line [N], g [m/s²], the line's natural length [m] and how fast it is reeled in [m/s]."""
@@ -147,7 +148,7 @@ def test_slack_is_reeled_in_until_the_line_snaps_taut():
     end, errors = taut + slack + 0.1, []
     place = lift(slack)[0] + speed * 0.1
     event = [(0, 0.0, True, False)]
-    probe = [(refweb.probes.line, [1, 0, 1], np.ones((1, 1)), 0)]
+    probe = [(refweb.results.probes.line, [1, 0, 1], np.ones((1, 1)), 0)]
     for safety in SAFETIES:
         solver = CentralDifference(system, probe, events=event, safety=safety)
         run = solver.start()

@@ -14,7 +14,7 @@ import pyvista
 from vtkmodules.vtkCommonCore import reference
 
 import refweb
-from refweb import elements
+from refweb.net import elements
 
 STEPS = (0.5, 1.0, 2.0, 3.0)
 MODULUS, AREA, DENSITY, WEIGHT = 1e5, 1e-4, 300.0, np.array([0.3, 0.0, -2.0])
@@ -329,7 +329,7 @@ def test_a_save_that_is_cut_short_is_marked(tmp_path, solution, monkeypatch):
     def full(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("refweb.io.write_frame", full)
+    monkeypatch.setattr("refweb.results.folder.write_frame", full)
     with pytest.raises(refweb.SolverError, match="disk full"):
         solution.save(tmp_path / "out")
     assert read_json(tmp_path / "out")["status"] == "running" and listed(tmp_path / "out") == []

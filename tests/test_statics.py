@@ -16,15 +16,16 @@ from nets import LAWS, skew_cable, skew_web, system
 from oracle import Oracle
 
 import refweb
-from refweb import certificate, statics
-from refweb.cables import Cable
 from refweb.effects.gravity import Gravity
 from refweb.effects.load import Load
 from refweb.effects.motion import Motion
-from refweb.lattices import Paper, Window
-from refweb.single_cable import SingleCable
-from refweb.state import State
-from refweb.webs import Web
+from refweb.net.cable import Cable
+from refweb.net.lattices import Paper, Window
+from refweb.net.single_cable import SingleCable
+from refweb.net.web import Web
+from refweb.results.state import State
+from refweb.statics.newton import duality_bound as certificate
+from refweb.statics.newton import newton as statics
 
 RESIDUAL = 1e-9
 GAP = 1e-10

@@ -6,9 +6,9 @@ import pytest
 from scipy.optimize import brentq
 
 import refweb
-from refweb.central_difference import CentralDifference
-from refweb.inputs import InputError
-from refweb.laws import Law
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.errors import InputError
+from refweb.net.tension_laws import Law
 
 AXIAL = 7e3
 CABLE = dict(modulus=7e7, area=1e-4, density=200.0)

@@ -7,11 +7,11 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from refweb.given_webs import File, Inline
-from refweb.inputs import InputError
-from refweb.lattices import Layers, Paper, Window
-from refweb.single_cable import SingleCable
-from refweb.webs import Web
+from refweb.errors import InputError
+from refweb.net.inline import File, Inline
+from refweb.net.lattices import Layers, Paper, Window
+from refweb.net.single_cable import SingleCable
+from refweb.net.web import Web
 
 MESHES = ("triangle", "square", "hexagon")
 # Section 3.2, captions of Figures 11–13: meshes, nodes, and elements (5165 where the paper prints 5156); fixed ends

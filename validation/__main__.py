@@ -10,7 +10,7 @@ import time
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from refweb.inputs import nearest
+from refweb.tables import nearest
 
 from . import Case, names, report, run, text
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import refweb
-from refweb.lines import AXIAL_STIFFNESS
+from refweb.net.net import AXIAL_STIFFNESS
 
 
 def tensions(solution):

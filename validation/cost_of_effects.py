@@ -24,9 +24,9 @@ import tempfile
 import time
 
 import refweb
-from refweb.dynamics import Motion
+from refweb.dynamics.simulation import Motion
+from refweb.results.solution import Solution
 from refweb.scene import Scene
-from refweb.solution import Solution
 
 PLAIN = {
     "title": "square web, thrown",
@@ -61,7 +61,7 @@ AGREEMENT = 1e-3
 COUNTED = """
 import ctypes, gc, json, sys
 import refweb
-from refweb.dynamics import Motion, row_times
+from refweb.dynamics.simulation import Motion, row_times
 
 scene = refweb.Scene.from_dict(json.loads(sys.argv[1]))
 refweb.run(scene)

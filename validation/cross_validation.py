@@ -18,8 +18,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import refweb
-from refweb.central_difference import CentralDifference
-from refweb.cvode import Cvode
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
 from refweb.scene import Scene
 
 from . import Case, Figure, Row, plots

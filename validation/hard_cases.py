@@ -33,8 +33,8 @@ from collections import Counter
 import numpy as np
 
 import refweb
+from refweb.dynamics.integrators.explicit_loop import DRIFT
 from refweb.errors import OpenBook
-from refweb.stepping import DRIFT
 
 from . import Case, Row, Table
 from .balances import energy_left, momentum_left, unbalanced

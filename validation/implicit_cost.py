@@ -23,9 +23,9 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import numpy as np  # noqa: E402
 
 import refweb  # noqa: E402
-from refweb.central_difference import CentralDifference  # noqa: E402
-from refweb.cvode import Cvode  # noqa: E402
-from refweb.ida import Ida  # noqa: E402
+from refweb.dynamics.integrators.central_difference import CentralDifference  # noqa: E402
+from refweb.dynamics.integrators.cvode import Cvode  # noqa: E402
+from refweb.dynamics.integrators.ida import Ida  # noqa: E402
 from refweb.scene import Scene  # noqa: E402
 
 END = 0.25

@@ -38,7 +38,7 @@ def ticks(plot, numbers):
 
 def picture(solution, field=None):
     """The picture of a solution that ``refweb picture`` draws, the bytes of a PNG."""
-    from refweb.pictures import picture as drawn
+    from refweb.pictures.pictures import picture as drawn
 
     with tempfile.TemporaryDirectory() as folder:
         solution.save(pathlib.Path(folder) / "result")

@@ -8,7 +8,7 @@ import platform
 import re
 from dataclasses import dataclass
 
-from refweb.runner import versions
+from refweb.results.provenance import versions
 
 from . import CASES, Case, text
 from .plots import png

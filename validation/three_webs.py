@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from refweb import drawing
-from refweb.bodies import surface
-from refweb.views import View
+from refweb.net.rigid_body import surface
+from refweb.pictures.camera import View
+from refweb.pictures.pictures import render as drawing
 
 from . import plots
 

@@ -24,8 +24,8 @@ import math
 import numpy as np
 
 import refweb
-from refweb.choice import decided
-from refweb.work_precision import cost
+from refweb.dynamics.method_choice import decided
+from refweb.studies.work_precision import cost
 
 from . import Case, Figure, Table, Verdict
 

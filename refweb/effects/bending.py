@@ -20,10 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..inputs import InputError, Table, real
-from ..vectors import cross, dot
-from . import Family
+from ..errors import InputError
+from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..tables import Table, real
+from .base import Family
+from .vectors import cross, dot
 
 LARGEST = math.radians(30.0)
 """Largest angle between elements that continue each other in the web's position."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..bodies import RigidBody
-from ..inputs import InputError, Table, boolean, choice, real, rows, shown, text, vector
-from ..shapes import KINDS
+from ..errors import InputError
+from ..net.rigid_body import RigidBody
+from ..net.shapes import KINDS
+from ..tables import Table, boolean, choice, real, rows, shown, text, vector
 
 NEEDS = {
     "sphere": ("radius",),
@@ -141,7 +142,7 @@ class Body(Table):
         return np.array([np.cross(first, own), first, own])
 
     def _grown(self):
-        """(radius of growth, half sizes of the core) of `refweb.shape_contacts`."""
+        """(radius of growth, half sizes of the core) of `refweb.effects.contact.signed_distance`."""
         if self.shape == "sphere":
             return self.radius, (0.0, 0.0, 0.0)
         if self.shape == "ring":

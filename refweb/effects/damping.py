@@ -22,11 +22,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..compiled import BOUND, FORCE, STIFFNESS, kernel
-from ..inputs import InputError, Table, real
-from ..laws import above_floor, curvature, prepared_stress, tangent
-from ..lines import AXIAL_STIFFNESS, G0, LENGTH, R0, REFERENCE, SLACKNESS, SMOOTHING, strain
-from . import Family, column
+from ..errors import InputError
+from ..kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, REFERENCE, SLACKNESS, SMOOTHING, strain
+from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
+from ..tables import Table, real
+from .base import Family, column
 
 TIME = REFERENCE + 4
 """Column of τ in the numbers of the lines."""

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..inputs import Table
-from ..laws import energy_density, prepared_stress, stress, tangent
-from ..lines import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
-from . import Family
+from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
+from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
+from ..tables import Table
+from .base import Family
 
 
 @functools.cache
@@ -132,13 +132,13 @@ def strains(net, x):
 
 
 def by_length(net):
-    """The kernel (signature `refweb.compiled.ENERGY`) of ∂E/∂L of each element [N]."""
+    """The kernel (signature `refweb.kernels.ENERGY`) of ∂E/∂L of each element [N]."""
     return of(net)[5]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Elasticity(Table):
-    """Tension of every line by the law of its cable; see `refweb.laws` and, for the numbers, `refweb.cables.Cable`."""
+    """Tension of every line by the law of its cable, see `refweb.net.tension_laws`."""
 
     def on(self, net):
         """The family of all lines; ``out`` is tension [N] and strain."""

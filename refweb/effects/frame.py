@@ -19,10 +19,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..inputs import Table, vector
-from ..shapes import RING
-from . import Family, column
+from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..net.shapes import RING
+from ..tables import Table, vector
+from .base import Family, column
 
 MASS = 3
 """First column of a cell's mass matrix, behind Ω; behind that stand the positions of its nodes in the web."""

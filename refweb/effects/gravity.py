@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import ENERGY, FORCE, kernel
-from ..inputs import Table, vector
-from . import Family, column
+from ..kernels import ENERGY, FORCE, kernel
+from ..tables import Table, vector
+from .base import Family, column
 
 
 @kernel(FORCE)

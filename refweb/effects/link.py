@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs import InputError, Table, nodes, shown
-from . import Constraint
+from ..errors import InputError
+from ..tables import Table, nodes, shown
+from .base import Constraint
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import ENERGY, FORCE, kernel
-from ..inputs import Table, nodes, rows, vector
-from ..time_tables import factor, factor_at
-from . import Family, column
+from ..kernels import ENERGY, FORCE, kernel
+from ..tables import Table, nodes, rows, vector
+from .base import Family, column
+from .time_tables import factor, factor_at
 
 
 @kernel(FORCE)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import FORCE, kernel
-from ..inputs import Table, nodes, rows
-from ..time_tables import flattened, interpolate
-from . import Drive, column
+from ..kernels import FORCE, kernel
+from ..tables import Table, nodes, rows
+from .base import Drive, column
+from .time_tables import flattened, interpolate
 
 
 @kernel(FORCE)

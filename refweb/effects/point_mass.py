@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..inputs import Table, nodes, real
+from ..tables import Table, nodes, real
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,11 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import BOUND, FORCE, STIFFNESS, kernel
-from ..inputs import InputError, Table, field, nearest, node_number, numbers_list, real, rows, shown, vector
-from ..lines import REFERENCE
-from ..time_tables import factor, factor_at, largest
-from . import Family
+from ..errors import InputError
+from ..kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..net.net import REFERENCE
+from ..tables import Table, field, nearest, node_number, numbers_list, real, rows, shown, vector
+from .base import Family
+from .time_tables import factor, factor_at, largest
 
 # Columns of data: p n; dX/dξ; the largest |factor|; the factor.
 NORMAL, ALONG, MOST, FACTOR = 0, 3, 6, 7

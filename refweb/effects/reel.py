@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..inputs import InputError, Table, nodes, rows
-from ..lengths import scaled
+from ..errors import InputError
+from ..tables import Table, nodes, rows
+from .length_factor import scaled
 
 
 @dataclass(frozen=True, kw_only=True)

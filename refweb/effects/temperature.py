@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..inputs import InputError, Table, by_group, field, nearest, real, rows, short, shown
-from ..lengths import scaled
+from ..errors import InputError
+from ..tables import Table, by_group, field, nearest, real, rows, short, shown
+from .length_factor import scaled
 
 
 def _change(name, value):

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..compiled import BOUND, FORCE, STIFFNESS, kernel
-from ..inputs import InputError, Table, field, node_number, nodes, real, rows, shown
-from ..lines import REFERENCE
-from ..time_tables import factor, factor_at, largest
-from . import Family
+from ..errors import InputError
+from ..kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..net.net import REFERENCE
+from ..tables import Table, field, node_number, nodes, real, rows, shown
+from .base import Family
+from .time_tables import factor, factor_at, largest
 
 SHORTER = 0.5
 """Length, of that at a history row, down to which a line may shrink until the next within the bound of the step."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..inputs import InputError, Table, nodes, vector
+from ..errors import InputError
+from ..tables import Table, nodes, vector
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,343 @@
+"""Implicit dynamics by IDA of SUNDIALS, in residual form: with nodes without mass, and with rigid links.
+
+The unknowns are displacements x, velocities v of what has mass, and two multipliers λ, μ of each link:
+
+    x' − v + Gᵀμ = 0        M v' − f(t, x, v) + Gᵀλ = 0        g(x) = 0        G v = 0,        G = ∂g/∂x
+
+In this form of Gear, Gupta and Leimkuhler [1]_ links are of index 2: lengths and their rates are both among the
+equations, and μ is 0 but for the error of a step. The error test leaves the multipliers out. The states of a step
+satisfy g = 0 and G v = 0 to about rtol, however long the run; what is observed is the nearest state that does so to
+rounding, with the forces that links have there.
+
+A node without mass has no velocity among the unknowns: its equation is 0 = f, of index 1, and its velocity is x'. To
+keep v and x' − v = 0 as well, of index 2, takes as many steps for the same error, with v in the error test or without.
+A node that nothing holds any more ends the run.
+
+A step solves J z = r with J = ∂F/∂y + c ∂F/∂y'. Eliminating displacements leaves, where there are no links,
+
+    (M + C/c + K/c²) z_v = (r_v − K r_x/c)/c,    z_x = (r_x + z_v)/c
+
+for every node alike, with r_x = 0 for one without mass.
+
+References
+----------
+.. [1] C. W. Gear, B. Leimkuhler, G. K. Gupta, "Automatic integration of Euler-Lagrange equations with constraints",
+   J. Comput. Appl. Math. 12–13 (1985) 77–90, doi:10.1016/0377-0427(85)90008-1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError, SolverError
+from .cvode import DENSE, LINEAR_SOLVERS, _Symmetric, _Unsymmetric
+from .step_observer import Implicit, _Stopped, scales
+
+UNTESTED = 1e30
+"""Absolute tolerance of multipliers, which takes them out of the error test."""
+
+
+class Ida(Implicit):
+    """IDA on one system.
+
+    Parameters
+    ----------
+    system, probes, watch, events, rtol, atol_position, atol_velocity
+        See `refweb.dynamics.integrators.step_observer.Implicit`.
+    max_order : int
+        Highest order of the BDF, 1 to 5; those above 2 are unstable near the frequencies of a net.
+    linear_solver : {"auto", "block", "sparse", "dense"}
+        How linear systems are solved, see `refweb.dynamics.integrators.cvode.LINEAR_SOLVERS`; "auto" chooses by size.
+        Links need "sparse" or "dense".
+
+    Attributes
+    ----------
+    choice : str
+        Which linear solver is used and why.
+
+    Raises
+    ------
+    InputError
+        For links that hold nothing or too much, or a choice that does not fit.
+    """
+
+    method = "ida"
+
+    def __init__(self, system, *observed, max_order=2, linear_solver="auto", **tolerances):
+        super().__init__(system, *observed, **tolerances)
+        self.max_order = max_order
+        mass = np.repeat(system.net.mass, 3)[system.free]
+        self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
+        self._M = system.pattern.matrix(system.mass())
+        self._massless = self._links = None
+        if len(self._bare):
+            from .massless_nodes import Massless
+
+            self._massless = Massless(system, self._bare)
+        if system.constraints:
+            self._links = system.links
+        self._count = len(self._links) if self._links else 0
+        self.linear_solver, self.choice = self._chosen(linear_solver)
+        self._product, self._exact, self._adrift = None, False, (0.0, None)
+
+    def _chosen(self, name):
+        if name == "block" and self._links:
+            raise InputError('[solve] linear_solver = "block" must be "sparse" or "dense" with [[link]]')
+        if name != "auto":
+            return name, f"{name}, as asked for: {LINEAR_SOLVERS[name]}"
+        name = "dense" if self.unknowns <= DENSE else "sparse" if self._links else "block"
+        size = f"{self.unknowns} unknowns, {'at most' if name == 'dense' else 'more than'} {DENSE}"
+        return name, f"{name}, for {size}{', and links' if self._links else ''}: {LINEAR_SOLVERS[name]}"
+
+    # The residual
+
+    def _parts(self, y):
+        """y, or y', as its displacements, velocities, λ and μ."""
+        n, m = self.unknowns, self.unknowns + len(self._heavy)
+        return y[:n], y[n:m], y[m : m + self._count], y[m + self._count :]
+
+    def _velocity(self, y, yp):
+        """Velocity of every unknown displacement [m/s]."""
+        v = self._parts(yp)[0].copy()
+        v[self._heavy] = self._parts(y)[1]
+        return v
+
+    def _state(self, t, y, yp):
+        """All rows at a state of the unknowns."""
+        system = self.system
+        x, v = self._reference.copy(), np.zeros((system.rows, 3))
+        x.ravel()[system.free], v.ravel()[system.free] = self._parts(y)[0], self._velocity(y, yp)
+        system.drive(t, x, v)
+        return x, v
+
+    def _residual(self, t, y, yp, r):
+        self.stats["nfev"] += 1
+        x, v = self._state(t, y, yp)
+        n, heavy, bare = self.unknowns, self._heavy, self._bare
+        force = self.system.force(t, x, v)
+        self._seen = t, force
+        rate, (_, own, multipliers, corrections) = self._parts(yp)[0], self._parts(y)
+        if self._links:
+            pairs = self._links.pairs
+            force = force - pairs.pull(x, multipliers)
+            rate = rate + pairs.pull(x, corrections).ravel()[self.system.free]
+            r[n + len(heavy) :] = np.concatenate([pairs.excess(x), pairs.speed(x, v)])
+        slope = np.zeros(n)
+        slope[heavy] = self._parts(yp)[1]
+        balance = self._M @ slope - force.ravel()[self.system.free]
+        r[heavy], r[bare], r[n : n + len(heavy)] = rate[heavy] - own, balance[bare], balance[heavy]
+
+    def _tangent(self, t, y, yp):
+        """Values of K, and of C or None, at a state."""
+        self.stats["njev"] += 1
+        x, v = self._state(t, y, yp)
+        self._at_state = t, x, v
+        K = self.system.stiffness(t, x, v)
+        if self._massless:
+            self._adrift = t, self._massless.adrift(K)
+        return K, self.system.damping(t, x, v)
+
+    # Block elimination
+
+    def _set_up(self, t, y, yp, res, c):
+        """Factorize M + C/c + K/c²."""
+        system = self.system
+        K, C = self._tangent(t, y, yp)
+        self._K, self._C = system.pattern.matrix(K), None if C is None else system.pattern.matrix(C)
+        self._factored, self._true = c, self._adrift[1] is None
+        rest = self._M.data if C is None else self._M.data + C / c
+        self.stats["nlu"] += 1
+        if not system.symmetric:
+            self._factor = _Unsymmetric(system.pattern, rest + K / c**2)
+            return
+        if self._true:
+            self._factor.update(rest + K / c**2)
+            self._true = not self._factor.negative_pivots()
+        if not self._true:
+            self.stats["nlu"] += 1
+            values = rest + system.stiffness(*self._at_state, definite=True) / c**2
+            values[system.pattern.diagonal[self._bare]] += np.abs(K).max() / c**2
+            self._factor.update(values)
+
+    def _precondition(self, t, y, yp, res, r, z, c, delta):
+        n, heavy, bare = self.unknowns, self._heavy, self._bare
+        self._exact = c == self._factored and self._true
+        if self._product is not None and self._exact:
+            z[:] = self._product  # r is J times it, and this inverts just that
+            self._product = None
+            return
+        self._product, c = None, self._factored
+        first, second = r[:n].copy(), np.empty(n)
+        first[bare], second[bare], second[heavy] = 0.0, r[bare], r[n:]
+        velocity = self._factor.apply((second - self._K @ first / c) / c)
+        z[:n], z[n:] = (first + velocity) / c, velocity[heavy]
+
+    def _jacobian_times(self, t, y, yp, res, u, Ju, c):
+        n, heavy, bare = self.unknowns, self._heavy, self._bare
+        self._product = u.copy()
+        if self._exact:
+            return  # what it would be, the preconditioner takes away again
+        velocity, slope = c * u[:n], np.zeros(n)
+        velocity[heavy], slope[heavy] = u[n:], c * u[n:]
+        balance = self._M @ slope + self._K @ u[:n]
+        if self._C is not None:
+            balance += self._C @ velocity
+        Ju[heavy], Ju[bare], Ju[n:] = c * u[heavy] - u[n:], balance[bare], balance[heavy]
+
+    # The whole Jacobian
+
+    def _places(self):
+        """Rows and columns of what `_values` holds; where a place stands several times the values add up."""
+        n, heavy, pattern = self.unknowns, self._heavy, self.system.pattern
+        column = np.repeat(np.arange(n), np.diff(pattern.indptr))
+        at = np.arange(n)  # row of M v' − f, and column of v; without mass that of x, whose rate v is
+        at[heavy] = n + np.arange(len(heavy))
+        self._slid = ~np.isin(column, heavy)
+        parts = [(heavy, heavy), (heavy, at[heavy]), (at[pattern.indices], column), (at[pattern.indices], at[column])]
+        if self._links:
+            parts += self._links.places(heavy, at[heavy], n + len(heavy))
+        return (np.concatenate(side) for side in zip(*parts, strict=True))
+
+    def _values(self, t, y, yp, c):
+        K, C = self._tangent(t, y, yp)
+        self.stats["nlu"] += 1
+        slope = c * self._M.data
+        if C is not None:
+            slope += np.where(self._slid, c, 1.0) * C
+        parts = [np.full(len(self._heavy), c), np.full(len(self._heavy), -1.0), K, slope]
+        if self._links:
+            parts += self._links.values(*self._at_state[1:], self._parts(y)[2])
+        return np.concatenate(parts)
+
+    def _options(self):
+        from sksundae.ida import IDAJacTimes, IDAPrecond
+
+        if self.linear_solver == "block":
+            self._factor = _Symmetric(self.system.pattern)
+            precond, times = IDAPrecond(self._set_up, self._precondition), IDAJacTimes(None, self._jacobian_times)
+            return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)
+        (rows, columns), size = self._places(), self.unknowns + len(self._heavy) + 2 * self._count
+        if self.linear_solver == "dense":
+            place, shape = rows * size + columns, (size, size)
+            options = dict(linsolver="dense")
+        else:
+            from scipy.sparse import csc_matrix
+
+            keys, place = np.unique(columns * size + rows, return_inverse=True)
+            shape = keys.shape
+            indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
+            pattern = csc_matrix((np.ones(shape), (keys % size).astype(np.int32), indptr), shape=(size, size))
+            options = dict(linsolver="sparse", sparsity=pattern)
+
+        def jacobian(t, y, yp, res, c, J):
+            J[:] = np.bincount(place, self._values(t, y, yp, c), J.size).reshape(shape)
+
+        return dict(**options, jacfn=jacobian)
+
+    # Consistent initial conditions
+
+    def start(self, x=None, v=None):
+        """The `Course` at t = 0.
+
+        Nodes without mass are moved to their equilibrium among all others, and what would stretch links is taken out
+        of the velocities with the least kinetic energy.
+        """
+        system = self.system
+        x = np.zeros((system.rows, 3)) if x is None else x.copy()
+        v = system.initial_velocity() if v is None else v.copy()
+        v[system.supported] = 0.0
+        system.drive(0.0, x, v)
+        if self._links:
+            self._links.refuse_stretched(x)
+            self._links.hold(x, v)
+        if self._massless:
+            self._massless.settle(x, v, *scales(system))
+        run = super().start(x, v)
+        run.constraint_drift = self._drift = np.zeros(2)
+        return run
+
+    def stored(self, run):
+        return {**super().stored(run), "constraint_drift": run.constraint_drift}
+
+    def restored(self, arrays):
+        arrays = dict(arrays)
+        drift = arrays.pop("constraint_drift")
+        run = super().restored(arrays)
+        run.constraint_drift = self._drift = drift
+        return run
+
+    def _begin(self, t, x, v):
+        from sksundae.ida import IDA
+
+        n, heavy, count = self.unknowns, self._heavy, self._count
+        rows = self._state(t, np.concatenate([x, v[heavy]]), np.concatenate([v, v[heavy]]))
+        force = self.system.force(t, *rows)
+        if self._links:
+            slope, multipliers = self._links.start(*rows, force)
+        else:
+            slope, multipliers = np.zeros(0), np.zeros(0)
+            if len(heavy):
+                slope = self.system.moved_by(force).ravel()[self.system.free[heavy]]
+        algebraic = np.concatenate([self._bare, n + len(heavy) + np.arange(2 * count)])
+        self._solver = IDA(
+            self._residual,
+            max_order=self.max_order,
+            rtol=self.rtol,
+            atol=np.repeat([self.atol_position, self.atol_velocity, UNTESTED], [n, len(heavy), 2 * count]),
+            algebraic_idx=algebraic.astype(int).tolist(),
+            max_num_steps=10_000_000,
+            **self._options(),
+        )
+        y = np.concatenate([x, v[heavy], multipliers, np.zeros(count)])
+        self._check(self._solver.init_step(t, y, np.concatenate([v, slope, np.zeros(2 * count)])))
+
+    # A solver's steps
+
+    def _advance(self, stop, end):
+        try:
+            found = self._check(self._solver.step(end, "onestep", float(stop) if np.isfinite(stop) else None))
+        except _Stopped:
+            self._refuse_adrift()
+            raise
+        if self._massless or self._links:
+            self._inspect(found.t, found.y, found.yp)
+        return float(found.t)
+
+    def _inspect(self, t, y, yp):
+        """Look at the end of a step: whether nodes without mass have a position, and how far links are off."""
+        x, v = self._state(t, y, yp)
+        if self._links:
+            self._drift[:] = np.maximum(self._drift, self._links.drift(x, v))
+        if self._massless:
+            tension = self.system.forces(t, x, v)[1][0][self._massless.around, 0]
+            if self._adrift[1] or not tension.min() > 0.0:
+                self._tangent(t, y, yp)
+            self._refuse_adrift()
+
+    def _refuse_adrift(self):
+        t, name = self._adrift
+        if name:
+            from .massless_nodes import REMEDY
+
+            raise SolverError(
+                f"{name} has lost its position by t = {t:.6g} s: it has no mass, and no tension holds it any more; "
+                f"{REMEDY}"
+            ) from None
+
+    def figures(self, run):
+        """What a run has spent, and the `constraint_drift` of its steps: of lengths [1], and of their rates [m/s]."""
+        drift = {"constraint_drift": run.constraint_drift.tolist()} if self._links else {}
+        return {**super().figures(run), **drift}
+
+    def _hold(self, x, v):
+        if self._links:
+            self._links.hold(x, v)
+
+    def _interpolated(self, t):
+        found = self._check(self._solver.step(t, "normal", None))
+        return self._parts(found.y)[0], self._velocity(found.y, found.yp)
+
+    def _check(self, result):
+        if result.status < 0:
+            raise _Stopped(result.message)
+        return result

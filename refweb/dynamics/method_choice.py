@@ -1,0 +1,120 @@
+"""``method = "auto"``: which dynamic method a scene is given to, and why.
+
+Links and nodes without mass leave IDA alone, curved elements and a consistent mass CVODE. For all else the question is
+whether anything asks for the short steps of an explicit method. Waves do, and contact, initial velocities and starts
+out of equilibrium make waves; then a compiled step, of 1e-6 s and 12e-9 s per element, is about a hundred times cheaper
+than one of CVODE. Where tables alone move a web from its equilibrium, BDF takes steps as long as the motion allows; so
+do Adams methods where damping ends the waves, and shortens explicit steps. CPU times for three digits of the
+displacement of the centre, from ``validation/work_precision.py``:
+
+=========================================  ===================  =========  ===========  ========
+scene                                      central differences  CVODE BDF  CVODE Adams  IDA
+=========================================  ===================  =========  ===========  ========
+ball on a square web of 180 lines          0.02 s               over 1 s   0.8 s        over 1 s
+steel cable that swings                    0.01 s               over 1 s   over 1 s     over 1 s
+taut steel net, loaded over 8 s            1.3 s                0.11 s     over 5 s     0.14 s
+web that settles, damped by its material   3.2 s                1.0 s      0.67 s       1.2 s
+=========================================  ===================  =========  ===========  ========
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..settings import Dynamic
+
+USUAL = 3
+"""Digits that are aimed at where a scene does not say."""
+MANY = 5
+"""Digits from which order 6 is cheaper than order 2."""
+MOST = 8
+"""Digits from which Adams methods are cheaper than order 2, where order 6 does not take the forces: central differences
+take √10 times the steps for each, on webs under a load with a factor 0.01 s for 6 and Adams methods 0.3 s for 9."""
+PER_STEP, PER_ELEMENT = 1e-6, 12e-9
+"""CPU time of a compiled explicit step [s], and of each element in it [s]."""
+QUICK = 0.5
+"""CPU time of an explicit run [s] below which nothing is to be gained."""
+DAMPED = 5.0
+"""Factor by which damping makes explicit steps shorter, above which they are given up."""
+
+
+def decided(scene, system):
+    """The `refweb.Dynamic` that stands for ``method = "auto"``, and the reason for it in words."""
+    net, digits = system.net, scene.accuracy.digits or USUAL
+    bare = np.flatnonzero((net.mass <= 0.0) & ~system.supported.all(axis=1))
+    tolerance = max(10.0 ** -(digits + 1), 1e-12)
+    if system.constraints:
+        return _of(scene, "ida", rtol=tolerance), "only ida holds the lengths of [[link]]"
+    if len(bare):
+        return _of(scene, "ida", rtol=tolerance), f"node {bare[0]} has no mass, which only ida takes"
+    family = "adams" if digits >= MANY else "bdf"
+    if net.order > 1 or net.spread is not None:
+        what = f"order {net.order}" if net.order > 1 else "a consistent mass"
+        return _of(scene, "cvode", rtol=tolerance, family=family), f"{what} is not for explicit steps"
+    system = _undamped(system, "contact")  # its bound of damping and friction is that of all lines touched at once
+    bound = _bound(system)
+    steps = scene.solve.duration / (0.5 * bound)
+    seconds = steps * step_price(system)
+    price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
+    damped = _damped(system, bound)
+    if seconds > QUICK and damped > DAMPED:
+        why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
+        return _of(scene, "cvode", rtol=tolerance, family="adams"), why
+    if seconds > QUICK and _quiet(scene, system):
+        why = f"tables alone move it from its equilibrium: no waves ask for {price}"
+        return _of(scene, "cvode", rtol=tolerance, family="bdf"), why
+    if digits >= MANY:
+        try:
+            from .integrators.splitting import Nystrom
+
+            Nystrom(system)
+            return _of(scene, "explicit"), f"{digits} digits, and forces that follow from displacement alone: {price}"
+        except InputError:
+            if digits >= MOST:
+                why = f"{digits} digits, and forces that no explicit step of order 6 takes"
+                return _of(scene, "cvode", rtol=tolerance, family="adams"), why
+    return _of(scene, "central-difference"), price
+
+
+def _undamped(system, only=None):
+    """The system without the bounds of damping: of an effect, by its name, or of all."""
+    calm = copy.copy(system)
+    calm.families = [replace(f, damping_bound=None) if only in (None, f.name) else f for f in system.families]
+    return calm
+
+
+def step_price(system):
+    """Estimate of the CPU time of an explicit step of one evaluation of forces [s].
+
+    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
+    """
+    price = PER_STEP + PER_ELEMENT * len(system.net.cells)
+    if any(family.damping is not None for family in system.families):
+        price *= 1.0 + min(_damped(system, _bound(system)), 7.0)
+    return price
+
+
+def _damped(system, bound):
+    """By what factor damping makes the bound of stability smaller."""
+    return _bound(_undamped(system)) / bound
+
+
+def _of(scene, method, **keys):
+    solve = scene.solve
+    return Dynamic(method=method, duration=solve.duration, mass=solve.mass, start=solve.start, **keys)
+
+
+def _bound(system):
+    from .integrators.central_difference import CentralDifference
+
+    return CentralDifference(system).bound()
+
+
+def _quiet(scene, system):
+    """Whether no body, velocity or lack of equilibrium makes waves."""
+    touched = any(family.name == "contact" for family in system.families)
+    return scene.solve.start == "equilibrium" and not touched and not system.initial_velocity().any()

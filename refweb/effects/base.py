@@ -1,0 +1,180 @@
+"""Effects: what acts on a net, one file each.
+
+An effect is a frozen value that holds physical numbers only. It has one or more of these methods, touches no global
+matrix and knows no other effect.
+
+``on(net)``
+    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
+    `Drive`, a `LineDrive` or a `Constraint`.
+``extend(net)``
+    The `refweb.net.net.Net` with more rows or mass; comes before any ``on``, of what has no ``on`` first.
+``start(net, supported, v)``
+    Writes initial velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Cells of one kind with their kernels, whose signatures are in `refweb.kernels`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the effect.
+    cells : ndarray of int32, shape (cells, arity)
+        Rows that each cell couples.
+    data : ndarray, shape (cells, columns)
+        Numbers of each cell.
+    force : kernel
+        Adds to the forces.
+    energy : kernel, optional
+        Potential of the force, where there is one.
+    stiffness : kernel, optional
+        −∂f/∂x by cell, None where it is zero.
+    bound : kernel, optional
+        Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
+    book : str
+        Column of the energy book that its energy or power belongs to.
+    observed : int
+        Number of values per cell that ``force`` writes to its ``out``.
+    power : int, optional
+        Column of ``out`` with the power of the force [W], for a family booked as "work" or "dissipated_energy".
+    shared : bool
+        Whether ``out`` is that of the lines, tension and strain, over whose elements the cells run as well; ``force``
+        then writes the whole tension, and its own values behind.
+    damping : kernel, optional
+        −∂f/∂v by cell; None where the force does not depend on velocity.
+    damping_bound : kernel, optional
+        Bound on the row sums of |−∂f/∂v|.
+    internal : bool
+        True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
+    symmetric : bool
+        Whether stiffness and damping are symmetric.
+    at_rest : bool
+        Whether it acts on what does not move; statics leaves out what does not.
+    times : sequence of float
+        Times at which the force has a corner [s]; no step of an implicit method passes one.
+    """
+
+    name: str
+    cells: np.ndarray
+    data: np.ndarray
+    force: Callable
+    energy: Callable | None
+    stiffness: Callable | None
+    bound: Callable | None
+    book: str
+    observed: int = 0
+    power: int | None = None
+    shared: bool = False
+    damping: Callable | None = None
+    damping_bound: Callable | None = None
+    internal: bool = False
+    symmetric: bool = True
+    at_rest: bool = True
+    times: tuple = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """Rows whose motion is prescribed; ``kernel`` (signature `FORCE`) writes their x and v at time t.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (rows, 1)
+        The driven rows.
+    data : ndarray, shape (rows, columns)
+        Numbers of each row.
+    kernel : kernel
+        Writes x and v.
+    times : sequence of float
+        Times at which the motion has a corner [s].
+    """
+
+    cells: np.ndarray
+    data: np.ndarray
+    kernel: Callable
+    times: tuple = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """Pairs of rows whose distance is kept: g(x) = (|d|² − L²)/(2L) = 0 with d from the first to the second.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (cells, 2)
+        The rows.
+    data : ndarray, shape (cells, 4)
+        d at x = 0, and its magnitude L [m].
+    """
+
+    cells: np.ndarray
+    data: np.ndarray
+
+    def between(self, x):
+        """Second less first of each pair, shape (cells, 3)."""
+        return x[self.cells[:, 1]] - x[self.cells[:, 0]]
+
+    @property
+    def length(self):
+        """L [m], shape (cells,)."""
+        return self.data[:, 3]
+
+    def excess(self, x):
+        """g [m] at displacement x, shape (cells,); the difference of the two lengths where that is small."""
+        u = self.between(x)
+        return ((2.0 * self.data[:, :3] + u) * u).sum(axis=1) / (2.0 * self.length)
+
+    def direction(self, x):
+        """∂g/∂x of the second row, d/L, shape (cells, 3); that of the first is its negative."""
+        return (self.data[:, :3] + self.between(x)) / self.length[:, None]
+
+    def speed(self, x, v):
+        """dg/dt [m/s] at displacement x and velocity v, shape (cells,)."""
+        return (self.direction(x) * self.between(v)).sum(axis=1)
+
+    def turning(self, v):
+        """What d²g/dt² has besides the accelerations, |v₂ − v₁|²/L [m/s²], shape (cells,)."""
+        return (self.between(v) ** 2).sum(axis=1) / self.length
+
+    def pull(self, x, multipliers):
+        """Gᵀλ on every row [N], G = ∂g/∂x, shape (rows, 3); the links act with its negative."""
+        along, total = multipliers[:, None] * self.direction(x), np.zeros_like(x)
+        np.subtract.at(total, self.cells[:, 0], along)
+        np.add.at(total, self.cells[:, 1], along)
+        return total
+
+
+@dataclass(frozen=True, eq=False)
+class LineDrive:
+    """Natural lengths that are prescribed over time; ``kernel`` (signature `LINES`) multiplies them.
+
+    Attributes
+    ----------
+    cells : ndarray of int32, shape (elements, 1)
+        The elements it changes.
+    data : ndarray, shape (rows, columns)
+        Numbers of the kernel.
+    kernel : kernel
+        Multiplies the natural lengths at time t; what multiplies them before or after does not matter.
+    times : sequence of float
+        Times at which the factor has a corner [s].
+    """
+
+    cells: np.ndarray
+    data: np.ndarray
+    kernel: Callable
+    times: tuple = ()
+
+
+def column(rows):
+    """Row numbers as the cells of a family that couples nothing: int32, shape (rows, 1)."""
+    return np.ascontiguousarray(np.asarray(rows, dtype=np.int32).reshape(-1, 1))

@@ -1,0 +1,155 @@
+"""The cable a web is made of: material, section and slackness of every line, by group."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..errors import InputError
+from ..tables import LARGEST, Table, by_group, choice, integer, nearest, real, shown
+from .tension_laws import NAMES, Law
+
+_DENSE = dict(at_least=0, unit="kg/m³")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group(Table):
+    """What may differ from `Cable` on the lines of one group; None keeps the cable's value.
+
+    Parameters
+    ----------
+    modulus : float, optional
+        Asymptotic modulus E [Pa], > 0.
+    area : float, optional
+        Cross section A [m²], > 0.
+    density : float, optional
+        ρ [kg/m³], ≥ 0.
+    slackness, smoothing : float, optional
+        ε0 and η of the smooth law [1], ≥ 0.
+    prestrain : float, optional
+        Natural length = distance/(1 + prestrain) [1], > −1.
+    strength : float, optional
+        Stress at which a line breaks [Pa], > 0.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite or out of these bounds.
+    """
+
+    modulus: float | None = real(None, above=0, unit="Pa")
+    area: float | None = real(None, above=0, unit="m²")
+    density: float | None = real(None, **_DENSE)
+    slackness: float | None = real(None, at_least=0, unit="1")
+    smoothing: float | None = real(None, at_least=0, unit="1")
+    prestrain: float | None = real(None, above=-1, unit="1")
+    strength: float | None = real(None, above=0, unit="Pa")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cable(Table):
+    """Material and section of the lines.
+
+    Parameters
+    ----------
+    law : {"smooth", "tension-only", "linear"}
+        Tension law, see `refweb.net.tension_laws`.
+    modulus : float
+        Asymptotic modulus E [Pa], > 0.
+    area : float
+        Cross section A [m²], > 0.
+    density : float
+        ρ [kg/m³], ≥ 0; mass follows natural length.
+    slackness, smoothing : float
+        ε0 and η of the smooth law [1].
+    prestrain : float
+        Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
+    strength : float, optional
+        Stress at which a line breaks [Pa]; utilisation is reported against it.
+    order : {1, 2, 3}
+        Order of the elements: straight, quadratic, cubic.
+    subdivide : int
+        Elements per line.
+    groups : dict of str to Group
+        Values that differ by group of lines.
+
+    Raises
+    ------
+    InputError
+        For an unknown law or order, a number out of these bounds, and slackness or smoothing, of a group as well, with
+        another law than the smooth one; from ``properties``, for a group that no line has, prestrain of a web whose
+        natural lengths are given, and a line whose stiffness or mass is above `refweb.tables.LARGEST`.
+    """
+
+    law: str = choice(*NAMES, default="smooth")
+    modulus: float = real(above=0, unit="Pa")
+    area: float = real(above=0, unit="m²")
+    density: float = real(**_DENSE)
+    slackness: float | None = real(None, at_least=0, unit="1")
+    smoothing: float | None = real(None, at_least=0, unit="1")
+    prestrain: float = real(0.0, above=-1, unit="1")
+    strength: float | None = real(None, above=0, unit="Pa")
+    order: int = choice(1, 2, 3, default=1)
+    subdivide: int = integer(1, at_least=1, at_most=1000)
+    groups: dict = by_group(Group, "cable")
+
+    def check(self):
+        """Fill in the smooth law's parameters; refuse them for other laws."""
+        for key, default in (("slackness", 0.0), ("smoothing", 1e-5)):
+            if self.law == "smooth":
+                if getattr(self, key) is None:
+                    object.__setattr__(self, key, default)
+                continue
+            owners = [self, *self.groups.values()]
+            given = [getattr(owner, key) for owner in owners if getattr(owner, key) is not None]
+            if given:
+                raise InputError(f'{key} = {given[0]:g} has no meaning with law = "{self.law}": leave it out')
+
+    def properties(self, web):
+        """Values for each line of a web.
+
+        Returns
+        -------
+        dict of str to ndarray
+            ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength`` (infinite where none is
+            given) and ``natural_length``, each of shape (lines,).
+
+        Raises
+        ------
+        InputError
+            For a group that no line has, or prestrain beside given natural lengths.
+        """
+        known = sorted(set(web.groups) - {""})
+        unknown = [name for name in self.groups if name not in known]
+        if unknown:
+            hint = nearest(unknown[0], known) if known else "this web has no groups"
+            raise InputError(f"[cable.groups] {shown(unknown[0])} is the group of no line, {hint}")
+        values = {}
+        for f in fields(Group):
+            own = getattr(self, f.name)
+            missing = np.inf if f.name == "strength" else 0.0
+            values[f.name] = np.full(len(web.lines), missing if own is None else own)
+        if self.groups:
+            group_of = np.array(web.groups)
+            for name, group in self.groups.items():
+                for key, value in group.to_dict().items():
+                    values[key][group_of == name] = value
+        prestrain = values.pop("prestrain")
+        if web.length_given and prestrain.any():
+            worst = prestrain[np.argmax(np.abs(prestrain))]
+            raise InputError(f"[cable] prestrain = {worst:g} cannot be used: the web's natural lengths are given")
+        values["natural_length"] = web.natural_length / (1.0 + prestrain)
+        with np.errstate(over="ignore"):
+            stiffness = values["modulus"] * values["area"] / values["natural_length"]
+            mass = values["density"] * values["area"] * values["natural_length"]
+        for name, value, unit in (("stiffness modulus × area / length", stiffness, "N/m"), ("mass", mass, "kg")):
+            bad = np.flatnonzero(~(value <= LARGEST))
+            if len(bad):
+                raise InputError(f"[cable] line {bad[0]}: {name} = {value[bad[0]]:g} must be ≤ {LARGEST:g} [{unit}]")
+        return values
+
+    @property
+    def tension_law(self):
+        """The `refweb.net.tension_laws.Law`."""
+        return Law(self.law)

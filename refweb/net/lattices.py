@@ -1,0 +1,225 @@
+"""Webs with triangle, square and hexagon meshes: those of the paper, windows of any size, and concentric layers.
+
+The paper is *Dynamic modelling and analysis of space webs*, Sci China-Phys Mech Astron 54 (2011). Lattice points have
+integer coordinates in steps of `STEP` sides; the meshes are polygons of such points, and shared points and sides of
+the polygons are the web's nodes and lines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from ..errors import InputError
+from ..tables import Table, choice, integer, real
+from .web import Web
+
+MESHES = ("triangle", "square", "hexagon")
+#: Rows and columns of the paper's three webs (section 3.2).
+PAPER = {"triangle": (29, 23), "square": (40, 40), "hexagon": (45, 40)}
+#: Smallest window whose inner web hangs together, (rows, columns).
+SMALLEST = {"triangle": (2, 1), "square": (2, 2), "hexagon": (2, 3)}
+#: x and y of the lattice point (1, 1), in sides.
+STEP = {"triangle": (0.5, sqrt(3) / 2), "square": (1.0, 1.0), "hexagon": (sqrt(3) / 2, 0.5)}
+#: Area of a mesh of side 1.
+AREA = {"triangle": sqrt(3) / 4, "square": 1.0, "hexagon": 3 * sqrt(3) / 2}
+
+_UP = ((0, 0), (2, 0), (1, 1))
+_DOWN = ((0, 0), (1, 1), (-1, 1))
+_SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
+_HEXAGON = ((0, -2), (1, -1), (1, 1), (0, 2), (-1, 1), (-1, -1))
+_MOST_CELLS = 1_000_000
+
+
+def _rows(counts, first, polygon, pitch=(2, 1)):
+    """Copies of a polygon, ``counts[j]`` in row j from x = ``first[j]`` on; integer array (polygons, corners, 2)."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    column = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    place = np.stack([pitch[0] * column + np.asarray(first)[row], pitch[1] * row], axis=1)
+    return place[:, None, :] + np.array(polygon)
+
+
+def _tessellation(polygons):
+    """Shared corners and sides: nodes (n, 2) row by row, lines (e, 2), and which lines belong to one polygon only."""
+    corners = polygons.reshape(-1, 2)
+    low = corners.min(axis=0)
+    width = np.ptp(corners[:, 0]) + 1
+    key, number = np.unique((corners - low) @ [1, width], return_inverse=True)
+    number = number.reshape(polygons.shape[:2])
+    sides = np.sort(np.stack([number, np.roll(number, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    sides, count = np.unique(sides @ [len(key), 1], return_counts=True)
+    lines = np.stack([sides // len(key), sides % len(key)], axis=1)
+    return np.stack([key % width, key // width], axis=1) + low, lines, count == 1
+
+
+def _placed(nodes, mesh, side):
+    """Positions (n, 3) [m] in z = 0, the bounding box centred at the origin."""
+    centred = 2 * nodes - nodes.min(axis=0) - nodes.max(axis=0)
+    return np.pad(centred * np.multiply(STEP[mesh], side / 2), ((0, 0), (0, 1)))
+
+
+def _window(mesh, rows, columns, side, kind):
+    """The paper's rule: a closed inner web, and one link to a fixed end for each outermost node and side."""
+    if mesh == "triangle":
+        odd = np.arange(rows - 1) % 2
+        polygons = np.concatenate([_rows(columns - 1 + odd, 1 - odd, _UP), _rows(columns - odd, 1 + odd, _DOWN)])
+        nodes, lines, _ = _tessellation(polygons)
+        points = _placed(nodes, mesh, side)
+        outward = [
+            (np.flatnonzero(nodes[:, axis] == end), axis, sign)
+            for axis in (1, 0)
+            for end, sign in ((nodes[:, axis].min(), -1), (nodes[:, axis].max(), 1))
+        ]
+        links = np.concatenate([at for at, _, _ in outward])
+        ends = np.concatenate([points[at] + sign * side * np.eye(3)[axis] for at, axis, sign in outward])
+        rim = len(points) + np.arange(len(ends))
+        points = np.concatenate([points, ends])
+        lines = np.concatenate([lines, np.stack([links, rim], axis=1)])
+    else:
+        odd = np.arange(rows) % 2
+        if mesh == "square":
+            polygons = _rows(np.full(rows, columns), 0 * odd, _SQUARE, (1, 1))
+        else:
+            polygons = _rows(columns - odd, odd, _HEXAGON, (2, 3))
+        nodes, lines, frame = _tessellation(polygons)
+        used, inner = np.unique(lines[~frame], return_inverse=True)
+        rim = np.flatnonzero(np.isin(used, lines[frame]))
+        points = _placed(nodes[used], mesh, side)
+        lines = inner.reshape(-1, 2)
+    return Web(points, lines, rim=rim, kind=kind, cells=len(polygons))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paper(Table):
+    """One of the three webs of the paper's section 3.2, exactly.
+
+    Parameters
+    ----------
+    mesh : {"triangle", "square", "hexagon"}
+        755, 1677 and 3554 nodes.
+    cable_length : float
+        Total length of cable [m]; the paper's webs share one.
+
+    Raises
+    ------
+    InputError
+        For an unknown mesh, and a length that is not finite and > 0.
+    """
+
+    kind: str = choice("paper", default="paper")
+    mesh: str = choice(*MESHES)
+    cable_length: float = real(above=0, unit="m")
+
+    def web(self, base=None):
+        """The `refweb.net.web.Web`.
+
+        Notes
+        -----
+        The hexagon web has 5165 lines; the paper's caption of Figure 13 prints 5156. The cells are the paper's 1260,
+        1600 and 1778: in the square and the hexagon web a sector between neighbouring links at the rim counts as a
+        cell, in the triangle web it does not.
+        """
+        rows, columns = PAPER[self.mesh]
+        lines = len(_window(self.mesh, rows, columns, 1.0, "paper").lines)
+        return _window(self.mesh, rows, columns, self.cable_length / lines, "paper")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window(Table):
+    """A web by the rule of `Paper`, at any size: closed inner web, every outermost node linked to a fixed end.
+
+    Parameters
+    ----------
+    mesh : {"triangle", "square", "hexagon"}
+        Shape of the meshes.
+    rows, columns : int
+        Cells for squares, and for hexagons, whose every second row has one cell less; for triangles rows of inner
+        nodes and nodes in the first of them, every second row having one node more. An even number of rows ends with
+        a row of the second kind.
+    side : float
+        Length of each line [m].
+
+    Raises
+    ------
+    InputError
+        For sizes at which nothing hangs together, and above a million cells.
+    """
+
+    kind: str = choice("window", default="window")
+    mesh: str = choice(*MESHES)
+    rows: int = integer()
+    columns: int = integer()
+    side: float = real(above=0, unit="m")
+
+    def check(self):
+        """Refuse sizes at which nothing hangs together, and more than a million cells."""
+        for name, least in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
+            if getattr(self, name) < least:
+                raise InputError(f'{name} = {getattr(self, name)} must be ≥ {least} for mesh = "{self.mesh}"')
+        if self.rows * self.columns > _MOST_CELLS:
+            raise InputError(f"rows × columns = {self.rows * self.columns} must be ≤ {_MOST_CELLS}")
+
+    def web(self, base=None):
+        """The `refweb.net.web.Web`; its cells count the sectors between links as `Paper` does."""
+        return _window(self.mesh, self.rows, self.columns, self.side, "window")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layers(Table):
+    """A web of concentric layers with its frame, fixed at every node of the frame (section 3.1, Figure 9).
+
+    Parameters
+    ----------
+    mesh : {"triangle", "square", "hexagon"}
+        Shape of the meshes: a triangle of side 3N − 2, a square of side 2N − 1, hexagons around one.
+    layers : int
+        N ≥ 1.
+    cell_area : float
+        Area A of a mesh [m²].
+
+    Raises
+    ------
+    InputError
+        For an unknown mesh, layers < 1, and an area that is not finite and > 0; from ``web``, above a million cells.
+
+    Notes
+    -----
+    N layers of hexagons have 3N² − 3N + 1 cells and 9N² − 3N lines; the paper's section 3.1.3 repeats the formulas of
+    the square. The limit of the length-area ratio that it states is that of hexagons.
+    """
+
+    kind: str = choice("layers", default="layers")
+    mesh: str = choice(*MESHES)
+    layers: int = integer(at_least=1)
+    cell_area: float = real(above=0, unit="m²")
+
+    def web(self, base=None):
+        """The `refweb.net.web.Web`; refused above a million cells."""
+        n = self.layers
+        cells = _cells(self.mesh, n)
+        if cells > _MOST_CELLS:
+            raise InputError(f"layers = {n} makes {cells} cells, must be ≤ {_MOST_CELLS}")
+        if self.mesh == "triangle":
+            row = np.arange(3 * n - 2)
+            polygons = np.concatenate([_rows(len(row) - row, row, _UP), _rows(len(row) - 1 - row, row + 2, _DOWN)])
+        elif self.mesh == "square":
+            polygons = _rows(np.full(2 * n - 1, 2 * n - 1), np.zeros(2 * n - 1, dtype=int), _SQUARE, (1, 1))
+        else:
+            away = abs(np.arange(2 * n - 1) - (n - 1))
+            polygons = _rows(2 * n - 1 - away, away, _HEXAGON, (2, 3))
+        nodes, lines, frame = _tessellation(polygons)
+        points = _placed(nodes, self.mesh, _side(self.mesh, self.cell_area))
+        return Web(points, lines, rim=np.unique(lines[frame]), kind="layers", cells=len(polygons))
+
+
+def _side(mesh, cell_area):
+    return sqrt(cell_area / AREA[mesh])
+
+
+def _cells(mesh, layers):
+    """Number of cells."""
+    if mesh == "hexagon":
+        return 3 * layers * layers - 3 * layers + 1
+    return (3 * layers - 2 if mesh == "triangle" else 2 * layers - 1) ** 2

@@ -1,0 +1,176 @@
+"""Tension laws: stress, tangent and energy density of a cable against its engineering strain.
+
+The smooth law is eqs. (2)–(3) of *Dynamic modelling and analysis of space webs*: with s = ε − ε0 and r = √(s² + 4η²),
+σ = E[(s + r)/2 − α]. In that form it loses all digits at small strain and under compression. With
+g = (s + r)/2 (for s < 0: 2η²/(r − s)) and g0, r0 its values at ε = 0 the same law reads
+
+    σ = E ε (g + g0)/(r + r0),        dσ/dε = E g/r,        α = g0,
+
+which has a relative error of a few units of round-off everywhere. Under compression the stress tends to the floor −αE.
+
+Scalar functions, one formula for the compiled kernels and for `Law`, whose methods are ufuncs.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+
+from ..errors import InputError
+from ..kernels import kernel, ufunc
+from ..tables import nearest
+
+SMOOTH, TENSION_ONLY, LINEAR = 0, 1, 2
+NAMES = {"smooth": SMOOTH, "tension-only": TENSION_ONLY, "linear": LINEAR}
+
+
+@kernel(inline="always")
+def branch(s, smoothing):
+    """(g, r) of the smooth law at s = ε − ε0."""
+    r = math.sqrt(s * s + 4.0 * smoothing * smoothing)
+    if s >= 0.0:
+        return 0.5 * (s + r), r
+    return 2.0 * smoothing * smoothing / (r - s), r
+
+
+@kernel()
+def prepared_stress(law, strain, modulus, slackness, smoothing, g0, r0):
+    """σ(ε) [Pa], with (g0, r0) = branch(−ε0, η) at hand."""
+    if law == LINEAR or (law == TENSION_ONLY and strain > 0.0):
+        return modulus * strain
+    if law == TENSION_ONLY:
+        return 0.0
+    g, r = branch(strain - slackness, smoothing)
+    if r + r0 == 0.0:
+        return 0.0
+    return modulus * strain * ((g + g0) / (r + r0))
+
+
+@kernel()
+def stress(law, strain, modulus, slackness, smoothing):
+    """σ(ε) [Pa]."""
+    g0, r0 = branch(-slackness, smoothing)
+    return prepared_stress(law, strain, modulus, slackness, smoothing, g0, r0)
+
+
+@kernel()
+def tangent(law, strain, modulus, slackness, smoothing):
+    """dσ/dε [Pa]; at the kink of a law without smoothing the taut side's."""
+    if law == LINEAR or (law == TENSION_ONLY and strain >= 0.0):
+        return modulus
+    if law == TENSION_ONLY:
+        return 0.0
+    g, r = branch(strain - slackness, smoothing)
+    if r == 0.0:
+        return modulus
+    return modulus * (g / r)
+
+
+@kernel()
+def curvature(law, strain, modulus, slackness, smoothing):
+    """d²σ/dε² [Pa], 2 E η²/r³; 0 for laws without smoothing."""
+    _, r = branch(strain - slackness, smoothing)
+    if law != SMOOTH or r == 0.0:
+        return 0.0
+    share = 2.0 * smoothing / r
+    return 0.5 * modulus * share * share / r
+
+
+@kernel()
+def above_floor(law, strain, modulus, slackness, smoothing):
+    """σ(ε) + αE, how far the stress is above the law's floor [Pa]; infinite for the linear law."""
+    return math.inf if law == LINEAR else modulus * branch(strain - slackness, smoothing)[0]
+
+
+@kernel()
+def energy_density(law, strain, modulus, slackness, smoothing):
+    """∫ σ dε from 0 [J/m³]; a Taylor series where |ε| is below 1e-4 of the larger of ε0 and 2η."""
+    if law == LINEAR or (law == TENSION_ONLY and strain > 0.0):
+        return 0.5 * modulus * strain * strain
+    if law == TENSION_ONLY:
+        return 0.0
+    s = strain - slackness
+    g0, r0 = branch(-slackness, smoothing)
+    if abs(strain) < 1e-4 * max(slackness, 2.0 * smoothing):
+        q = 2.0 * smoothing * smoothing / (r0 * r0 * r0)
+        rest = strain * (q / 6.0) * (1.0 + 0.75 * strain * slackness / (r0 * r0))
+        return modulus * strain * strain * (0.5 * g0 / r0 + rest)
+    g, r = branch(s, smoothing)
+    energy = 0.5 * (s * g + slackness * g0) - g0 * strain
+    if smoothing > 0.0:
+        twice = 2.0 * smoothing
+        energy += smoothing * smoothing * (math.asinh(s / twice) + math.asinh(slackness / twice))
+    return modulus * energy
+
+
+@functools.cache
+def _ufuncs():
+    """Stress, tangent and energy density as ufuncs; a run of kernels alone never builds them."""
+    signature = ["float64(int64, float64, float64, float64, float64)"]
+
+    @ufunc(signature)
+    def stresses(law, strain, modulus, slackness, smoothing):
+        return stress(law, strain, modulus, slackness, smoothing)
+
+    @ufunc(signature)
+    def tangents(law, strain, modulus, slackness, smoothing):
+        return tangent(law, strain, modulus, slackness, smoothing)
+
+    @ufunc(signature)
+    def energies(law, strain, modulus, slackness, smoothing):
+        return energy_density(law, strain, modulus, slackness, smoothing)
+
+    return stresses, tangents, energies
+
+
+@dataclass(frozen=True)
+class Law:
+    """A tension law by name, vectorised over strain and parameters.
+
+    Parameters
+    ----------
+    name : {"smooth", "tension-only", "linear"}
+        ``smooth`` has slackness ε0 ≥ 0 and smoothing η ≥ 0; ``tension-only`` is its limit η → 0 at ε0 = 0, of convex
+        energy; ``linear`` resists compression like a bar.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+
+    Notes
+    -----
+    All methods take engineering strain [1], modulus E [Pa], slackness ε0 [1] and smoothing η [1], which broadcast.
+    """
+
+    name: str = "smooth"
+
+    def __post_init__(self):
+        if self.name not in NAMES:
+            raise InputError(f'law = "{self.name}" is unknown, {nearest(self.name, NAMES)}')
+
+    @property
+    def number(self):
+        """The law's number in compiled kernels."""
+        return NAMES[self.name]
+
+    def stress(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
+        """Stress σ = T/A [Pa]."""
+        return _ufuncs()[0](self.number, strain, modulus, slackness, smoothing)
+
+    def tangent(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
+        """Tangent modulus dσ/dε [Pa]."""
+        return _ufuncs()[1](self.number, strain, modulus, slackness, smoothing)
+
+    def energy_density(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
+        """Energy per natural volume ∫σ dε, zero at ε = 0 [J/m³]."""
+        return _ufuncs()[2](self.number, strain, modulus, slackness, smoothing)
+
+    def floor(self, modulus=1.0, slackness=0.0, smoothing=0.0):
+        """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for linear."""
+        if self.name != "smooth":
+            return 0.0 * modulus if self.name == "tension-only" else math.inf * modulus
+        root = (slackness * slackness + 4.0 * smoothing * smoothing) ** 0.5
+        total = root + slackness
+        return modulus * (2.0 * smoothing * smoothing / (total + (total == 0.0)))

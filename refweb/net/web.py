@@ -1,0 +1,268 @@
+"""A web is nodes, lines between them and the lines' natural lengths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import chain
+
+import numpy as np
+
+from ..errors import InputError
+from ..tables import nearest, node_number, shown
+
+SELECTIONS = ("centre", "rim", "corners", "all")
+_TIE = 1e-9  # two distances are equal if they differ by less than this part of the web's size
+
+
+@dataclass(frozen=True, eq=False)
+class Web:
+    """A net of straight lines in its stress-free or prestressed position.
+
+    Parameters
+    ----------
+    points : ndarray of shape (nodes, 3)
+        Positions [m].
+    lines : ndarray of shape (lines, 2)
+        End nodes of each line, as int32.
+    natural_length : ndarray of shape (lines,), optional
+        Natural length of each line [m], by default the distance of its end nodes.
+    rim : ndarray of shape (k,)
+        Nodes that the web's own rule supports, sorted.
+    kind : {"paper", "window", "layers", "cable", "inline", "file"}
+        The rule that made the web.
+    cells : int, optional
+        Number of meshes, by default lines − nodes + components.
+    names : dict of str to tuple of int
+        The user's names for nodes.
+    groups : tuple of str, optional
+        Group of each line, "" for none.
+    length_given : bool, optional
+        Whether natural lengths are data of their own and not distances; by default whether ``natural_length`` is given.
+
+    Raises
+    ------
+    InputError
+        For node numbers out of range, a line that joins a node to itself, repeats another one or has no length, nodes
+        that no line uses, numbers that are not finite.
+
+    Notes
+    -----
+    Arrays are C-contiguous and read-only.
+    """
+
+    points: np.ndarray
+    lines: np.ndarray
+    natural_length: np.ndarray | None = None
+    rim: np.ndarray = ()
+    kind: str = "inline"
+    cells: int | None = None
+    names: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    groups: tuple[str, ...] | None = None
+    length_given: bool | None = None
+
+    def __post_init__(self):
+        points = np.array(self.points, dtype=np.float64, order="C")
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
+        for i in _first(~np.isfinite(points).all(axis=1)):
+            raise InputError(f"points[{i}] = {points[i].tolist()} must be finite [m]")
+        lines = _checked_lines(self.lines, len(points))
+        if self.natural_length is None:
+            with np.errstate(over="ignore"):
+                length = np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1)
+            for i in _first(length == 0):
+                raise InputError(f"lines[{i}] = {lines[i].tolist()} has no length: its nodes coincide")
+        else:
+            length = np.array(self.natural_length, dtype=np.float64)
+        if length.shape != (len(lines),):
+            raise InputError(f"natural_length has {length.size} entries for {len(lines)} lines")
+        for i in _first(~((length > 0) & np.isfinite(length))):
+            raise InputError(f"natural_length[{i}] = {length[i]:g} must be finite and > 0 [m]")
+        groups = ("",) * len(lines) if self.groups is None else tuple(map(str, self.groups))
+        if len(groups) != len(lines):
+            raise InputError(f"groups has {len(groups)} entries for {len(lines)} lines")
+        names = {name: _named(name, numbers, len(points)) for name, numbers in self.names.items()}
+        rim = np.unique(in_range("rim", self.rim, len(points))).astype(np.int32)
+        given = self.natural_length is not None if self.length_given is None else bool(self.length_given)
+        for name, value in (("points", points), ("lines", lines), ("natural_length", length), ("rim", rim)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        for name, value in (("groups", groups), ("names", names), ("length_given", given)):
+            object.__setattr__(self, name, value)
+        if self.cells is None:
+            object.__setattr__(self, "cells", len(lines) - len(points) + self.components()[0])
+
+    @property
+    def cable_length(self):
+        """Sum of the natural lengths [m]."""
+        return float(self.natural_length.sum())
+
+    @property
+    def area(self):
+        """Area of the bounding box [m²]: the product of its two largest sides, for a flat web those in x and y."""
+        return float(np.sort(np.ptp(self.points, axis=0))[1:].prod())
+
+    @property
+    def centre(self):
+        """Number of the node nearest the origin, of a cable nearest half its length; ties go to lowest y, then x."""
+        size = np.ptp(self.points, axis=0).max()
+        if self.kind == "cable":
+            near = np.unique([len(self.lines) // 2, (len(self.lines) + 1) // 2])
+        else:
+            distance = np.linalg.norm(self.points, axis=1)
+            near = np.flatnonzero(distance <= distance.min() + _TIE * size)
+        for axis in (1, 0, 2):
+            value = self.points[near, axis]
+            near = near[value <= value.min() + _TIE * size]
+        return int(near[0])
+
+    @property
+    def corners(self):
+        """Numbers of the hull's vertices, sorted, shape (k,); refused unless the web lies in z = 0."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        size = np.ptp(self.points, axis=0).max()
+        height = np.abs(self.points[:, 2]).max()
+        if height > _TIE * size:
+            raise InputError(f"corners are those of a flat web in z = 0 m; this web reaches |z| = {height:g} m")
+        try:
+            hull = ConvexHull(self.points[:, :2]).vertices
+        except QhullError:
+            raise InputError("corners are those of a flat web; the nodes of this web lie on one line") from None
+        side = np.roll(self.points[hull, :2], -1, axis=0) - self.points[hull, :2]
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        before = np.roll(side, 1, axis=0)
+        turn = before[:, 0] * side[:, 1] - before[:, 1] * side[:, 0]
+        return np.sort(hull[turn > _TIE]).astype(np.int64)
+
+    def components(self):
+        """Number of connected parts and the part each node belongs to, shape (nodes,)."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.points)
+        graph = coo_array((np.ones(len(self.lines), dtype=np.int8), tuple(self.lines.T)), shape=(n, n))
+        return connected_components(graph, directed=False)
+
+    def find(self, selection, name="node"):
+        """Node numbers of a selection.
+
+        Parameters
+        ----------
+        selection : int, str or list of them
+            Node numbers, the user's names, "centre", "rim", "corners" or "all".
+        name : str
+            What messages call the selection.
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            Node numbers as int64, in the order given, each once.
+
+        Raises
+        ------
+        InputError
+            For a number out of range or an unknown name.
+        """
+        if isinstance(selection, (list, tuple, np.ndarray)):
+            found = [self._find_one(f"{name}[{i}]", one) for i, one in enumerate(selection)]
+        else:
+            found = [self._find_one(name, selection)]
+        return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
+
+    def find_lines(self, selection):
+        """Line numbers of a selection.
+
+        Parameters
+        ----------
+        selection : int, str or list of them
+            Line numbers, groups, "rim" (the lines between two nodes of the rim) or "all".
+
+        Returns
+        -------
+        ndarray of shape (k,)
+            Line numbers as int64, increasing, each once.
+
+        Raises
+        ------
+        InputError
+            For a number out of range, or a name that is that of no line.
+        """
+        if isinstance(selection, (list, tuple, np.ndarray)):
+            found = [self._find_lines(f"lines[{i}]", one) for i, one in enumerate(selection)]
+        else:
+            found = [self._find_lines("lines", selection)]
+        return np.unique(np.concatenate(found)).astype(np.int64)
+
+    def _find_lines(self, name, one):
+        if not isinstance(one, str):
+            if not 0 <= node_number(name, one) < len(self.lines):
+                raise InputError(f"{name} = {one} must be 0 … {len(self.lines) - 1}")
+            return [one]
+        known = [group for group in dict.fromkeys(self.groups) if group]
+        if one in known:
+            return np.flatnonzero(np.array(self.groups) == one)
+        if one == "all":
+            return np.arange(len(self.lines))
+        if one != "rim":
+            raise InputError(f"{name} = {shown(one)} names no line, {nearest(one, ('rim', 'all', *known))}")
+        found = np.flatnonzero(np.isin(self.lines, self.rim).all(axis=1))
+        if not len(found):
+            raise InputError(f'{name} = "rim": no line of this web joins two nodes of its rim, give line numbers')
+        return found
+
+    def _find_one(self, name, one):
+        if not isinstance(one, str):
+            if not 0 <= node_number(name, one) < len(self.points):
+                raise InputError(f"{name} = {one} must be 0 … {len(self.points) - 1}")
+            return (one,)
+        if one in self.names:
+            return self.names[one]
+        if one == "all":
+            return range(len(self.points))
+        if one == "rim" and not len(self.rim):
+            raise InputError(f'{name} = "rim": this web has no supports of its own, give node numbers')
+        if one in SELECTIONS:
+            return np.atleast_1d(getattr(self, one)).tolist()
+        raise InputError(f"{name} = {shown(one)} names no node, {nearest(one, (*SELECTIONS, *self.names))}")
+
+
+def _first(bad):
+    """Index of the first true entry, none if all are false."""
+    return np.flatnonzero(bad)[:1].tolist()
+
+
+def in_range(name, numbers, count):
+    """Node numbers as int64; refuse those that are not 0 … count − 1."""
+    numbers = np.asarray(numbers)
+    if numbers.size and numbers.dtype.kind not in "iu":
+        raise InputError(f"{name} = {shown(numbers.tolist())} must be node numbers")
+    for i in _first((numbers < 0) | (numbers >= count)):
+        raise InputError(f"{name}[{i}] = {numbers[i]} must be 0 … {count - 1}")
+    return numbers.astype(np.int64)
+
+
+def _named(name, numbers, count):
+    if name in SELECTIONS:
+        raise InputError(f"names.{name} = {shown(numbers)}: {', '.join(SELECTIONS)} have a meaning of their own")
+    return tuple(in_range(f"names.{name}", np.atleast_1d(numbers), count).tolist())
+
+
+def _checked_lines(lines, nodes):
+    lines = np.asarray(lines)
+    if lines.ndim != 2 or lines.shape[1] != 2 or len(lines) == 0 or lines.dtype.kind not in "iu":
+        raise InputError(f"lines of shape {lines.shape} must be at least one pair of node numbers, shape (lines, 2)")
+    for i in _first(((lines < 0) | (lines >= nodes)).any(axis=1)):
+        raise InputError(f"lines[{i}] = {lines[i].tolist()} must be node numbers 0 … {nodes - 1}")
+    for i in _first(lines[:, 0] == lines[:, 1]):
+        raise InputError(f"lines[{i}] = {lines[i].tolist()} joins a node to itself")
+    key = lines.min(axis=1).astype(np.int64) * nodes + lines.max(axis=1)
+    _, first, same = np.unique(key, return_index=True, return_inverse=True)
+    for i in _first(first[same] != np.arange(len(lines))):
+        j = first[same[i]]
+        raise InputError(f"lines[{i}] = {lines[i].tolist()} repeats lines[{j}] = {lines[j].tolist()}")
+    unused = np.flatnonzero(np.bincount(lines.ravel(), minlength=nodes) == 0)
+    if len(unused):
+        more = f" (and {len(unused) - 1} more)" if len(unused) > 1 else ""
+        raise InputError(f"node {unused[0]}{more} is used by no line")
+    return np.array(lines, dtype=np.int32, order="C")

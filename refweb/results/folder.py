@@ -1,0 +1,370 @@
+"""Result folders: frames, history and summary, so written that a kill at any moment leaves a folder that opens.
+
+Every file but ``history.csv``, which grows by whole rows, is written beside its place and then moved there. A frame is
+listed in ``web.pvd`` after it and the checkpoint of its state are there, and its row of the history before.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+import pathlib
+import re
+import shutil
+import tempfile
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from ..net.rigid_body import row_names, surface
+from ..tables import short
+
+OWN = re.compile(
+    r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
+    r"|(frames/)?\.refweb-[^/]+"
+)
+"""Files that a run writes, and that ``--force`` removes."""
+POINT_DATA = ("displacement", "velocity", "reaction", "mass")
+SHAPE_SIZE = 0.05
+"""Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
+CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
+
+
+def write_atomically(path, write):
+    """Call ``write(file name)`` for a file beside ``path`` and move it there."""
+    handle, name = tempfile.mkstemp(prefix=".refweb-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    try:
+        write(name)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except BaseException:
+        pathlib.Path(name).unlink(missing_ok=True)
+        raise
+
+
+@functools.cache
+def _umask():
+    """The process's mask of permissions, which can only be read by setting it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def write_text(path, text):
+    """Write a text file atomically, as UTF-8."""
+    write_atomically(path, lambda name: pathlib.Path(name).write_text(text, encoding="utf-8"))
+
+
+def _drawn(net):
+    """Weights of a cell's nodes at the places where VTK has the nodes of a line of that order, shape (nodes, nodes).
+
+    VTK's cubic has its inner nodes at thirds, this element at the Gauss–Lobatto points: the curve through the element's
+    own nodes would have 10 % less sag than the element.
+    """
+    order = net.order
+    places = np.array([0.0, 1.0, *np.arange(1, order) / order])
+    powers = np.arange(order + 1)
+    return places[:, None] ** powers @ np.linalg.inv(net.places[:, None] ** powers)
+
+
+def frame_data(state, shape=None):
+    """Points, and point and cell data by name, of a state's web, as VTU has them; one cell per element.
+
+    The ``shape`` of a mode, of shape (nodes, 3), is point data as well, and is added to points and displacement.
+    """
+    net = state.system.net
+    state.system.prepare(state.time)
+    fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
+    points, *point_data = (values[: net.nodes].copy() for values in fields)
+    curved = [points, *point_data[:2]]
+    if shape is not None:
+        large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
+        for values in curved[:2]:
+            values += large * shape
+        point_data.append(shape.copy())
+        curved.append(point_data[-1])
+    if net.order > 2:
+        inner, weights = net.cells[:, 2:], _drawn(net)[2:]
+        for values in curved:
+            values[inner] = np.einsum("ia,cax->cix", weights, values[net.cells])
+    cells = (state.element_tension, state.element_tension / net.area, state.element_strain)
+    cell_data = dict(zip(CELL_DATA, (*cells, net.natural_length, state.element_slack), strict=True))
+    if net.subdivide > 1:
+        cell_data["line"] = net.line
+    cell_data = {key: np.asarray(values, dtype=float) for key, values in cell_data.items()}
+    return points, dict(zip((*POINT_DATA, "shape"), point_data, strict=False)), cell_data
+
+
+def write_frame(path, state, shape=None):
+    """Write the web of a state as VTU: current positions, its lines in the web's own numbering, float64.
+
+    Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other. A
+    ``shape`` is drawn on it.
+    """
+    import meshio
+
+    points, point_data, cell_data = frame_data(state, shape)
+    net = state.system.net
+    mesh = meshio.Mesh(
+        points,
+        [({1: "line", 2: "line3", 3: "line4"}[net.order], net.cells)],
+        point_data=point_data,
+        cell_data={key: [values] for key, values in cell_data.items()},
+    )
+    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
+
+
+def write_body(path, body, state):
+    """Write the surface of a body as VTU, at its current position."""
+    import meshio
+
+    points, triangles = surface(body, state.position[body.row])
+    data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
+    point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
+    mesh = meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
+    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
+
+
+def read_summary(folder):
+    """The content of ``run.json`` in a folder, None where there is none that a run of refweb wrote."""
+    try:
+        run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    own = isinstance(run, dict) and isinstance(run.get("versions"), dict) and "refweb" in run["versions"]
+    return run if own else None
+
+
+def check_folder(folder, force=False):
+    """Refuse a result folder that cannot be written, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        Where ``folder`` is a file, cannot be written, or is not empty and ``force`` is not given; with ``force`` where
+        it holds no ``run.json`` of refweb.
+    """
+    folder = pathlib.Path(folder)
+    name = f"result folder {short(str(folder))}"
+    try:
+        existing = next(p for p in (folder.absolute(), *folder.absolute().parents) if p.exists() or p.is_symlink())
+        for part in (existing, *([folder / "frames"] if (folder / "frames").exists() else [])):
+            if not part.is_dir():
+                raise InputError(f"{name}: {part.name} is a file, not a folder")
+            if not os.access(part, os.W_OK | os.X_OK):
+                raise InputError(f"{name}: {part.name} cannot be written: choose another folder")
+        full = existing == folder.absolute() and any(not p.name.startswith(".refweb-") for p in folder.iterdir())
+    except (OSError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{name}: cannot be used: {getattr(error, 'strerror', None) or error}") from None
+    if full and not force:
+        raise InputError(f"{name}: is not empty: choose another folder, or force (--force) to replace its results")
+    if full and read_summary(folder) is None:
+        raise InputError(f"{name}: holds no run.json of refweb, so it is no result of it: nothing was removed")
+
+
+def clear(folder, keep=("run.json",)):
+    """Remove what a run wrote except ``keep``, and nothing else."""
+    for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
+        name = path.relative_to(folder).as_posix()
+        if path.is_file() and OWN.fullmatch(name) and name not in keep:
+            path.unlink()
+
+
+def copy(source, target):
+    """Copy what a run wrote from one folder to another, ``run.json`` last."""
+    target = pathlib.Path(target)
+    if source.resolve() == target.resolve():
+        return
+    (target / "frames").mkdir(parents=True, exist_ok=True)
+    clear(target)
+    own = [p for p in source.rglob("*") if p.is_file() and OWN.fullmatch(p.relative_to(source).as_posix())]
+    for path in sorted(own, key=lambda p: p.name == "run.json"):
+        place = target / path.relative_to(source)
+        write_atomically(place, lambda name, path=path: shutil.copyfile(path, name))
+
+
+def number(value):
+    """A number as text that reads back to the same float."""
+    return repr(float(value))
+
+
+def as_toml(given):
+    """The dict of a scene as TOML, its tables in the order they have there: sums are taken in that order."""
+    import tomli_w
+
+    parts = []
+    for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
+        if isinstance(value, list):
+            parts += [f"[[{key}]]\n{tomli_w.dumps(one)}" for one in value]
+        else:
+            parts.append(tomli_w.dumps({key: value}))
+    return "\n".join(parts)
+
+
+class Folder:
+    """A result folder that is being written.
+
+    Parameters
+    ----------
+    path : path-like
+        The folder; made where it does not exist, cleared of earlier results where it does.
+    scene : refweb.Scene
+        Written as ``scene.toml`` with all defaults filled in.
+    columns : sequence of str
+        Header of ``history.csv``.
+    run : dict
+        First content of ``run.json``.
+    table : str
+        Name of the history's file.
+    row : int, optional
+        Number of the last row to keep of a run that goes on; nothing else is cleared then.
+
+    Raises
+    ------
+    SolverError
+        From every method that writes, where the folder cannot be written any more.
+    """
+
+    def __init__(self, path, scene, columns, run, table="history.csv", row=None):
+        self.path = pathlib.Path(path)
+        self._columns, self._table = columns, table
+        if row is not None:
+            self._go_on(row, run)
+            return
+        text = as_toml(scene.to_dict())
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"result folder {short(str(path))}: cannot be made: {error.strerror}") from None
+        with self._written():
+            (self.path / "scene.toml").unlink(missing_ok=True)  # from here on there is nothing to resume
+        self.summary(run)
+        with self._written():
+            (self.path / "frames").mkdir(exist_ok=True)
+            clear(self.path)
+            write_text(self.path / "scene.toml", text)
+        self._start()
+
+    @contextlib.contextmanager
+    def _written(self):
+        """Name the folder where it cannot be written: a full disk, a permission or the folder itself that is gone."""
+        try:
+            yield
+        except OSError as error:
+            raise SolverError(
+                f"result folder {short(str(self.path))}: cannot be written any more: {error.strerror or error}; "
+                "what was written is whole"
+            ) from None
+
+    def _start(self):
+        with self._written():
+            self._history = open(self.path / self._table, "wb", buffering=0)
+        self.row(self._columns)
+        self._listed = []
+        self._list_frames()
+
+    def _go_on(self, row, run):
+        """Cut the history behind a row, and remove the frames behind it."""
+        try:
+            with open(self.path / self._table, "rb") as lines:
+                kept = [len(line) for line, _ in zip(lines, range(row + 2), strict=False)]
+                lines.seek(0)
+                header = lines.readline().decode(errors="replace").strip()
+        except OSError as error:
+            raise InputError(f"{self.path / self._table}: cannot be read: {error.strerror}") from None
+        if len(kept) < row + 2 or header != ",".join(self._columns):
+            raise InputError(f"{self.path / self._table}: is not the history that checkpoint.npz goes with")
+        with self._written():
+            self._history = open(self.path / self._table, "r+b", buffering=0)
+            kept = sum(kept)
+            self._history.truncate(kept)
+            self._history.seek(kept)
+            for path in [*self.path.glob(".refweb-*"), *(self.path / "frames").iterdir()]:
+                number = re.search(r"_(\d{6,})\.vtu$", path.name)
+                if OWN.fullmatch(path.relative_to(self.path).as_posix()) and not (number and int(number[1]) <= row):
+                    path.unlink()
+        self._listed = []
+        self.summary(run)
+
+    def restart(self, run):
+        """Remove rows and frames and begin anew; ``run`` is the content of ``run.json``."""
+        self.close()
+        with self._written():
+            (self.path / "checkpoint.npz").unlink(missing_ok=True)
+        self.summary(run)
+        with self._written():
+            clear(self.path, keep=("run.json", "scene.toml"))
+        self._start()
+
+    def row(self, values):
+        """Append a row to the history, or nothing where it does not fit on the disk."""
+        line = (",".join(v if isinstance(v, str) else number(v) for v in values) + "\n").encode()
+        whole = self._history.tell()
+        with self._written():
+            try:
+                while line:
+                    line = line[self._history.write(line) :]
+            except OSError:
+                self._history.truncate(whole)
+                raise
+
+    def frame(self, number, state, shape=None, run=None):
+        """Write frame and checkpoint of a state and list the frame in ``web.pvd``, with a ``shape`` as its mode.
+
+        ``run`` is what the checkpoint holds besides, as arrays by name, for the run to go on from it.
+        """
+        with self._written():
+            write_frame(self.path / f"frames/web_{number:06d}.vtu", state, shape)
+            for body in state.system.net.bodies:
+                write_body(self.path / f"frames/{body.name}_{number:06d}.vtu", body, state)
+            net = state.system.net
+            arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
+            arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
+            arrays |= run or {}
+            write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
+        self.listed([(number, state.time if shape is None else number)], net.bodies)
+
+    def listed(self, frames, bodies):
+        """Add frames, each a row number and its time, to ``web.pvd``."""
+        for row, time in frames:
+            names = ["web", *(body.name for body in bodies)]
+            self._listed += [(time, part, f"frames/{name}_{row:06d}.vtu") for part, name in enumerate(names)]
+        self._list_frames()
+
+    def _list_frames(self):
+        rows = "".join(
+            f'    <DataSet timestep="{number(time)}" group="" part="{part}" file={quoteattr(name)}/>\n'
+            for time, part, name in self._listed
+        )
+        with self._written():
+            write_text(
+                self.path / "web.pvd",
+                '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+                f"  <Collection>\n{rows}  </Collection>\n</VTKFile>\n",
+            )
+
+    def summary(self, run):
+        """Write ``run.json``."""
+        text = json.dumps(run, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+        with self._written():
+            write_text(self.path / "run.json", text)
+
+    def last_row(self):
+        """The last row of the history."""
+        with open(self.path / self._table, encoding="utf-8") as lines:
+            *_, last = lines
+        return [float(value) for value in last.split(",")]
+
+    def rows(self):
+        """All rows of the history, shape (rows, columns)."""
+        return np.loadtxt(self.path / self._table, delimiter=",", skiprows=1, ndmin=2)
+
+    def close(self):
+        """Close the history."""
+        self._history.close()

@@ -1,0 +1,144 @@
+"""Compiled probes: what an explicit loop looks at in every step, one scalar each.
+
+A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``lines`` holds tension and strain of
+each element, ``rows`` and ``data`` the probe's own numbers; where ``where[1]`` is `PLACE` it writes the row or
+element it stands at to ``where[0]``.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+
+from ..kernels import MATRIX, kernel
+
+INTEGERS = types.Array(types.int64, 1, "C")
+"""Type of a probe's rows."""
+PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
+MAGNITUDE = 3
+"""Component number of a magnitude."""
+PLACE = 1
+"""Value of ``where[1]`` that asks a probe for the place of its value as well."""
+
+
+@kernel()
+def _larger(a, b):
+    return b if b > a else a
+
+
+@kernel()
+def _square(a, data, row, n):
+    x, y, z = a[row, 0] + data[n, 0], a[row, 1] + data[n, 1], a[row, 2] + data[n, 2]
+    return x * x + y * y + z * z
+
+
+@kernel()
+def _value(a, data, row, n, component):
+    return a[row, component] + data[n, component] if component < MAGNITUDE else _square(a, data, row, n)
+
+
+@kernel()
+def largest_of(a, data, rows, where):
+    """Largest component, or magnitude, of ``a + data`` over some rows.
+
+    ``rows`` is (component, first, last + 1), or (component, −1, −1, row, row, ...); the value is found first, and
+    its place only where it is asked for.
+    """
+    component, first, last, best = rows[0], rows[1], rows[2], -math.inf
+    if first >= 0:
+        part = a[first:last]  # a view whose index starts at 0: no check for rows counted from the end
+        for n in range(part.shape[0]):
+            best = _larger(best, _value(part, data, n, n, component))
+    else:
+        for n in range(rows.size - 3):
+            best = _larger(best, _value(a, data, rows[3 + n], n, component))
+    if where[1] == PLACE:
+        where[0] = -1
+        for n in range(data.shape[0]):
+            r = first + n if first >= 0 else rows[3 + n]
+            if where[0] < 0 and _value(a, data, r, n, component) >= best - 1e-15 * abs(best):
+                where[0] = r
+    return math.sqrt(best) if component == MAGNITUDE else best
+
+
+@kernel(PROBE)
+def displacement(t, x, v, f, lines, rows, data, where):
+    """Largest of x + data: displacement where data is zero, position where it is the reference."""
+    return largest_of(x, data, rows, where)
+
+
+@kernel(PROBE)
+def velocity(t, x, v, f, lines, rows, data, where):
+    """Largest of v."""
+    return largest_of(v, data, rows, where)
+
+
+@kernel()
+def _outer(data, n, first, k, x, v, row):
+    """Component k of g + B x + C v at a row; data has g, and then B and C where they are not zero, from ``first``."""
+    outer = data[n, first + k]
+    if data.shape[1] > first + 3:
+        at = first + 3 + 3 * k
+        for i in range(3):
+            outer += data[n, at + i] * x[row, i] + data[n, at + 9 + i] * v[row, i]
+    return outer
+
+
+@kernel(PROBE)
+def reaction(t, x, v, f, lines, rows, data, where):
+    """Component or magnitude of Σ w (g + B x + C v − f) over rows; data holds w, g, B, C, shape (rows, 6 or 24)."""
+    total0 = total1 = total2 = 0.0
+    first = rows[1]
+    for n in range(data.shape[0]):
+        r = first + n if first >= 0 else rows[3 + n]
+        total0 += data[n, 0] * (_outer(data, n, 3, 0, x, v, r) - f[r, 0])
+        total1 += data[n, 1] * (_outer(data, n, 3, 1, x, v, r) - f[r, 1])
+        total2 += data[n, 2] * (_outer(data, n, 3, 2, x, v, r) - f[r, 2])
+    where[0] = first if first >= 0 else rows[3]
+    if rows[0] == MAGNITUDE:
+        return math.sqrt(total0 * total0 + total1 * total1 + total2 * total2)
+    return total0 if rows[0] == 0 else total1 if rows[0] == 1 else total2
+
+
+@kernel(PROBE)
+def push(t, x, v, f, lines, rows, data, where):
+    """Largest magnitude of g + B x + C v − f over rows, the force of contact on bodies, 0 where it is of rounding.
+
+    data holds g, B, C, shape (rows, 3 or 21).
+    """
+    best = 0.0
+    for n in range(rows.size):
+        square = scale = 0.0
+        for k in range(3):
+            outer, whole = _outer(data, n, 0, k, x, v, rows[n]), f[rows[n], k]
+            square += (outer - whole) ** 2
+            scale += outer * outer + whole * whole
+        if square > 1e-26 * scale:
+            best = max(best, square)
+    return math.sqrt(best)
+
+
+@kernel(PROBE)
+def line(t, x, v, f, lines, rows, data, where):
+    """Largest of data × column over elements; ``rows`` is (column, first, last + 1)."""
+    column, first, last = rows[0], rows[1], rows[2]
+    values, scales, best = lines[first:last, column], data[first:last, 0], -math.inf
+    for n in range(values.size):
+        best = _larger(best, values[n] * scales[n])
+    if where[1] == PLACE:
+        where[0] = first
+        for n in range(values.size - 1, -1, -1):
+            if values[n] * scales[n] == best:
+                where[0] = first + n
+    return best
+
+
+@kernel(PROBE)
+def slack_fraction(t, x, v, f, lines, rows, data, where):
+    """Share of elements whose strain is at most data."""
+    count = 0
+    for c in range(lines.shape[0]):
+        if lines[c, 1] <= data[c, 0]:
+            count += 1
+    return count / lines.shape[0]

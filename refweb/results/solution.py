@@ -1,0 +1,200 @@
+"""What a run returns: results, fields, history and cost, as numpy arrays and plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..tables import nearest
+
+SOLVER = dict.fromkeys(
+    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift".split()
+)
+"""What a solver reports; None for what it does not know."""
+
+
+class Names(dict):
+    """A dict whose unknown keys are answered with the nearest one."""
+
+    def __missing__(self, key):
+        raise KeyError(f"{key!r} is not among them, {nearest(key, self)}")
+
+
+@dataclass(eq=False, repr=False)
+class Solution:
+    """A solved scene.
+
+    Attributes
+    ----------
+    scene : refweb.Scene
+        What was solved.
+    state : refweb.results.state.State
+        The last state.
+    columns : list of str
+        Names of the columns of ``history.csv``, with units.
+    steps : list of dict
+        Results and solver figures of each load step.
+    solver, cost, web : dict
+        As in ``run.json``.
+    versions : dict of str to str
+        Versions of refweb, Python and the libraries that solved it, by name.
+    status : {"running", "solved", "failed", "interrupted"}
+        How it ended; ``message`` says why.
+    warnings : list of str
+        What a reader of the results has to know.
+    table : dict of str to ndarray, optional
+        The history, where it is held in memory.
+    path : pathlib.Path, optional
+        The result folder that a run wrote while it went.
+    utilisation : (float, int), optional
+        Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
+    reduced : dict
+        Results of a dynamic run; `results` has those of either kind.
+    horizon : dict
+        How long the motion is determined, see `refweb.studies.predictability.horizon`; empty where that was not asked
+        for.
+    events : list of dict
+        Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
+    frames : list of (int, refweb.results.state.State)
+        Row numbers and states that stand as VTU in a result folder.
+    """
+
+    scene: object
+    state: object = None
+    table: dict | None = None
+    path: object = None
+    columns: list = field(default_factory=list)
+    steps: list = field(default_factory=list)
+    solver: dict = field(default_factory=SOLVER.copy)
+    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "by_effect": {}})
+    web: dict = field(default_factory=dict)
+    versions: dict = field(default_factory=dict)
+    status: str = "running"
+    message: str = ""
+    warnings: list = field(default_factory=list)
+    events: list = field(default_factory=list)
+    frames: list = field(default_factory=list)
+    reduced: dict = field(default_factory=dict)
+    horizon: dict = field(default_factory=dict)
+    utilisation: tuple | None = None
+
+    @property
+    def results(self):
+        """Results by name, each a `refweb.results.observables.Result`; of the last load step."""
+        return Names(self.steps[-1]["results"] if self.steps else self.reduced)
+
+    @property
+    def history(self):
+        """Columns of the history by name, a dict of arrays with one entry per row.
+
+        First ``time`` [s], in statics ``step``, then every observable and the energies [J], in dynamics the momentum of
+        all that is free and the impulse of the supports [N s] as well. A dynamic run that writes a folder holds none of
+        it in memory: it is read from there.
+        """
+        if self.table is not None:
+            return self.table
+        rows = np.loadtxt(self.path / "history.csv", delimiter=",", skiprows=1, ndmin=2)
+        return as_history(self.columns, rows)
+
+    @property
+    def positions(self):
+        """Positions of the nodes in the last state [m], shape (nodes, 3); those of order and subdivision come last."""
+        return self.state.position[: self.state.system.net.nodes]
+
+    @property
+    def displacement(self):
+        """Displacement of the nodes in the last state [m], shape (nodes, 3)."""
+        return self.state.x[: self.state.system.net.nodes]
+
+    @property
+    def tension(self):
+        """Tension of the lines in the last state [N], shape (lines,)."""
+        return self.state.tension
+
+    @property
+    def stress(self):
+        """Stress of the lines in the last state [Pa], shape (lines,)."""
+        return self.state.stress
+
+    @property
+    def strain(self):
+        """Strain of the lines in the last state [1], shape (lines,)."""
+        return self.state.strain
+
+    @property
+    def slack(self):
+        """Lines that are slack in the last state, bool, shape (lines,)."""
+        return self.state.slack
+
+    @property
+    def velocities(self):
+        """Velocities of the nodes in the last state [m/s], shape (nodes, 3)."""
+        return self.state.v[: self.state.system.net.nodes]
+
+    @property
+    def reaction(self):
+        """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
+        return self.state.reaction[: self.state.system.net.nodes]
+
+    def __repr__(self):
+        found = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
+        return f'<Solution of "{self.scene.title}": {self.status}; {found}>'
+
+    def summary(self):
+        """The content of ``run.json``, a dict of plain values."""
+
+        def plain(results):
+            return {name: result.plain() for name, result in results.items()}
+
+        return {
+            "status": self.status,
+            "message": self.message,
+            "scene": self.scene.title,
+            "web": self.web,
+            "results": plain(self.results),
+            "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
+            "events": self.events,
+            "solver": self.solver,
+            "cost": self.cost,
+            "versions": self.versions,
+            "seed": self.scene.seed,
+            "warnings": self.warnings,
+            **({"horizon": self.horizon} if self.horizon else {}),
+        }
+
+    def save(self, folder, force=False):
+        """Write the result folder.
+
+        Parameters
+        ----------
+        folder : path-like
+            Made where it does not exist.
+        force : bool
+            Replace the results of an earlier run.
+
+        Raises
+        ------
+        InputError
+            Where the folder is not empty or cannot be written.
+        """
+        from .folder import Folder, check_folder, copy
+
+        check_folder(folder, force)
+        if self.table is None:
+            copy(self.path, folder)
+            return
+        out = Folder(folder, self.scene, self.columns, {**self.summary(), "status": "running"})
+        for row in zip(*self.history.values(), strict=True):
+            out.row(row)
+        for number, state in self.frames:
+            out.frame(number, state)
+        out.close()
+        out.summary(self.summary())
+
+
+def as_history(columns, rows):
+    """Rows of numbers as a dict by name; ``columns`` are names with units."""
+    names = [column.rsplit(" [", 1)[0] for column in columns]
+    table = np.array(rows, dtype=float).reshape(len(rows), len(names))
+    return Names(zip(names, table.T, strict=True))

@@ -1,0 +1,144 @@
+"""One instant of a net and everything that can be read off it."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ..net.tension_laws import LINEAR, SMOOTH
+
+
+class State:
+    """Displacement and velocity of a system at one time, and the quantities that follow from them.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    time : float
+        Time [s]; in statics the load step.
+    x : ndarray, shape (rows, 3)
+        Displacement [m].
+    v : ndarray, shape (rows, 3), optional
+        Velocity [m/s], zero by default.
+    """
+
+    def __init__(self, system, time, x, v=None):
+        self.system, self.time, self.x = system, time, x
+        self.v = np.zeros_like(x) if v is None else v
+
+    @cached_property
+    def _forces(self):
+        force, out = self.system.forces(self.time, self.x, self.v)
+        return force, [o.copy() for o in out]
+
+    def _by_line(self, values):
+        """Largest value over the elements of each line."""
+        net = self.system.net
+        largest = np.full(len(net.web.lines), -np.inf)
+        np.maximum.at(largest, net.line, values)
+        return largest
+
+    @cached_property
+    def position(self):
+        """Positions [m], shape (rows, 3)."""
+        return self.system.net.points + self.x
+
+    @cached_property
+    def element_tension(self):
+        """Tension of each element [N], shape (cells,)."""
+        at = next(i for i, f in enumerate(self.system.families) if f.cells is self.system.net.cells)
+        return self._forces[1][at][:, 0]
+
+    @cached_property
+    def tension(self):
+        """Tension [N], shape (lines,)."""
+        return self._by_line(self.element_tension)
+
+    @cached_property
+    def stress(self):
+        """Nominal stress T/A [Pa], shape (lines,)."""
+        return self._by_line(self.element_tension / self.system.net.area)
+
+    @cached_property
+    def element_strain(self):
+        """Strain of each element, its largest over quadrature points [1], shape (cells,)."""
+        from ..effects.elasticity import strains
+
+        self.system.prepare(self.time)
+        return strains(self.system.net, self.x).max(axis=1)
+
+    @cached_property
+    def element_slack(self):
+        """True for each element that is slack all along, as `slack`, shape (cells,)."""
+        return self.element_strain <= self.system.net.slackness
+
+    @cached_property
+    def strain(self):
+        """Engineering strain [1], shape (lines,)."""
+        return self._by_line(self.element_strain)
+
+    @cached_property
+    def slack(self):
+        """True for each line whose strain is ≤ ε0 (laws without slackness: ≤ 0), shape (lines,)."""
+        return np.bincount(self.system.net.line, ~self.element_slack) == 0.0
+
+    @cached_property
+    def slack_nodes(self):
+        """Free nodes that no taut line holds, whose position is not unique; bars hold under compression as well."""
+        net = self.system.net
+        held = self.system.supported.all(axis=1)
+        holds = np.ones(len(net.cells), dtype=bool) if net.law.number == LINEAR else ~self.element_slack
+        held[net.cells[holds].ravel()] = True
+        return np.flatnonzero(~held[: net.nodes])
+
+    @cached_property
+    def reaction(self):
+        """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
+        force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
+        for body in self.system.net.bodies:
+            internal = (f for f in self.system.families if f.internal)
+            force[body.row] = sum(self.system.force_of(f, self.time, self.x, self.v)[body.row] for f in internal)
+        return force
+
+    @cached_property
+    def utilisation(self):
+        """Stress over strength, shape (lines,); None where no line has a strength."""
+        net = self.system.net
+        if not np.isfinite(net.strength).any():
+            return None
+        return self._by_line(self.element_tension / (net.area * net.strength))
+
+    @cached_property
+    def energies(self):
+        """Energies by column of the book [J]: those of the effects that are present, and their total.
+
+        Work is that of dead loads, and left out where other loads act, whose work depends on the path.
+        """
+        book = {}
+        for family in (f for f in self.system.families if f.energy is not None):
+            energy = float(self.system.energy_of(family, self.time, self.x).sum())
+            book[family.book] = book.get(family.book, 0.0) + energy
+        work = -book.pop("work") if "work" in book else None
+        book["total_energy"] = sum(book.values())
+        if work is None or any(f.book == "work" and f.energy is None for f in self.system.families):
+            return book
+        return {**book, "work": work}
+
+
+def strength_remark(utilisation):
+    """A warning where the largest stress over strength, (value, line), exceeds 1."""
+    if utilisation is not None and utilisation[0] > 1.0:
+        yield f"line {utilisation[1]} breaks: stress over strength is {utilisation[0]:.3g}"
+
+
+def floor_remark(net, stress):
+    """A warning where the smooth law's floor exceeds 1 % of the largest stress [Pa]."""
+    if net.law.number == SMOOTH:
+        floor = float((net.law.floor(*net.line_data[:, 1:4].T) / net.area).max())
+        if floor > 0.01 * stress:
+            yield (
+                f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "
+                'slack lines push; lower smoothing or use law = "tension-only"'
+            )

@@ -1,0 +1,1 @@
+"""Equilibria and their bounds; it knows no time and no events."""

@@ -1,0 +1,77 @@
+"""The angular speed at and above which a net that turns has no stable equilibrium.
+
+Far out every tension law is linear: a net that is stretched without limit has the potential ½ Σ (EA/L) |d|² of the
+vectors d of its lines, less terms that grow no faster than |d|, and the centrifugal one, −½ Σ m |Ω × r|². The least Ω
+at which their sum is not positive definite,
+
+    A y = Ω² C y,      A of unit tensions EA/L,   C of masses across the axis,
+
+is a sharp limit. Below it the whole potential has a least value, above it none. And as no law here has dσ/dε > E or
+T/l > EA/L, no tangent of the lines exceeds A: at and above the limit no equilibrium is stable, wherever it may be.
+
+Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. A part of the net that nothing holds across
+the axis is an exception in its translations alone, which A does not resist: such a part moves on in a straight line, as
+seen from outside, and turns steadily where its centre of mass is on the axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SolverError
+from ..net.net import AXIAL_STIFFNESS
+from ..system.factorization import Factor
+
+FRAME = "frame"
+"""Name of the effect that turns the net."""
+LOOSE = 1e-10
+"""Stiffness that holds each node of a loose part against its translation, over the largest EA/L."""
+
+
+def drifting(system):
+    """Number of translations of loose parts that centrifugal forces drive away from the axis."""
+    if not system.loose:
+        return 0
+    moves = np.zeros((len(system.free), len(system.loose)))
+    for k, places in enumerate(_loose(system)):
+        moves[places, k] = 1.0
+    values = np.linalg.eigvalsh(moves.T @ (system.pattern.matrix(_centrifugal(system)) @ moves))
+    return int(np.count_nonzero(values < -1e-12 * np.abs(values).max()))
+
+
+def _loose(system):
+    """Unknowns of each translation of a loose part."""
+    return [np.searchsorted(system.free, 3 * rows + axis) for rows, axis in system.loose]
+
+
+def _centrifugal(system):
+    """Values of −Ω²C in the pattern of the system."""
+    return system.stiffness(0.0, np.zeros((system.rows, 3)), only=FRAME)
+
+
+def check_speed(system, t):
+    """Refuse a frame that turns at the limit or above it, with that limit."""
+    net, factor = system.net, Factor(system.pattern)
+    taken, allowed = _centrifugal(system), drifting(system)
+    system.prepare(t)
+    unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
+    axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    held = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
+    for places in _loose(system):
+        held[system.pattern.diagonal[places]] += LOOSE * axial.max()
+
+    def stands(share):
+        factor.update(held + share * share * taken)
+        return factor.negative_pivots() <= allowed
+
+    if stands(1.0):
+        return
+    low, high = 0.0, 1.0
+    while high - low > 1e-13 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if stands(middle) else (low, middle)
+    (speed,) = {np.linalg.norm(family.data[0, :3]) for family in system.families if family.name == FRAME}
+    raise SolverError(
+        f"no equilibrium: [frame] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
+        "centrifugal forces outgrow any tension: lower angular_velocity or the masses, or raise modulus × area"
+    )

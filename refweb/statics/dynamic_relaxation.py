@@ -1,0 +1,119 @@
+"""Static equilibrium by dynamic relaxation: the explicit way, independent of any tangent.
+
+Central differences with fictitious masses, chosen so that a step of 1 is at `SAFETY` of the bound of stability in every
+row, and kinetic damping: whenever the kinetic energy passes a peak, all velocities are set to zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..kernels import FORCE, INDICES, MATRIX, kernel, typed_list
+from .newton import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
+
+SAFETY = 0.6
+"""Half a kick from rest takes the stiffest vibration 2 `SAFETY`² of the way to its middle. Where it goes beyond, a net
+may chatter between taut and slack, at rest again after every other step, and hardly move."""
+
+STALLED, TOUCHING = 2_000_000, 500_000
+"""Steps in which the residual has to fall by a tenth; the second with contact, where each costs ten times as much."""
+
+
+@kernel()
+def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
+    """``count`` steps of x, v and f."""
+    flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
+    before = 0.0
+    for _ in range(count):
+        kinetic = 0.0
+        for q in range(flat_x.size):
+            if flat_inverse[q] > 0.0:
+                flat_v[q] += flat_inverse[q] * flat_f[q]
+                kinetic += flat_v[q] * flat_v[q] / flat_inverse[q]
+        if kinetic < before:
+            for q in range(flat_x.size):  # a new start from rest: half a kick
+                flat_v[q] = 0.5 * flat_inverse[q] * flat_f[q]
+            kinetic = 0.0
+        before = kinetic
+        for q in range(flat_x.size):
+            flat_x[q] += flat_v[q]
+            flat_f[q] = 0.0
+        for i in range(len(kernels)):
+            kernels[i](t, x, v, f, cells[i], data[i], outs[i])
+
+
+def _inverse_mass(system, t):
+    """What forces are multiplied by [m/N], shape (rows, 3): 0 where nothing moves."""
+    rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
+    system.prepare(t)
+    for family in system.families:
+        if family.bound is not None:
+            family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
+    moving = ~system.supported & (rates > 0.0)[:, None]
+    return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
+
+
+def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANCE):
+    """Equilibria at load steps, one after another, each from the one before.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a net whose ``quasi_static`` is True.
+    load_steps : sequence of float
+        Values of t.
+    progress : callable, optional
+        Called with a line of text as it goes.
+    most : int
+        Largest number of steps for one load step.
+    tolerance : float
+        Residual to stop at.
+
+    Yields
+    ------
+    refweb.statics.newton.Equilibrium
+
+    Raises
+    ------
+    SolverError
+        Where there is no equilibrium, or none is found.
+    """
+    system = system.at_rest()
+    families, outs = system.families, system.outs()
+    cells, data = typed_list(INDICES, [f.cells for f in families]), typed_list(MATRIX, [f.data for f in families])
+    lists = (typed_list(FORCE, [f.force for f in families]), cells, data, typed_list(MATRIX, outs))
+    x, scale = np.zeros((system.rows, 3)), 0.0
+    stalled = TOUCHING if any(family.name == "contact" for family in families) else STALLED
+    for t in load_steps:
+        check_supported(system, t)
+        x = x.copy()
+        system.drive(t, x)
+        inverse = _inverse_mass(system, t)
+        v, done, error, best, since = np.zeros_like(x), 0, np.inf, np.inf, 0
+        while True:
+            f, out = system.forces(t, x)
+            tension = out[0][:, 0]
+            here = max(scale, force_scale(system, t, x, tension))
+            last, error = error, residual(system, f, here)
+            if error <= tolerance or (error <= LIMIT and done and error > 0.5 * last):
+                break
+            if error < 0.9 * best:
+                best, since = error, done
+            if done >= most or done - since >= stalled or not np.isfinite(error):
+                raise NotFound(
+                    f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
+                    f'{LIMIT:g}; use method = "newton"',
+                    {"nsteps": done},
+                )
+            relax(2000, t, x, v, f, inverse, *lists)
+            done += 2000
+            if progress is not None:
+                progress(f"step {t:g}, residual {error:.0e}")
+        scale = here
+        stats = dict(nsteps=done, nfev=done, njev=0, nlu=0, residual=float(error))
+        state = Equilibrium(t, x, tension.copy(), f, stats)
+        if system.convex:
+            from ..statics import duality_bound as certificate
+
+            state.certificate = certificate.certify(system, state)
+        yield state

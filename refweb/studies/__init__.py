@@ -1,0 +1,1 @@
+"""Runs about runs: errors of elements, horizons, modes and what digits cost."""

@@ -1,0 +1,83 @@
+"""The work-precision diagram: errors against CPU time, one curve per method, failures and what is not known with it."""
+
+from __future__ import annotations
+
+import math
+
+STYLES = {
+    "central-difference": ("#1b5e8c", "o"),
+    "explicit-4": ("#3c7a4c", "s"),
+    "explicit-6": ("#8a5a9e", "D"),
+    "cvode-bdf": ("#c8553d", "v"),
+    "cvode-adams": ("#b58900", "^"),
+    "ida": ("#7a4a2b", "<"),
+    "dop853": ("#555555", "P"),
+    "newton": ("#1b5e8c", "o"),
+    "relaxation": ("#c8553d", "v"),
+    "newton-smooth": ("#3c7a4c", "s"),
+}
+"""Colour and marker of each method."""
+
+
+def diagram(cost):
+    """Draw the two errors of a `refweb.studies.work_precision.Cost`, a `matplotlib.figure.Figure`."""
+    from matplotlib.figure import Figure
+
+    page = Figure(figsize=(5.6, 7.8), dpi=130, layout="constrained")  # legible on a phone as well
+    halves = page.subplots(2, 1, sharex=True)
+    unit = "" if cost.observable.unit == "1" else f" [{cost.observable.unit}]"
+    names = f"error of {cost.observable.name}{unit}", "error of displacement at the end [m]"
+    for plot, name, key, trust in zip(halves, names, ("error_observable", "error_state"), cost.trust, strict=True):
+        _curves(plot, cost, key, trust)
+        plot.set_ylabel(name)
+        plot.grid(color="#dddddd", linewidth=0.6)
+        plot.set_axisbelow(True)
+        plot.spines[["top", "right"]].set_visible(False)
+    for axis in (halves[0].yaxis, halves[1].yaxis, halves[1].xaxis):
+        _ticked(axis)
+    halves[1].set_xlabel("CPU time [s]")
+    told = halves[0].get_legend_handles_labels()
+    page.legend(*told, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
+    page.suptitle(cost.scene.title, fontsize=11)
+    return page
+
+
+def _curves(plot, cost, key, trust):
+    seen = [getattr(t, key) for t in cost.trials if getattr(t, key) > 0.0]
+    floor = max(trust, 1e-3 * min(seen, default=1.0))
+    for method, (colour, marker) in STYLES.items():
+        ladder = [t for t in cost.trials if t.method == method]
+        if not ladder:
+            continue
+        solved = [t for t in ladder if t.status == "solved"]
+        times, errors = [t.cpu_s for t in solved], [max(getattr(t, key), 0.3 * floor) for t in solved]
+        plot.plot(times, errors, marker=marker, markersize=4, color=colour, linewidth=1.1, label=_label(method, ladder))
+        failed = [t.cpu_s for t in ladder if t.status == "failed" and math.isfinite(t.cpu_s)]
+        top = {"transform": plot.get_xaxis_transform(), "markersize": 7, "markeredgewidth": 1.8}  # no error has a place
+        plot.plot(failed, [0.97] * len(failed), "x", color=colour, **top)
+    if seen:
+        plot.set(xscale="log", yscale="log")
+    if trust > 0.0:
+        plot.axhspan(1e-9 * floor, trust, color="#bbbbbb", alpha=0.45, linewidth=0, label="references apart: not known")
+        plot.set_ylim(bottom=0.2 * floor)
+
+
+def _ticked(axis):
+    """Widen a logarithmic axis until it shows two decades at least, the only ones with a number."""
+    from matplotlib.ticker import NullFormatter
+
+    if axis.get_scale() == "log":
+        low, high = (math.log10(limit) for limit in axis.get_view_interval())
+        if math.floor(high) - math.ceil(low) < 1:
+            axis.axes.set(**{f"{axis.axis_name}lim": (10.0 ** math.floor(low), 10.0 ** math.ceil(high))})
+        axis.set_minor_formatter(NullFormatter())
+
+
+def _label(method, ladder):
+    """Name of a method, with how many runs failed, were left out or refused."""
+    count = {status: sum(t.status == status for t in ladder) for status in ("failed", "refused", "budget")}
+    if count["refused"]:
+        return f"{method} (refused)"
+    told = [f"{count['failed']} failed, ×"] * bool(count["failed"])
+    told += [f"{count['budget']} left out"] * bool(count["budget"])
+    return f"{method} ({'; '.join(told)})" if told else method

@@ -1,0 +1,260 @@
+"""Natural frequencies and mode shapes of a scene: an equilibrium, and the small vibrations about it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..dynamics import initial_state as starts
+from ..errors import InputError, SolverError
+from ..net.net import SMOOTHING
+from ..net.tension_laws import LINEAR
+from ..results.folder import Folder, check_folder
+from ..results.observables import Result
+from ..results.provenance import versions, web_of
+from ..results.solution import SOLVER, Solution, as_history
+from ..results.state import State, floor_remark
+from ..scene import Scene, in_file
+from ..statics import newton as statics
+from ..tables import integer
+from .spectrum import STRAIN, spectrum
+
+MOST = 1000
+"""Largest number of modes."""
+COLUMNS = ["step [1]", "mode [1]", "frequency [Hz]", "error [Hz]", "omega_squared [1/s²]", "residual [1]"]
+COLUMNS += ["modal_mass [kg]", "share_x [1]", "share_y [1]", "share_z [1]", "moving [1]", "node [1]"]
+
+
+@dataclass(eq=False, repr=False)
+class Modes(Solution):
+    """Natural frequencies and shapes; `state` and what is read off it are the equilibrium at the last load step.
+
+    Attributes
+    ----------
+    spectra : list of refweb.studies.spectrum.Spectrum
+        Modes at each load step, the last with its shapes, the others without (None); of a dynamic scene one, at its
+        equilibrium at t = 0.
+    """
+
+    spectra: list = field(default_factory=list)
+
+    @property
+    def frequency(self):
+        """Natural frequencies at the last load step [Hz], shape (modes,); negative ones are imaginary: unstable."""
+        return self.spectra[-1].frequency
+
+    @property
+    def error(self):
+        """± of each frequency [Hz], shape (modes,): that of solving, not that of the elements."""
+        return self.spectra[-1].error
+
+    @property
+    def shapes(self):
+        """Displacement of each node in each mode at the last load step, the largest 1, shape (modes, nodes, 3)."""
+        return self.spectra[-1].shapes[:, : self.state.system.net.nodes]
+
+    def __repr__(self):
+        found = ", ".join(f"{f:.6g}" for f in self.frequency[:4]) if self.spectra else ""
+        return f'<Modes of "{self.scene.title}": {self.status}; {found} Hz>'
+
+    def summary(self):
+        """The content of ``run.json``, a dict of plain values; ``kind`` is "modes"."""
+        return {"kind": "modes", **super().summary()}
+
+    def save(self, folder, force=False):
+        """Write the result folder: ``modes.csv``, and as frame k the shape of mode k on the equilibrium.
+
+        Parameters
+        ----------
+        folder : path-like
+            Made where it does not exist.
+        force : bool
+            Replace the results of an earlier run.
+
+        Raises
+        ------
+        InputError
+            Where the folder is not empty or cannot be written.
+        """
+        check_folder(folder, force)
+        out = Folder(folder, self.scene, COLUMNS, {**self.summary(), "status": "running"}, table="modes.csv")
+        for row in zip(*self.history.values(), strict=True):
+            out.row(row)
+        for number, shape in enumerate(self.shapes if self.spectra else (), start=1):
+            out.frame(number, self.state, shape)
+        out.close()
+        out.summary(self.summary())
+
+
+def modes(scene, number=10, out=None, force=False, progress=None, announce=None):
+    """The lowest natural frequencies and mode shapes about an equilibrium, without damping.
+
+    Of a static scene the equilibrium is that of each load step; of a dynamic one that at t = 0 under gravity, loads,
+    motion and fixed bodies, while free bodies wait.
+
+    Parameters
+    ----------
+    scene : Scene, path-like or str
+        A scene, a scene file or the name of a scene shipped with refweb.
+    number : int
+        How many, at most 1000; fewer where the web has fewer.
+    out : path-like, optional
+        Result folder; without it nothing touches the disk.
+    force : bool
+        Replace the results of an earlier run in ``out``.
+    progress : callable, optional
+        Called with a line of text and the share that is done, 0 to 1.
+    announce : callable, optional
+        Called with the scene and its system when the input has been accepted.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    InputError
+        For wrong input; nothing has been written.
+    SolverError
+        Where there is no equilibrium, none is found, or nothing can vibrate. What was computed is kept in ``out``,
+        marked "failed".
+    """
+    scene = scene if isinstance(scene, Scene) else Scene.load(scene)
+    number = integer(at_least=1, at_most=MOST).metadata["read"]("number", number)
+    if out is not None:
+        check_folder(out, force)
+    started = time.process_time(), time.perf_counter()
+    system = scene.build()
+    with in_file(scene.file):
+        rest = _at_rest(system)
+    if announce is not None:
+        announce(scene, system)
+    found = Modes(scene, web=web_of(system), versions=versions(), columns=COLUMNS)
+    tell = progress or (lambda text, share: None)
+    try:
+        _follow(found, rest, number, tell)
+        found.status = "solved"
+    except KeyboardInterrupt:
+        found.status, found.message = "interrupted", f"interrupted after {len(found.spectra)} load steps"
+        raise
+    except SolverError as error:
+        found.status, found.message = "failed", str(error)
+        raise
+    except Exception as error:
+        found.status, found.message = "failed", f"{type(error).__name__}: {error}"
+        raise
+    finally:
+        found.table = as_history(COLUMNS, [row for here in found.spectra for row in _rows(here)])
+        spent = time.process_time() - started[0], time.perf_counter() - started[1]
+        found.cost = {"cpu_s": spent[0], "wall_s": spent[1], "by_effect": {}}
+        found.warnings += _notices(system)
+        if out is not None:
+            found.save(out, force)
+    return found
+
+
+def _at_rest(system):
+    """The system that vibrates; refuses what has no modes."""
+    rest = system.at_rest()
+    if rest.constraints:
+        raise InputError("[[link]]: modes take no lengths that are held exactly: make it a stiff line")
+    for family in rest.families:
+        if family.stiffness is not None and not family.symmetric:
+            raise InputError(f"{family.name} has no potential, so there are no natural modes: leave it out")
+    if not len(rest.free):
+        raise InputError("no node is free, so there are no modes: support fewer of them")
+    return rest
+
+
+def _equilibria(scene, rest, tell):
+    if scene.solve.kind == "dynamic":
+        yield starts.equilibrium(rest, tell)
+    elif scene.solve.method == "relaxation":
+        from ..statics import dynamic_relaxation as relaxation
+
+        yield from relaxation.solve(rest, scene.solve.load_steps, tell)
+    else:
+        yield from statics.solve(rest, scene.solve.load_steps, tell)
+
+
+def _follow(found, rest, number, tell):
+    """Equilibrium and modes of one load step after the other."""
+    scene, remarks, totals = found.scene, {}, dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    steps = scene.solve.load_steps if scene.solve.kind == "static" else (0.0,)
+    method = scene.solve.method if scene.solve.kind == "static" else "newton"
+    for equilibrium in _equilibria(scene, rest, lambda text: tell(text, len(found.spectra) / len(steps))):
+        tell(f"step {equilibrium.step:g}, modes", len(found.spectra) / len(steps))
+        here = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
+        found.state = State(rest, equilibrium.step, equilibrium.x)
+        if found.spectra:
+            found.spectra[-1] = replace(found.spectra[-1], shapes=None)
+        found.spectra.append(here)
+        stats = {key: equilibrium.stats.get(key) for key in SOLVER} | {
+            "method": method,
+            "duality_gap": equilibrium.certificate.gap if equilibrium.certificate else None,
+            "smallest_pivot": -1 if here.unstable else 0 if here.zero else 1,
+            "slack_nodes": len(found.state.slack_nodes),
+        }
+        totals = {key: totals[key] + stats[key] for key in totals}
+        found.solver = {**stats, **totals}
+        found.steps.append({"step": here.step, "results": _results(here), "solver": stats, **_described(here)})
+        for kind, text in _remarks(here, found.state):
+            remarks.setdefault(kind, []).append((here.step, text))
+        found.warnings = [_at(made, len(found.spectra)) for made in remarks.values()]
+
+
+def _results(here):
+    """Frequencies of a spectrum by name; a result stands where the displacement of its shape is largest."""
+    values = zip(here.frequency.tolist(), here.error.tolist(), here.nodes.tolist(), strict=True)
+    return {f"frequency_{k}": Result(f, error, "Hz", here.step, node) for k, (f, error, node) in enumerate(values, 1)}
+
+
+def _described(here):
+    """What ``run.json`` says of a spectrum besides its frequencies."""
+    names = ("squared", "bound", "residual", "modal_mass", "shares", "moving")
+    return {"unstable": here.unstable, "zero": here.zero, **{name: getattr(here, name).tolist() for name in names}}
+
+
+def _rows(here):
+    """A spectrum as rows of ``modes.csv``."""
+    count = np.arange(1, len(here.squared) + 1)
+    columns = [np.full(len(count), here.step), count, here.frequency, here.error, here.squared, here.residual]
+    return np.column_stack([*columns, here.modal_mass, here.shares, here.moving, here.nodes]).tolist()
+
+
+def _at(made, count):
+    """The last of some remarks of a kind, (load step, text), with its load steps unless it was made at all of them."""
+    steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
+    return made[-1][1] + (f" (load step {steps})" if len(made) < count else "")
+
+
+def _remarks(here, state):
+    """What a reader of the modes of an equilibrium has to know: pairs of a kind and a text."""
+    net = state.system.net
+    if here.unstable:
+        yield (
+            "unstable",
+            f"{here.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium is a "
+            "saddle and the web leaves it by itself",
+        )
+    if here.zero:
+        yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
+    if count := len(state.slack_nodes):
+        yield "slack", f"{count} nodes hang on slack lines only, their positions are not unique"
+    kinked = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
+    if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
+        yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
+    for text in floor_remark(net, float(state.stress.max())):
+        yield "floor", text
+
+
+def _notices(system):
+    """What the modes leave out."""
+    if system.turns:
+        yield "Coriolis forces are left out: ± holds how far they may move the frequency of a mode that they act on"
+    if any(family.damping is not None and family.name != "frame" for family in system.families):
+        yield "forces that depend on velocity, such as damping, are left out"
+    if free := [body.name for body in system.net.bodies if not body.fixed]:
+        yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

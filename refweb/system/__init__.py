@@ -1,0 +1,1 @@
+"""M v' = f assembled: force, tangent, mass, links and factorizations; it knows no scene, method or file."""

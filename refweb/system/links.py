@@ -1,0 +1,179 @@
+"""Rigid links of a system: their equations, and the forces that keep their lengths.
+
+With M a + Gᵀλ = f and G = ∂g/∂x, accelerations keep the lengths where G a = −|v₂ − v₁|²/L; so do the nearest
+velocities where G v = 0, and the nearest positions where G δx = −g, as mass weighs distance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.base import Constraint
+from ..errors import InputError, SolverError
+from .factorization import weak_pivot
+
+WEAK = 1e-12
+"""Share of its largest entry that each pivot of G M⁻¹ Gᵀ has to exceed."""
+STRETCH = 1e-6
+"""Largest relative error of a length in a state to start from."""
+FINE = 1e-13
+"""Relative error of lengths that is left."""
+
+
+class Links:
+    """All links of a system, in what has mass and is free.
+
+    Attributes
+    ----------
+    pairs : refweb.effects.base.Constraint
+        The links, one after another.
+
+    Raises
+    ------
+    InputError
+        For a link that holds nothing, more than there is to hold, or a node that has no mass or is moved.
+    """
+
+    def __init__(self, system):
+        given = system.constraints
+        cells, data = (np.vstack([getattr(one, name) for one in given]) for name in ("cells", "data"))
+        self.pairs = Constraint(cells=cells, data=data)
+        table = np.repeat(np.arange(len(given)), [len(one.cells) for one in given]) + 1
+        self._names = [f"[[link]] {i} of nodes {a} and {b}" for i, (a, b) in zip(table, cells, strict=True)]
+        self._refuse(system)
+        heavy = np.repeat(system.net.mass, 3)[system.free] > 0.0
+        self._M = system.pattern.matrix(system.mass())[heavy][:, heavy].tocsc()
+        self._at = system.free[heavy]
+        number = np.full(3 * system.rows, -1)
+        number[self._at] = np.arange(len(self._at))
+        unknown = number[3 * cells[:, :, None] + np.arange(3)]  # of (link, end, axis)
+        moving = unknown >= 0
+        self._link, end, self._axis = np.nonzero(moving)
+        self._unknown, self._sign = unknown[moving], 2.0 * end - 1.0
+        other = np.full(unknown.shape, -1)
+        other[moving] = np.arange(len(self._link))
+        self._other = other[:, ::-1][moving]
+        self._both = np.flatnonzero(self._other >= 0)
+        self._refuse_redundant(np.zeros((system.rows, 3)))
+        self._arrange()
+
+    def __len__(self):
+        return len(self._names)
+
+    def _refuse(self, system):
+        free = ~system.supported
+        driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)])
+        for name, pair in zip(self._names, self.pairs.cells, strict=True):
+            for node in pair[np.isin(pair, driven)]:
+                raise InputError(
+                    f"{name}: node {node} moves by [[motion]], whose jumps of velocity no rigid link can follow: link "
+                    "to a free node, tied to it by a line"
+                )
+            if not free[pair].any():
+                raise InputError(f"{name}: both are supported, so that it holds nothing: leave it out")
+            for node in pair[(system.net.mass[pair] <= 0.0) & free[pair].any(axis=1)]:
+                raise InputError(f"{name}: node {node} has no mass: give density > 0 or a [[point_mass]]")
+
+    def _refuse_redundant(self, x):
+        from qdldl import Solver
+        from scipy.sparse import csc_matrix, csr_array, eye_array, triu
+
+        G = csr_array((self._entries(x), (self._link, self._unknown)), shape=(len(self), len(self._at)))
+        coupling = G @ (G / self._M.diagonal()).T
+        coupling = coupling - WEAK * abs(coupling).max() * eye_array(len(self))
+        if (weak := weak_pivot(Solver(csc_matrix(triu(coupling)), upper=True))) is not None:
+            raise InputError(
+                f"{self._names[weak]}: the other links and the supports hold that distance already, so that its force "
+                "is not determined: leave it out"
+            )
+
+    def refuse_stretched(self, x):
+        """Refuse a start that is not made of these links."""
+        off = self.pairs.excess(x) / self.pairs.length
+        worst = int(np.abs(off).argmax())
+        if not abs(off[worst]) < STRETCH:
+            raise InputError(f"{self._names[worst]}: the start has it stretched by {off[worst]:.3g} of its length")
+
+    def _arrange(self):
+        """The fixed pattern of [[M, Gᵀ], [G, 0]]."""
+        from scipy.sparse import csc_array
+
+        n, M = len(self._at), self._M.tocoo()
+        size = n + len(self)
+        rows = np.concatenate([M.row, self._unknown, n + self._link])
+        columns = np.concatenate([M.col, n + self._link, self._unknown])
+        keys, self._place = np.unique(columns.astype(np.int64) * size + rows, return_inverse=True)
+        indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
+        self._matrix = csc_array((np.zeros(len(keys)), (keys % size).astype(np.int32), indptr), shape=(size, size))
+        self._lu = None
+
+    def _entries(self, x):
+        """∂g/∂x of the ends that move."""
+        return self._sign * self.pairs.direction(x)[self._link, self._axis]
+
+    def places(self, position, velocity, first):
+        """Rows and columns of what links add to the Jacobian of `refweb.dynamics.integrators.ida`.
+
+        Parameters
+        ----------
+        position, velocity : ndarray of int
+            Number of x' − v, and of M v' − f, of all that has mass and is free; x and v have the same.
+        first : int
+            Number of g and λ of the first link; those of G v and μ follow.
+        """
+        x, v, force = position[self._unknown], velocity[self._unknown], first + self._link
+        rate, both = force + len(self), self._both
+        own, across = (v, x), (v[both], x[self._other[both]])
+        return [(v, force), own, across, (x, rate), (force, x), (rate, v), (rate, x)]
+
+    def values(self, x, v, multipliers):
+        """Values at those places."""
+        G, length = self._entries(x), self.pairs.length[self._link]
+        turn = multipliers[self._link] / length
+        rate = self._sign * self.pairs.between(v)[self._link, self._axis] / length
+        return [G, turn, -turn[self._both], G, G, G, rate]
+
+    def solve(self, x, f, b):
+        """a and λ of M a + Gᵀλ = f, G a = b, by the last factorization where refinement makes up for its age."""
+        G = self._entries(x)
+        self._matrix.data[:] = np.bincount(self._place, np.concatenate([self._M.data, G, G]))
+        rest = wanted = np.concatenate([f, b])
+        found = np.zeros_like(wanted)
+        for i in range(5):
+            if self._lu is None or i == 4:
+                self._lu, rest, found = self._factorized(), wanted, np.zeros_like(wanted)
+            found = found + self._lu.solve(rest)
+            rest = wanted - self._matrix @ found
+            if np.abs(rest).max() <= 1e-10 * np.abs(wanted).max():
+                break
+        return found[: len(f)], found[len(f) :]
+
+    def _factorized(self):
+        from scipy.sparse.linalg import splu
+
+        try:
+            return splu(self._matrix)
+        except RuntimeError:
+            raise SolverError("links have come to stand so that their forces are not determined") from None
+
+    def start(self, x, v, force):
+        """Accelerations of what has mass [m/s²], and λ [N], for the forces of all else [N]."""
+        return self.solve(x, force.ravel()[self._at], -self.pairs.turning(v))
+
+    def force(self, x, v, force):
+        """Force of the links on every row [N], shape (rows, 3), for the forces of all else [N]."""
+        return -self.pairs.pull(x, self.start(x, v, force)[1])
+
+    def drift(self, x, v):
+        """Largest relative error of a length, and largest rate of one [m/s]."""
+        return np.abs(self.pairs.excess(x) / self.pairs.length).max(), np.abs(self.pairs.speed(x, v)).max()
+
+    def hold(self, x, v):
+        """Move x and v to the nearest state that keeps the lengths."""
+        still, moving = np.zeros(len(self._at)), x.ravel()
+        for _ in range(4):
+            excess = self.pairs.excess(x)
+            if np.abs(excess).max() <= FINE * self.pairs.length.min():
+                break
+            moving[self._at] += self.solve(x, still, -excess)[0]
+        v.ravel()[self._at] += self.solve(x, still, -self.pairs.speed(x, v))[0]

@@ -1,0 +1,345 @@
+"""How a table of a scene becomes a checked value.
+
+A table is a frozen dataclass whose fields say what they accept: ``area: float = real(above=0, unit="m²")``. The same
+class is the Python value, the TOML table and, for effects, the effect itself. Every refusal is an `InputError` of one
+line that names the value, the limit and, for a misspelt name, the nearest valid one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import numbers
+from dataclasses import MISSING
+
+from .errors import InputError, one_line
+
+LARGEST = 1e100
+"""Largest value of a number with a unit: products of three stay finite."""
+SMALLEST = 1e-100
+"""Smallest value of a number that must not be negative, unless it is 0."""
+_WHOLE = 2**63 - 1
+
+
+def nearest(name, known):
+    """The part of a message that helps with an unknown name: the nearest valid one, else all of them."""
+    known = [str(k) for k in known]
+    close = _close(name, known)
+    if close:
+        return f'did you mean "{close}"?'
+    listed = ", ".join(known)
+    return "known: " + (listed if len(listed) <= 150 else listed[:150].rpartition(", ")[0] + ", ...")
+
+
+def _close(name, known):
+    """The valid name nearest to one, None if none is near."""
+    plain = {k.casefold(): k for k in reversed(known)}
+    found = difflib.get_close_matches(str(name).casefold(), plain, n=1, cutoff=0.5)
+    return plain[found[0]] if found else None
+
+
+def short(text):
+    """A text as a message shows it: at most 60 characters on one line."""
+    text = one_line(text[:1000])
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def shown(value):
+    """A value as a message shows it: short, on one line, texts in quotes."""
+    if isinstance(value, str):
+        return f'"{short(value)}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    try:
+        return short(str(list(value) if isinstance(value, tuple) else value))
+    except (ValueError, RecursionError):  # a number of thousands of digits, lists in lists in lists
+        return f"a {type(value).__name__} too large to show"
+
+
+def _refuse(name, value, limit):
+    raise InputError(f"{name} = {shown(value)} must be {limit}")
+
+
+def _number(name, value, unit=""):
+    unit = f" [{unit}]" if unit else ""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        _refuse(name, value, f"a number{unit}")
+    if not abs(value) < math.inf:
+        _refuse(name, value, f"a finite number{unit}")
+    try:
+        value = float(value)
+    except OverflowError:
+        _refuse(name, value, f"a finite number{unit}")
+    if abs(value) > LARGEST:
+        _refuse(name, value, f"≤ {LARGEST:g}{' in size' if value < 0 else ''}{unit}")
+    return value
+
+
+def _whole(name, value, what="a whole number"):
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        _refuse(name, value, what)
+    if abs(value) > _WHOLE:
+        _refuse(name, value, f"{what} below 2⁶³")
+    return int(value)
+
+
+def _bounded(name, value, unit, above, at_least, below, at_most):
+    for bound, bad, sign in (
+        (above, above is not None and not value > above, ">"),
+        (at_least, at_least is not None and not value >= at_least, "≥"),
+        (below, below is not None and not value < below, "<"),
+        (at_most, at_most is not None and not value <= at_most, "≤"),
+    ):
+        if bad:
+            _refuse(name, value, f"{sign} {bound:g}" + (f" [{unit}]" if unit else ""))
+    if 0.0 in (above, at_least) and 0 < value < SMALLEST:
+        least = f"≥ {SMALLEST:g}" if above == 0.0 else f"0 or ≥ {SMALLEST:g}"
+        _refuse(name, value, least + (f" [{unit}]" if unit else ""))
+    return value
+
+
+def _list(name, value, what):
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if not isinstance(value, (list, tuple)):
+        _refuse(name, value, what)
+    return value
+
+
+def field(read, default=MISSING, unit="", factory=MISSING):
+    """A dataclass field whose values pass through ``read(name, value)``; None passes where it is the default."""
+    given = {"default_factory": factory} if factory is not MISSING else {"default": default}
+    return dataclasses.field(metadata={"read": read, "unit": unit}, **given)
+
+
+def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit=""):
+    """A finite real number within bounds."""
+
+    def read(name, value):
+        return _bounded(name, _number(name, value, unit), unit, above, at_least, below, at_most)
+
+    return field(read, default, unit)
+
+
+def integer(default=MISSING, *, at_least=None, at_most=None):
+    """A whole number within bounds."""
+
+    def read(name, value):
+        return _bounded(name, _whole(name, value), "", None, at_least, None, at_most)
+
+    return field(read, default)
+
+
+def choice(*names, default=MISSING):
+    """One of a few names (or numbers)."""
+
+    def read(name, value):
+        for known in names:
+            if type(value) is type(known) and value == known:
+                return known
+        close = _close(value, [n for n in names if isinstance(n, str)]) if isinstance(value, str) else None
+        hint = f' — did you mean "{close}"?' if close else ""
+        _refuse(name, value, ("one of " if len(names) > 1 else "") + ", ".join(map(shown, names)) + hint)
+
+    return field(read, default)
+
+
+def boolean(default=MISSING):
+    """True or false."""
+
+    def read(name, value):
+        if not isinstance(value, bool):
+            _refuse(name, value, "true or false")
+        return value
+
+    return field(read, default)
+
+
+def text(default=MISSING, *, most=4096):
+    """A string that is not empty, stands on one line and has at most ``most`` characters."""
+
+    def read(name, value):
+        if not isinstance(value, str) or not value.strip() or not value.isprintable():
+            _refuse(name, value, "a printable text on one line")
+        if len(value) > most:
+            _refuse(name, value, f"a text of at most {most} characters, not {len(value)}")
+        return value
+
+    return field(read, default)
+
+
+def vector(default=MISSING, unit=""):
+    """Three finite numbers."""
+
+    def read(name, value):
+        value = _list(name, value, "a vector [x, y, z]" + (f" [{unit}]" if unit else ""))
+        if len(value) != 3:
+            _refuse(name, value, f"a vector of 3 numbers, not {len(value)}" + (f" [{unit}]" if unit else ""))
+        return tuple(_number(f"{name}[{i}]", x, unit) for i, x in enumerate(value))
+
+    return field(read, default, unit)
+
+
+def rows(width, default=MISSING, *, unit="", increasing=False, number=_number):
+    """A list of rows of ``width`` numbers; ``increasing`` asks that of the first column (a table over time)."""
+
+    def read(name, value):
+        value = _list(name, value, f"a list of rows of {width} numbers")
+        if not value:
+            _refuse(name, value, f"at least one row of {width} numbers")
+        result = []
+        for i, row in enumerate(value):
+            row = _list(f"{name}[{i}]", row, f"a row of {width} numbers")
+            if len(row) != width:
+                _refuse(f"{name}[{i}]", row, f"a row of {width} numbers, not {len(row)}")
+            result.append(tuple(number(f"{name}[{i}][{j}]", x) for j, x in enumerate(row)))
+        if increasing:
+            for i in range(1, len(result)):
+                if not result[i][0] > result[i - 1][0]:
+                    _refuse(f"{name}[{i}][0]", result[i][0], f"> {result[i - 1][0]:g}: the first column increases")
+        return tuple(result)
+
+    return field(read, default, unit)
+
+
+def node_number(name, value):
+    """Read one whole number ≥ 0."""
+    return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
+
+
+def numbers_list(default=MISSING, *, number=_number, empty=False):
+    """A list of numbers; ``number=node_number`` for whole numbers ≥ 0."""
+
+    def read(name, value):
+        value = _list(name, value, "a list of numbers")
+        if not value and not empty:
+            _refuse(name, value, "a list with at least one number")
+        return tuple(number(f"{name}[{i}]", x) for i, x in enumerate(value))
+
+    return field(read, default)
+
+
+def texts(default=MISSING):
+    """A list of strings."""
+
+    def read(name, value):
+        value = _list(name, value, "a list of texts")
+        for i, x in enumerate(value):
+            if not isinstance(x, str):
+                _refuse(f"{name}[{i}]", x, "a text")
+        return tuple(value)
+
+    return field(read, default)
+
+
+def nodes(default=MISSING, *, empty=False, what="node"):
+    """A number of a node (or a line), a name, or a list of them; `refweb.net.web.Web.find` turns it into numbers."""
+
+    def read(name, value):
+        if hasattr(value, "tolist"):
+            value = value.tolist()
+        if isinstance(value, (list, tuple)):
+            if not value and not empty:
+                _refuse(name, value, f"at least one {what}")
+            return tuple(one(f"{name}[{i}]", x) for i, x in enumerate(value))
+        return one(name, value)
+
+    def one(name, value):
+        if isinstance(value, str):
+            return value
+        return _bounded(name, _whole(name, value, f"a {what} number or a name"), "", None, 0, None, None)
+
+    return field(read, default)
+
+
+def component(default=MISSING):
+    """An axis: 0, 1, 2 or "x", "y", "z"; read as 0, 1 or 2."""
+
+    def read(name, value):
+        if isinstance(value, str) and value in ("x", "y", "z"):
+            return "xyz".index(value)
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not 0 <= value <= 2:
+            _refuse(name, value, 'one of 0, 1, 2, "x", "y", "z"')
+        return int(value)
+
+    return field(read, default)
+
+
+def components(default=MISSING):
+    """A list of axes; read as a sorted tuple of 0, 1, 2."""
+    read_one = component().metadata["read"]
+
+    def read(name, value):
+        value = _list(name, value, 'a list of "x", "y", "z"')
+        if not value:
+            _refuse(name, value, 'a list with at least one of "x", "y", "z"')
+        return tuple(sorted({read_one(f"{name}[{i}]", x) for i, x in enumerate(value)}))
+
+    return field(read, default)
+
+
+class Table:
+    """Base of all tables: checks its fields when made, and reads itself from a dict.
+
+    Subclasses are ``@dataclass(frozen=True, kw_only=True)`` with fields made by the functions above. ``check`` may
+    refuse combinations of values.
+    """
+
+    def __post_init__(self):
+        for f in dataclasses.fields(self):
+            value = getattr(self, f.name)
+            if value is None and f.default is None:
+                continue
+            object.__setattr__(self, f.name, f.metadata["read"](f.name, value))
+        self.check()
+
+    def check(self):
+        """Refuse impossible combinations of values; the default refuses none."""
+
+    @classmethod
+    def read(cls, where, given):
+        """The table from a dict; ``where`` (such as ``[gravity]``) begins every message."""
+        if not isinstance(given, dict):
+            raise InputError(f"{where} = {shown(given)} must be a table")
+        known = [f.name for f in dataclasses.fields(cls)]
+        for key in given:
+            if key not in known:
+                raise InputError(f"{where} {short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")
+        for f in dataclasses.fields(cls):
+            if f.default is MISSING and f.default_factory is MISSING and f.name not in given:
+                unit = f" [{f.metadata['unit']}]" if f.metadata["unit"] else ""
+                raise InputError(f"{where} {f.name} is missing: give {f.name} = ...{unit}")
+        try:
+            return cls(**given)
+        except InputError as error:
+            raise InputError(f"{where} {error}") from None
+
+    def to_dict(self):
+        """The table as plain TOML values, defaults filled in, absent values left out."""
+
+        def plain(value):
+            if isinstance(value, Table):
+                return value.to_dict()
+            if isinstance(value, (tuple, list)):
+                return [plain(x) for x in value]
+            if isinstance(value, dict):
+                return {k: plain(x) for k, x in value.items()}
+            return value
+
+        pairs = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
+        return {name: plain(value) for name, value in pairs if value is not None}
+
+
+def by_group(kind, where):
+    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
+
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")
+        return {
+            key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
+            for key, group in value.items()
+        }
+
+    return field(read, factory=dict)
