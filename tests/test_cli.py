@@ -11,7 +11,7 @@ import pytest
 import refweb
 from refweb import scene
 from refweb.__main__ import main
-from refweb.statics.newton import newton as statics
+from refweb.statics import newton as statics
 
 SCENE = """
 title = "Small web"

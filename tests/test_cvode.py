@@ -18,12 +18,12 @@ from scipy.sparse.linalg import splu
 
 import refweb
 from refweb.__main__ import main
+from refweb.dynamics import simulation as dynamics
 from refweb.dynamics.integrators import cvode
 from refweb.dynamics.integrators import step_observer as implicit
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
-from refweb.dynamics.simulation import simulation as dynamics
 from refweb.effects.elasticity import Elasticity
 from refweb.net import net as lines
 from refweb.results.state import State

@@ -16,10 +16,10 @@ from scipy.integrate import DOP853
 
 import refweb
 from refweb.__main__ import main
+from refweb.dynamics import simulation as dynamics
 from refweb.dynamics.integrators import central_difference
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.simulation import SPREAD
-from refweb.dynamics.simulation import simulation as dynamics
 from refweb.results.state import State
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0

@@ -14,8 +14,8 @@ from refweb.effects.elasticity import Elasticity
 from refweb.net import elements
 from refweb.net import net as lines
 from refweb.net.web import Web
-from refweb.statics.newton import dynamic_relaxation as relaxation
-from refweb.statics.newton import newton as statics
+from refweb.statics import dynamic_relaxation as relaxation
+from refweb.statics import newton as statics
 from refweb.system.factorization import Factor
 from refweb.system.system import System
 

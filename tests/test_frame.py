@@ -16,8 +16,8 @@ from refweb.effects.elasticity import Elasticity
 from refweb.net import net as lines
 from refweb.net.web import Web
 from refweb.scene import SHIPPED
-from refweb.statics.newton import dynamic_relaxation as relaxation
-from refweb.statics.newton import newton as statics
+from refweb.statics import dynamic_relaxation as relaxation
+from refweb.statics import newton as statics
 from refweb.system.system import System
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0

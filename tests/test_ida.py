@@ -16,7 +16,7 @@ from refweb.effects.link import Link
 from refweb.errors import InputError, SolverError
 from refweb.net import net as lines
 from refweb.results import probes
-from refweb.statics.newton import newton as statics
+from refweb.statics import newton as statics
 from refweb.system.system import System
 
 SOLVERS = ["block", "sparse", "dense"]

@@ -24,7 +24,7 @@ from refweb.net import net as lines
 from refweb.net.cable import Cable
 from refweb.net.web import Web
 from refweb.results.state import State
-from refweb.statics.newton import newton as statics
+from refweb.statics import newton as statics
 from refweb.system.system import System
 
 MODULUS, AREA, GRAVITY = 7e7, 1e-4, 9.81

@@ -10,9 +10,9 @@ from PIL import Image
 
 import refweb
 from refweb.errors import InputError
+from refweb.pictures import pictures
+from refweb.pictures import render as drawing
 from refweb.pictures.camera import View
-from refweb.pictures.pictures import pictures
-from refweb.pictures.pictures import render as drawing
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 FACES = np.array([[i, j, k] for i in (0, 1) for j in (2, 3) for k in (4, 5)])

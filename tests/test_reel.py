@@ -17,8 +17,8 @@ from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.errors import InputError
 from refweb.results.state import State
-from refweb.statics.newton import dynamic_relaxation as relaxation
-from refweb.statics.newton import newton as statics
+from refweb.statics import dynamic_relaxation as relaxation
+from refweb.statics import newton as statics
 
 AXIAL, GRAVITY, LENGTH, SPEED = 1e3, 9.81, 1.0, 0.2
 """EA of a massless line [N], g [m/s²], the line's natural length [m] and how fast it is reeled in [m/s]."""

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import refweb
-from refweb.statics.newton import dynamic_relaxation as relaxation
-from refweb.statics.newton import newton as statics
+from refweb.statics import dynamic_relaxation as relaxation
+from refweb.statics import newton as statics
 
 MODULUS, AREA = 7e7, 1e-4
 LOAD = refweb.Load(node="centre", force=(0.0, 0.0, 1.0))

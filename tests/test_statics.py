@@ -24,8 +24,8 @@ from refweb.net.lattices import Paper, Window
 from refweb.net.single_cable import SingleCable
 from refweb.net.web import Web
 from refweb.results.state import State
-from refweb.statics.newton import duality_bound as certificate
-from refweb.statics.newton import newton as statics
+from refweb.statics import duality_bound as certificate
+from refweb.statics import newton as statics
 
 RESIDUAL = 1e-9
 GAP = 1e-10

@@ -20,7 +20,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import qdldl  # noqa: E402
 
 from refweb.scene import Scene  # noqa: E402
-from refweb.statics.newton import newton as statics  # noqa: E402
+from refweb.statics import newton as statics  # noqa: E402
 from refweb.system.system import System  # noqa: E402
 
 LIMIT = 1.6

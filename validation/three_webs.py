@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from refweb.net.rigid_body import surface
+from refweb.pictures import render as drawing
 from refweb.pictures.camera import View
-from refweb.pictures.pictures import render as drawing
 
 from . import plots
 
