@@ -134,7 +134,7 @@ def test_frequency_by_implicit_steps(method):
     small, end = 1e-6, 2.3 * np.pi / omega
     solver = method(system, rtol=1e-7, atol_position=1e-7 * small / omega, atol_velocity=1e-7 * small)
     run = solver.start(v=small * shape)
-    solver.rows(run, [end])
+    solver.advance(run, [end])
     # BDF of order 2 leaves a few hundred times its tolerance after a period.
     np.testing.assert_allclose(run.x, small / omega * np.sin(omega * end) * shape, atol=3e-4 * small / omega)
     assert run.drift < 1e-4
@@ -148,7 +148,7 @@ def test_frequency():
     for safety in safeties:
         solver = CentralDifference(system, safety=safety)
         run = solver.start(v=small * shape)
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         errors.append(np.abs(run.x - small / omega * np.sin(omega * end) * shape).max())
         drifts.append(run.drift)
     assert abs(slope(errors, safeties) - 2.0) < 0.05 and abs(slope(drifts, safeties) - 2.0) < 0.05
@@ -157,7 +157,7 @@ def test_frequency():
         system, _, shape = beam(count)
         solver = CentralDifference(system, safety=0.2)
         run = solver.start(v=small * shape)
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         errors.append(np.abs(run.x - small / np.pi**2 * np.sin(np.pi**2 * end) * shape).max())
     assert abs(slope(errors, 1.0 / counts) - 2.0) < 0.05
 
@@ -310,7 +310,7 @@ def test_free_beam_keeps_momentum_and_energy():
     for safety in safeties:
         solver = CentralDifference(system, safety=safety)
         run = solver.start(x, v)
-        solver.rows(run, np.linspace(0.0, 0.5, 11)[1:])
+        solver.advance(run, np.linspace(0.0, 0.5, 11)[1:])
         before, after = (np.cross(web.points + u, mass * w).sum(axis=0) for u, w in ((x, v), (run.x, run.v)))
         np.testing.assert_allclose(after, before, atol=1e-12)
         drifts.append(run.drift)

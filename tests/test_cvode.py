@@ -85,7 +85,7 @@ def ran(system, ends, v=None, **options):
     """(solver, run, rows) of CVODE."""
     solver = Cvode(system, **options)
     run = solver.start(v=v)
-    return solver, run, solver.rows(run, ends)
+    return solver, run, solver.advance(run, ends)
 
 
 def errors(system, tolerances, **options):
@@ -168,7 +168,7 @@ class Noted(Cvode):
 def between(system, family):
     """What each step leaves of x₁ − x₀ = ½h (v₀ + v₁) and of v₁ − v₀ = ½h (a₀ + a₁), over the tolerance."""
     solver = Noted(system, rtol=1e-6, family=family, max_order=2, linear_solver="dense")
-    solver.rows(solver.start(v=thrown(system)), [END])
+    solver.advance(solver.start(v=thrown(system)), [END])
     mass, left = np.repeat(system.net.mass, 3)[system.free], []
     for (t, x, v), (s, y, w) in zip(solver.steps[:-1], solver.steps[1:], strict=True):
         slopes = [system.force(0.0, rows_of(system, z)).ravel()[system.free] / mass for z in (x, y)]
@@ -197,7 +197,7 @@ def test_trapezoidal_rule_on_an_oscillator():
     rate = np.sqrt(MODULUS * AREA / net.mass[1])
     solver = Noted(system, rtol=1e-6, family="adams", max_order=2, linear_solver="dense")
     run = solver.start(v=np.array([[0.0, 0, 0], [1.0, 0, 0]]))
-    solver.rows(run, [20.0 / rate])
+    solver.advance(run, [20.0 / rate])
     times, x, v = (np.array([step[k] for step in solver.steps[10:]]).reshape(-1) for k in range(3))
     turned = np.exp(-2j * np.arctan(0.5 * rate * np.diff(times)).cumsum())
     found = rate * x + 1j * v
@@ -434,7 +434,7 @@ def test_consistent_mass_passes_a_motion_on():
         for rtol in (1e-5, 1e-7, 1e-9):
             solver = Cvode(system, rtol=rtol, family="adams") if method == "cvode" else Ida(system, rtol=rtol)
             run = solver.start()
-            solver.rows(run, np.linspace(0.0, 0.003, 11))
+            solver.advance(run, np.linspace(0.0, 0.003, 11))
             found.append([abs(run.v[1, 0] - speed), abs(run.book[-1] - work)])
         assert (np.diff(found, axis=0) < 0.0).all()
         assert (found[-1] < np.array([1e-5 * abs(speed), 1e-5 * energy])).all(), (method, found, speed, work)
@@ -536,7 +536,7 @@ def test_a_short_pulse_is_felt(family, width):
     pulse = refweb.Load(node=1, force=force, factor=[*quiet, (at, 1.0), (at + 0.5 * width, 0.0)])
     solver = Noted(drifting([pulse]), rtol=1e-8, family=family)
     run = solver.start()
-    solver.rows(run, [end])
+    solver.advance(run, [end])
     steps = np.diff([t for t, _, _ in solver.steps])
     assert steps.max() > 30.0 * width
     expected = 0.5 * force * width / 2.0
@@ -577,17 +577,17 @@ def test_rows_change_nothing():
     times = np.linspace(0.0, 0.02, 21)
     solver = motion.solver(1e-6)
     run = solver.start()
-    rows = solver.rows(run, times)
+    rows = solver.advance(run, times)
     for sizes in ([1] * 21, [1, 2, 7, 11]):
         other = motion.solver(1e-6)
         again = other.start()
-        parts = [other.rows(again, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
+        parts = [other.advance(again, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
         np.testing.assert_array_equal(np.vstack(parts), rows)
         assert (again.nsteps, again.drift) == (run.nsteps, run.drift)
         np.testing.assert_array_equal(again.peaks, run.peaks)
     coarse = motion.solver(1e-6)
     end = coarse.start()
-    coarse.rows(end, [0.0, times[1], 0.02])
+    coarse.advance(end, [0.0, times[1], 0.02])
     assert end.nsteps == run.nsteps
     np.testing.assert_array_equal(end.x, run.x)
     np.testing.assert_array_equal(end.v, run.v)
@@ -677,7 +677,7 @@ own, Cvode._right_side = Cvode._right_side, fault
 for _ in range(20):
     solver = Cvode(test_cvode.small(size=3), linear_solver="sparse")
     try:
-        solver.rows(solver.start(), [1.0])
+        solver.advance(solver.start(), [1.0])
     except ZeroDivisionError:
         pass
     del solver
@@ -750,7 +750,7 @@ def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, linear_solver)
     solver = Cvode(system, linear_solver=linear_solver)
     run = solver.start(v=thrown(system))
     with pytest.raises(refweb.SolverError) as caught:
-        solver.rows(run, [END])
+        solver.advance(run, [END])
     found = re.fullmatch(r"number not finite at node (\d+), t = (\S+) s: use a smaller rtol", str(caught.value))
     assert int(found[1]) == node and run.time <= from_now < float(found[2]) * (1.0 + 1e-5)
     assert np.isfinite(run.x).all()

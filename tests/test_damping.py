@@ -73,7 +73,7 @@ def started(solver, v=APART):
 def stepped(system, end, safety, v=APART):
     solver = CentralDifference(system, safety=safety)
     run = solver.start(v=v)
-    solver.rows(run, np.linspace(0.0, end, 3)[1:])
+    solver.advance(run, np.linspace(0.0, end, 3)[1:])
     return run
 
 
@@ -111,7 +111,7 @@ def test_restitution_by_implicit_steps(method, zeta):
     for gap in (0.0, 2.17e-3):
         time, expected = parting(zeta)
         solver, run = started(method(tether(zeta, gap), rtol=1e-8))
-        solver.rows(run, [1.5 * time + gap / SPEED])
+        solver.advance(run, [1.5 * time + gap / SPEED])
         # Errors of a few hundred steps of a tolerance of 1e-8, and of their book by 1e-3 of the energy in a piece.
         assert abs(approach(run) - expected) < 1e-5 and run.drift < 2e-3
 
@@ -124,7 +124,7 @@ def test_first_order_where_the_force_jumps():
     errors = []
     for step in steps:
         solver, run = started(CentralDifference(system, step_size=step))
-        solver.rows(run, [1.2 * time + gap / SPEED])
+        solver.advance(run, [1.2 * time + gap / SPEED])
         errors.append(abs(approach(run) - expected))
     # The error goes with the place of the jump in its step; its largest over ten neighbouring steps with the step.
     envelope = np.array(errors).reshape(4, 10).max(axis=1)
@@ -165,7 +165,7 @@ def test_other_laws(law):
         np.testing.assert_allclose(exact[2], -system.net.law.floor(*system.net.line_data[0, 1:4]), rtol=1e-14)
     for solver in (Cvode(system, rtol=1e-9), Ida(system, rtol=1e-9), CentralDifference(system, safety=0.001)):
         run = solver.start(v=APART)
-        solver.rows(run, np.linspace(0.0, 0.04, 5)[1:])
+        solver.advance(run, np.linspace(0.0, 0.04, 5)[1:])
         # Local tolerances of 1e-9 add up over three thousand steps; (ωh)² of explicit ones is 3e-6.
         np.testing.assert_allclose(stretched(system, run), exact, rtol=5e-5)
 
@@ -275,7 +275,7 @@ def test_decay_at_every_order(method, order, consistent):
     omega, shape = mode(bar([], **kind), 0)
     system, end = bar([refweb.Damping(time=2.0 * zeta / omega)], **kind), 3.3 * np.pi / omega
     solver, run = started(method(system, rtol=1e-7), v=0.1 * shape)
-    solver.rows(run, [end])
+    solver.advance(run, [end])
     # BDF of order 2 leaves a few hundred times its tolerance after two periods.
     assert np.abs(run.x - 0.1 * decayed(omega, zeta, end) * shape).max() < 1e-4 * 0.1 / omega
     assert run.drift < 1e-4
@@ -292,7 +292,7 @@ def test_decay_of_a_string_mode(method):
         if method == "cvode":
             tolerances = dict(rtol=1e-7, atol_position=1e-7 * small / omega, atol_velocity=1e-7 * small)
             solver, run = started(Cvode(system, family="adams", **tolerances), v=small * shape)
-            solver.rows(run, [end])
+            solver.advance(run, [end])
         else:
             run = stepped(system, end, 0.02, v=small * shape)
         # (ωh)²/24 of phase per step of 0.02 of the bound, and tolerances.
@@ -311,7 +311,7 @@ def test_drag_of_a_free_web():
     for count in (40, 80, 160, 320):
         solver = CentralDifference(system, step_size=1.0 / count)
         run = solver.start(v=v)
-        solver.rows(run, [1.0])
+        solver.advance(run, [1.0])
         np.testing.assert_array_equal(run.v[5], v[5])
         errors.append(np.abs(run.v[:5] - np.exp(-2.0) * v[:5]).max())
     assert abs(slope(errors, [8, 4, 2, 1]) - 2.0) < 0.05

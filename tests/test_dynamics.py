@@ -76,7 +76,7 @@ def slope(errors, steps):
 def run_at(system, safety, ends, v=None, **options):
     solver = CentralDifference(system, safety=safety, **options)
     run = solver.start(v=v)
-    return run, solver.rows(run, ends)
+    return run, solver.advance(run, ends)
 
 
 SAFETIES = (0.2, 0.1, 0.05, 0.025)
@@ -113,9 +113,9 @@ def test_time_reversal():
     system, end, h = taut_system(), 0.02, 0.02 / 200
     solver = CentralDifference(system, step_size=h * (1 + 1e-12))
     run = solver.start(v=bump(system))
-    solver.rows(run, [end])
+    solver.advance(run, [end])
     back = solver.start(run.x, -run.v)
-    solver.rows(back, [end])
+    solver.advance(back, [end])
     assert run.nsteps == back.nsteps == 200 and np.abs(run.x).max() > 1e-3
     np.testing.assert_allclose(back.x, 0.0, atol=ROUND_OFF * np.abs(run.x).max())
     np.testing.assert_allclose(back.v, -bump(system), atol=ROUND_OFF * np.abs(bump(system)).max())
@@ -132,7 +132,7 @@ def test_momentum_and_angular_momentum_of_a_free_web(mesh):
     position, lines = points + run.x, np.abs(run.saved[2]).max()
     momentum, turning = (mass * v).sum(axis=0), np.cross(position, mass * v).sum(axis=0)
     for end in np.linspace(0.01, 0.1, 10):
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         parts = mass * run.v
         np.testing.assert_allclose(parts.sum(axis=0), momentum, atol=ROUND_OFF * np.abs(mass * v).sum())
         parts = np.cross(points + run.x, parts)
@@ -199,7 +199,7 @@ def test_prescribed_motion_is_followed():
     run = solver.start()
     table = np.array(MOTION)
     for end in (0.002, 0.0051, 0.008, 0.02):
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         expected = [np.interp(end, table[:, 0], column) for column in table.T[1:]]
         np.testing.assert_allclose(run.x[0], expected, rtol=0, atol=1e-15)
         assert not run.x[system.net.web.rim[1:]].any()
@@ -257,7 +257,7 @@ def whole():
     """(solver, times, run, rows) of one undisturbed run."""
     solver, times = full_solver(), np.linspace(0.0, 0.02, 21)
     run = solver.start()
-    return times, run, solver.rows(run, times)
+    return times, run, solver.advance(run, times)
 
 
 def full_solver():
@@ -272,7 +272,7 @@ def test_blocks_of_rows_do_not_matter(whole, sizes):
     times, run, rows = whole
     solver = full_solver()
     other = solver.start()
-    parts = [solver.rows(other, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
+    parts = [solver.advance(other, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
     np.testing.assert_array_equal(np.vstack(parts), rows)
     for a, b in zip(everything(run), everything(other), strict=True):
         np.testing.assert_array_equal(a, b)
@@ -283,15 +283,15 @@ def test_a_run_is_its_whole_state(whole):
     times, run, rows = whole
     solver = full_solver()
     first = solver.start()
-    solver.rows(first, times[:9])
+    solver.advance(first, times[:9])
     second, third = copy.deepcopy(first), copy.deepcopy(first)
     parts = []
     for end in times[9:]:
-        solver.rows(first, [end])
-        parts.append(solver.rows(second, [end]))
-        solver.rows(solver.start(), [5e-4])
+        solver.advance(first, [end])
+        parts.append(solver.advance(second, [end]))
+        solver.advance(solver.start(), [5e-4])
     np.testing.assert_array_equal(np.vstack(parts), rows[9:])
-    np.testing.assert_array_equal(full_solver().rows(third, times[9:]), rows[9:])
+    np.testing.assert_array_equal(full_solver().advance(third, times[9:]), rows[9:])
     for other in (first, second, third):
         for a, b in zip(everything(run), everything(other), strict=True):
             np.testing.assert_array_equal(a, b)

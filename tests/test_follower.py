@@ -283,7 +283,7 @@ def test_orbit_order_two():
     for count in counts:
         solver = CentralDifference(system, step_size=2.0 / count * (1.0 + 1e-12))
         run = solver.start(v=v)
-        solver.rows(run, [2.0])
+        solver.advance(run, [2.0])
         assert run.nsteps == count
         errors.append(np.abs(run.x[1] - path(2.0)).max())
     assert abs(slope(errors, 1.0 / counts) - 2.0) < 0.02 and abs(run.work.sum()) < 1e-3
@@ -325,7 +325,7 @@ def test_order_two_and_the_book(exact):
     for count in counts:
         solver = CentralDifference(system, step_size=0.01 / count * (1.0 + 1e-12))
         run = solver.start()
-        solver.rows(run, np.linspace(0.0, 0.01, 6)[1:])
+        solver.advance(run, np.linspace(0.0, 0.01, 6)[1:])
         assert run.nsteps == count
         found.append([np.abs(run.x.ravel()[system.free] - exact[0]).max(), abs(run.work.sum() - exact[1]), run.drift])
     assert exact[1] > 0.1 and np.abs(exact[0]).max() > 1e-3
@@ -339,7 +339,7 @@ def test_implicit_solvers(solver, choice, exact):
     system = blown()
     method = solver(system, rtol=1e-6, linear_solver=choice)
     run = method.start()
-    method.rows(run, [0.005, 0.01])
+    method.advance(run, [0.005, 0.01])
     np.testing.assert_allclose(run.x.ravel()[system.free], exact[0], rtol=0, atol=1e-3 * np.abs(exact[0]).max())
     np.testing.assert_allclose(run.book.sum(), exact[1], rtol=1e-3)
     assert run.drift < 1e-3

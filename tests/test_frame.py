@@ -218,7 +218,7 @@ def at_time(system, end, solver, x=None, v=None, **options):
     """Displacement and velocity at a time, and the run."""
     method = solver(system, **options)
     run = method.start(x, v)
-    method.rows(run, np.linspace(0.0, end, 5)[1:])
+    method.advance(run, np.linspace(0.0, end, 5)[1:])
     return run.x, run.v, run
 
 

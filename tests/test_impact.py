@@ -289,7 +289,7 @@ def test_pulled_cable_is_the_exact_discrete_solution():
         solver, found = CentralDifference(system, safety=safety), []
         run = solver.start()
         for time in times:
-            solver.rows(run, [time])
+            solver.advance(run, [time])
             found.append(run.x[:, 0].copy())
         assert not run.x[:, 1:].any()
         errors.append([run.nsteps, np.abs(found - exact).max()])
@@ -346,7 +346,7 @@ def struck(count, ratio, initial):
     system = nets.system(web, cable(), [motion], quasi_static=False)
     solver, end = CentralDifference(system), 0.9 * natural / SOUND
     run = solver.start()
-    solver.rows(run, np.linspace(0.0, end, 21))
+    solver.advance(run, np.linspace(0.0, end, 21))
     strain = strains(web, system.net.points + run.x)
 
     def excess(e):

@@ -44,7 +44,7 @@ def exact(system, end):
 def ran(system, end, **steps):
     solver = Nystrom(system, **steps)
     run = solver.start()
-    return solver, run, solver.rows(run, [end])
+    return solver, run, solver.advance(run, [end])
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -70,8 +70,8 @@ def test_far_fewer_evaluations_than_central_differences(order):
     solver, run, _ = ran(system, END, order=order, safety=0.4)
     other = CentralDifference(system, safety=0.05)
     slow = other.start()
-    other.rows(slow, [END])
-    assert solver.figures(run)["nfev"] < other.figures(slow)["nfev"]
+    other.advance(slow, [END])
+    assert solver.spent(run)["nfev"] < other.spent(slow)["nfev"]
     assert np.abs(run.x - reference).max() < 0.3 * np.abs(slow.x - reference).max()
 
 

@@ -264,7 +264,7 @@ def handed(monkeypatch):
         seen = []
         monkeypatch.setattr(central_difference, "rows_ahead", lambda *given: seen.append(given) or 1)
         solver = central_difference.CentralDifference(scene_of(*effects).build())
-        solver.rows(solver.start(), [1e-3])
+        solver.advance(solver.start(), [1e-3])
         lists = [one for one in seen[0] if isinstance(one, numba.typed.List)]
         counts = [len(one) for one in lists if isinstance(one._dtype, numba.types.FunctionType)]
         return dict(zip(LISTED, counts, strict=True))

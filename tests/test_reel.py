@@ -86,7 +86,7 @@ def test_a_lift_converges_to_its_closed_form(law):
     for safety in SAFETIES:
         solver = CentralDifference(system, safety=safety)
         run = solver.start(found.x)
-        rows = solver.rows(run, [0.5, 1.0])
+        rows = solver.advance(run, [0.5, 1.0])
         assert rows[-1, -8] == run.work[-1]  # the column of work
         length, rate = lift(1.0)
         error = abs(1.0 - run.x[1, 2] - length), abs(-run.v[1, 2] - rate), abs(run.work[-1] - work)
@@ -106,7 +106,7 @@ def test_a_lift_by_sundials(solver):
     for rtol in (1e-5, 1e-7):
         one = solver(system, rtol=rtol)
         run = one.start(start)
-        one.rows(run, np.linspace(0.0, 1.0, 11))
+        one.advance(run, np.linspace(0.0, 1.0, 11))
         length, rate = lift(1.0)
         errors.append([abs(1.0 - run.x[1, 2] - length), abs(-run.v[1, 2] - rate), abs(run.book[-1] - work), run.drift])
     coarse, fine = np.array(errors)
@@ -152,9 +152,9 @@ def test_slack_is_reeled_in_until_the_line_snaps_taut():
     for safety in SAFETIES:
         solver = CentralDifference(system, probe, events=event, safety=safety)
         run = solver.start()
-        solver.rows(run, [0.99 * taut])
+        solver.advance(run, [0.99 * taut])
         assert not run.x.any() and not run.work.any()
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         step = run.state[2]
         assert abs(run.events[0, -1] - taut) <= step
         errors.append([step, abs(1.0 - run.x[1, 2] - place), abs(-run.v[1, 2] - speed), run.drift])
@@ -198,7 +198,7 @@ def test_order_two_and_the_book(law):
     for safety in SAFETIES:
         solver = CentralDifference(system, safety=safety)
         run = solver.start()
-        solver.rows(run, np.linspace(0.0, end, 21))
+        solver.advance(run, np.linspace(0.0, end, 21))
         assert abs(run.work[-1]) > 1.0  # J
         difference = np.concatenate([run.x.ravel()[free], run.v.ravel()[free]]) - method.y
         errors.append([run.nsteps, np.linalg.norm(difference), run.drift])
@@ -213,7 +213,7 @@ def test_the_book_of_sundials_closes():
     for rtol in (1e-5, 1e-7):
         solver = Cvode(system, rtol=rtol)
         run = solver.start()
-        solver.rows(run, np.linspace(0.0, 0.02, 5))
+        solver.advance(run, np.linspace(0.0, 0.02, 5))
         drifts.append(run.drift)
     assert drifts[1] < 0.1 * drifts[0] < 1e-3
 
@@ -257,7 +257,7 @@ def test_a_step_is_safe_for_the_shortest_length_of_its_row():
             moments = [run.time, np.clip(0.04, run.time, time), time]
             largest = share * np.sqrt(np.interp(moments, *np.transpose(table)).min())
             width = time - run.time
-            solver.rows(run, [time])
+            solver.advance(run, [time])
             # Steps divide a row: the largest that do, but for rounding, and 0.5/0.01 at least.
             np.testing.assert_allclose(width / run.state[2], max(np.ceil(width / largest), 50), rtol=1e-12)
     with pytest.raises(InputError, match="step_size = .* must be ≤"):
@@ -270,16 +270,16 @@ def test_a_run_is_the_same_however_it_is_cut():
     times, rows = np.linspace(0.0, 0.02, 21), []
     system = taut_net("tension-only", *BOTH)
     whole = CentralDifference(system)
-    rows.append(whole.rows(whole.start(), times))
+    rows.append(whole.advance(whole.start(), times))
     one, run = CentralDifference(system), None
     run = one.start()
-    rows.append(np.vstack([one.rows(run, [t]) for t in times]))
+    rows.append(np.vstack([one.advance(run, [t]) for t in times]))
     run = one.start()
-    first = one.rows(run, times[:7])
+    first = one.advance(run, times[:7])
     system.prepare(0.013)
     for begin in (6, 7):  # from the time that it is at, and from the next
         other = CentralDifference(system)
-        rows.append(np.vstack([first[:begin], other.rows(copy.deepcopy(run), times[begin:])]))
+        rows.append(np.vstack([first[:begin], other.advance(copy.deepcopy(run), times[begin:])]))
     for found in rows[1:]:
         np.testing.assert_array_equal(found, rows[0])
 
@@ -292,9 +292,9 @@ def test_a_reel_that_waits():
         system = nets.system(web, cable, [reel(factor, [0])], False)
         solver = CentralDifference(system)
         run = solver.start()
-        solver.rows(run, [0.005, 0.01])
+        solver.advance(run, [0.005, 0.01])
         still.append(run.saved[:3].any() or run.work.any())
-        solver.rows(run, [0.015])
+        solver.advance(run, [0.015])
     assert still == [False, False] and not run.x.any()
 
 

@@ -140,7 +140,7 @@ def test_the_book_closes_to_second_order(law):
     for safety in (0.2, 0.1, 0.05, 0.025):
         solver = CentralDifference(system, safety=safety)
         run = solver.start()
-        solver.rows(run, np.linspace(0.0, 0.02, 21))
+        solver.advance(run, np.linspace(0.0, 0.02, 21))
         assert abs(run.work[-1]) > 0.1
         drifts.append(run.drift)
         counts.append(run.nsteps)

@@ -71,7 +71,7 @@ gc.disable()  # it would come when it likes
 toggle = ctypes.CDLL(sys.argv[2]) if len(sys.argv) > 2 else None
 if toggle:
     toggle.start()
-history = solver.rows(run, times)
+history = solver.advance(run, times)
 if toggle:
     toggle.stop()
 own = [sys.modules[name].__file__ for name in sys.modules if name.partition(".")[0] == "refweb"]

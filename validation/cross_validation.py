@@ -72,7 +72,7 @@ def by_central_differences(system, steps, end, node):
     for count in (steps, 2 * steps):
         solver = CentralDifference(system, step_size=end / count * (1 + 1e-12))
         run = solver.start()
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         found.append(run.x[node, 2])
     return (4 * found[1] - found[0]) / 3
 
@@ -81,7 +81,7 @@ def by_cvode(system, end, node):
     """Height of a node [m] by Adams methods at rtol = 1e-10."""
     solver = Cvode(system, family="adams", rtol=1e-10)
     run = solver.start()
-    solver.rows(run, [end])
+    solver.advance(run, [end])
     return run.x[node, 2]
 
 

@@ -168,7 +168,7 @@ def steps_of(scene, system):
     run, counts, sizes = solver.start(), [], []
     for end in times[1:]:
         before = run.nsteps
-        solver.rows(run, [end])
+        solver.advance(run, [end])
         counts.append(run.nsteps - before)
         sizes.append(run.state[2])
     return np.array(counts, dtype=np.int64), np.array(sizes), run

@@ -60,7 +60,7 @@ def ran(solver, end):
     """A run to ``end`` and its CPU time [s]."""
     run = solver.start()
     began = time.process_time()
-    solver.rows(run, [end])
+    solver.advance(run, [end])
     return run, time.process_time() - began
 
 
@@ -94,7 +94,7 @@ def tolerances():
     met = False
     for safety in (0.9, 0.45):
         solver = CentralDifference(system, safety=safety)
-        solver.rows(solver.start(), [1e-6])
+        solver.advance(solver.start(), [1e-6])
         run, cpu = ran(solver, END)
         row = f"central differences, safety {safety:4.2f}"
         print(f"{row:s}  {abs(run.x[node, 2] - reference):.1e}  {cpu:6.2f}  {run.nsteps:6d}")

@@ -111,13 +111,13 @@ def blocks(solver, run, times, stops, first=0):
         stop = stops[np.searchsorted(stops, first)]
         count = min(size, stop + 1 - first)
         began = time.perf_counter()
-        yield first, solver.rows(run, times[first : first + count])
+        yield first, solver.advance(run, times[first : first + count])
         first += count
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.05 else int(size * 0.1 / spent), 10000))
         if run.stopped:
             break
-    solver.judge(run)
+    solver.refuse_drift(run)
 
 
 SPREAD = 3.0
@@ -531,7 +531,7 @@ class Motion:
         if self._kept is None:
             return solver.start(*self.begin), 0
         own = {key.removeprefix("run_"): array for key, array in self._kept.items() if key.startswith("run_")}
-        run, row = solver.restored(own), int(self._kept["row"])
+        run, row = solver.load(own), int(self._kept["row"])
         self._kept, self.rows = None, [folder.last_row()]
         folder.listed([*((n, times[n]) for n in stops[stops < row]), (row, run.time)], self.system.net.bodies)
         return run, len(times) if run.stopped else row + 1
@@ -553,7 +553,7 @@ class Motion:
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
             for event, time in zip(self.scene.event, run.events[:, TIME], strict=True)
         ]
-        figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.figures(run))
+        figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.spent(run))
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **self._choice, **figures}
         self.solution.solver["slack_nodes"] = len(self.solution.state.slack_nodes) if self.solution.state else None
 
@@ -562,7 +562,7 @@ class Motion:
         if folder is None:
             self.solution.frames.append((number, state))
             return
-        kept = {f"run_{name}": array for name, array in self._solver.stored(run).items()}
+        kept = {f"run_{name}": array for name, array in self._solver.save(run).items()}
         kept |= {f"begin_{name}": array for name, array in zip("xv", self.begin, strict=True) if array is not None}
         kept |= {"row": number, "accuracy": self._accuracy, "repeated": self._repeated}
         kept |= {"missing": np.array(list(self._missing), dtype=str), "shares": np.array(list(self._missing.values()))}

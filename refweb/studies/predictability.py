@@ -44,7 +44,7 @@ def horizon(motion, results, ensemble=None, tell=None):
     apart, size = [np.abs(runs[0].x - runs[1].x).max()], [np.abs(runs[0].x).max()]
     for n, end in enumerate(times, 1):
         for solver, run in zip(pair, runs, strict=True):
-            solver.rows(run, [end])
+            solver.advance(run, [end])
         apart.append(np.abs(runs[0].x - runs[1].x).max())
         size.append(np.abs(runs[0].x).max())
         tell("horizon", n / len(times))

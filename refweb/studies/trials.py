@@ -164,7 +164,7 @@ class Dynamics:
             return
         solver = self._solver(trial)
         with contextlib.suppress(SolverError):  # energies of a first moment may be too small for their book
-            solver.rows(solver.start(*self.begin), [1e-9 * self.times[-1]])
+            solver.advance(solver.start(*self.begin), [1e-9 * self.times[-1]])
 
     def expected(self, trial):
         """Estimate of the CPU time of a trial before any of its method has run [s].
@@ -210,7 +210,7 @@ class Dynamics:
         if trial.key == "safety":
             self._price = trial.cpu_s * trial.value / _stages(solver)
         trial.values, trial.x = np.concatenate(table)[::split], run.x[: self._linear].copy()
-        trial.work = {**{key: solver.figures(run)[key] for key in ("nfev", "njev", "nlu")}, "nsteps": run.nsteps}
+        trial.work = {**{key: solver.spent(run)[key] for key in ("nfev", "njev", "nlu")}, "nsteps": run.nsteps}
 
     def _outside(self, trial, deadline):
         """Run scipy's DOP853 with the forces of the system."""

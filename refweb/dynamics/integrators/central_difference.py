@@ -232,7 +232,7 @@ class CentralDifference:
         if self.system.line_drives:
             set_lengths(t, *self._drives[4:10], self._data[0])
 
-    def figures(self, run):
+    def spent(self, run):
         """What a run has spent, for ``run.json``.
 
         The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
@@ -272,18 +272,18 @@ class CentralDifference:
         recent[:, 2], recent[:, 3] = 0.0, values
         return Run(state, saved, values, none, where[:, 0].copy(), book, np.zeros(3), events, recent)
 
-    def stored(self, run):
+    def save(self, run):
         """The `Run` as arrays by name, for a checkpoint."""
         return vars(run)
 
-    def restored(self, arrays):
+    def load(self, arrays):
         """The `Run` of a checkpoint."""
         return Run(**arrays)
 
     def _peaks(self, run):
         return (*self._probes, run.peaks, run.times, run.places, run.recent, run.work, run.impulse)
 
-    def rows(self, run, ends):
+    def advance(self, run, ends):
         """Advance a run to each time of ``ends`` in turn; equal steps lead to each.
 
         Returns
@@ -382,6 +382,6 @@ class CentralDifference:
         step = self.step_size
         return f"use a smaller step_size than {step:g}" if step else f"use a smaller safety than {self.safety:g}"
 
-    def judge(self, run):
+    def refuse_drift(self, run):
         """Refuse a whole run whose energy drift exceeds `DRIFT`; `OpenBook`."""
         refuse_open(run, DRIFT, self._remedy)

@@ -256,13 +256,13 @@ class Ida(Implicit):
         run.constraint_drift = self._drift = np.zeros(2)
         return run
 
-    def stored(self, run):
-        return {**super().stored(run), "constraint_drift": run.constraint_drift}
+    def save(self, run):
+        return {**super().save(run), "constraint_drift": run.constraint_drift}
 
-    def restored(self, arrays):
+    def load(self, arrays):
         arrays = dict(arrays)
         drift = arrays.pop("constraint_drift")
-        run = super().restored(arrays)
+        run = super().load(arrays)
         run.constraint_drift = self._drift = drift
         return run
 
@@ -324,10 +324,10 @@ class Ida(Implicit):
                 f"{REMEDY}"
             ) from None
 
-    def figures(self, run):
+    def spent(self, run):
         """What a run has spent, and the `constraint_drift` of its steps: of lengths [1], and of their rates [m/s]."""
         drift = {"constraint_drift": run.constraint_drift.tolist()} if self._links else {}
-        return {**super().figures(run), **drift}
+        return {**super().spent(run), **drift}
 
     def _hold(self, x, v):
         if self._links:

@@ -175,7 +175,7 @@ class Implicit:
 
     # What it makes of them
 
-    def figures(self, run):
+    def spent(self, run):
         """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""
         return {**self.stats, "linear_solver": self.choice}
 
@@ -207,12 +207,12 @@ class Implicit:
         self._enter(run)
         return run
 
-    def stored(self, run):
+    def save(self, run):
         """The `Course` as arrays by name, for a checkpoint; a solver's past steps are not among them."""
         kept = {f.name: np.asarray(getattr(run, f.name)) for f in fields(run) if f.name != "rates"}
         return {**kept, "spent": np.array(list(self.stats.values()))}
 
-    def restored(self, arrays):
+    def load(self, arrays):
         """The `Course` of a checkpoint, from which the solver begins with short steps of order 1, as at t = 0."""
         arrays = dict(arrays)
         self.stats.update(zip(self.stats, arrays.pop("spent").tolist(), strict=True))
@@ -232,14 +232,14 @@ class Implicit:
         if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
 
-    def rows(self, run, ends):
+    def advance(self, run, ends):
         """Advance a run to each time of ``ends`` in turn.
 
         Returns
         -------
         ndarray, shape (rows, columns)
             Fewer rows than times where an event ends the run; as
-            `refweb.dynamics.integrators.central_difference.CentralDifference.rows`.
+            `refweb.dynamics.integrators.central_difference.CentralDifference.advance`.
 
         Raises
         ------
@@ -493,7 +493,7 @@ class Implicit:
         if run.largest > 0.0:
             run.share = share
 
-    def judge(self, run):
+    def refuse_drift(self, run):
         """Refuse a whole run whose energy drift exceeds `DRIFT`; `OpenBook`."""
         refuse_open(run, DRIFT, self._remedy)
 
