@@ -8,10 +8,10 @@ import pytest
 import refweb
 from refweb.dynamics.integrators.explicit_loop import DRIFT
 from refweb.errors import OpenBook
-from validation import hard_cases
-from validation.balances import energy_left, momentum_left, unbalanced
-from validation.hard_cases import STATIC, STATICS, attempt, matrix
-from validation.random_scenes import near_the_limit, outcome, random_net
+from validation.hard_cases import hard_cases
+from validation.hard_cases.balances import energy_left, momentum_left, unbalanced
+from validation.hard_cases.hard_cases import STATIC, STATICS, attempt, matrix
+from validation.hard_cases.random_scenes import near_the_limit, outcome, random_net
 
 
 def outcomes(seeds):

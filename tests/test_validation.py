@@ -4,16 +4,17 @@ import re
 
 import pytest
 
-import validation
-from validation import Case, Figure, Row, Table, Verdict, plots, report
 from validation.__main__ import main
+from validation.harness import case as cases
+from validation.harness import page, plots
+from validation.harness.case import Case, Figure, Row, Table, Verdict
 
 
-@pytest.mark.parametrize("name", validation.names())
+@pytest.mark.parametrize("name", cases.names())
 def test_case(name):
-    title, body = validation.text(name)
-    assert title and body, f"validation/{name}.py does not say what it is"
-    case = validation.run(name, quick=True)
+    title, body = cases.text(name)
+    assert title and body, f"{name} does not say what it is"
+    case = cases.run(name, quick=True)
     assert case.failures == []
     for figure in case.figures:
         assert figure.caption and plots.png(figure.draw()).startswith(b"\x89PNG")
@@ -64,20 +65,22 @@ def test_failures():
 
 def test_report(tmp_path, monkeypatch, capsys):
     """No cell is empty, the page loads nothing, Markdown's pictures are there, and the status tells of a failure."""
-    monkeypatch.setattr(validation, "CASES", {"Part": ("one", "two")})
-    monkeypatch.setattr(report, "CASES", validation.CASES)
+    monkeypatch.setattr(cases, "CASES", {"Part": ("one", "two")})
+    monkeypatch.setattr(page, "CASES", cases.CASES)
     described = "Words, doi:10.1000/182.\n\n    F = m a\n\n- item"
-    monkeypatch.setattr(report, "text", lambda name: (f"Title {name}", described))
+    monkeypatch.setattr(page, "text", lambda name: (f"Title {name}", described))
     monkeypatch.setattr("validation.__main__.run", lambda name, quick: sample() if name == "one" else 1 / 0)
     assert main(["--quick", "--out", str(tmp_path)]) == 1
     assert "ZeroDivisionError" in capsys.readouterr().out
-    page, words = ((tmp_path / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
-    cells = re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", page, re.DOTALL)
+    shown, words = ((tmp_path / name).read_text(encoding="utf-8") for name in ("index.html", "report.md"))
+    cells = re.findall(r"<t[dh][^>]*>(.*?)</t[dh]>", shown, re.DOTALL)
     assert len(cells) > 20 and all(re.sub(r"<.*?>", "", cell).strip() for cell in cells)
-    assert not re.search(r"<(script|link|iframe)|@import|url\(", page)
-    assert all(source.startswith("data:image/png;base64,") for source in re.findall(r'src="(.*?)"', page))
-    assert 'href="https://doi.org/10.1000/182"' in page and "a &lt; b &amp; c" in page and "<pre>F = m a</pre>" in page
+    assert not re.search(r"<(script|link|iframe)|@import|url\(", shown)
+    assert all(source.startswith("data:image/png;base64,") for source in re.findall(r'src="(.*?)"', shown))
+    assert (
+        'href="https://doi.org/10.1000/182"' in shown and "a &lt; b &amp; c" in shown and "<pre>F = m a</pre>" in shown
+    )
     (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", words)
     assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
-    assert "fails: ZeroDivisionError" in page and "fails: ZeroDivisionError" in words
+    assert "fails: ZeroDivisionError" in shown and "fails: ZeroDivisionError" in words
     assert main(["one", "--quick", "--out", str(tmp_path)]) == 0

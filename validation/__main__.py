@@ -12,7 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from refweb.tables import nearest
 
-from . import Case, names, report, run, text
+from .harness import page as report
+from .harness.case import Case, names, run, text
 
 FOLDER = pathlib.Path(__file__).parent / "report"
 

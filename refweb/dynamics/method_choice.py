@@ -5,7 +5,7 @@ whether anything asks for the short steps of an explicit method. Waves do, and c
 out of equilibrium make waves; then a compiled step, of 1e-6 s and 12e-9 s per element, is about a hundred times cheaper
 than one of CVODE. Where tables alone move a web from its equilibrium, BDF takes steps as long as the motion allows; so
 do Adams methods where damping ends the waves, and shortens explicit steps. CPU times for three digits of the
-displacement of the centre, from ``validation/work_precision.py``:
+displacement of the centre, from ``validation/methods/work_precision.py``:
 
 =========================================  ===================  =========  ===========  ========
 scene                                      central differences  CVODE BDF  CVODE Adams  IDA

@@ -19,7 +19,7 @@ DOP853, rtol = 1e-4, 1e-6, 1e-8, 1e-10  5.6e-8, 1.7e-9, 1.6e-11, 2.0e-13 m for 1
 
 There is no order 8 here because of the last rows but one: down to 1e-13 m it needs more evaluations than order 6.
 In CPU time DOP853 with the same forces takes 1.9 to 3 times as long as order 4 or 6 for errors of 1e-7 to 1e-11 m, by
-``validation/work_precision.py``.
+``validation/methods/work_precision.py``.
 
 References
 ----------

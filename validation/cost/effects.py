@@ -1,0 +1,174 @@
+"""What each effect costs in the explicit loop, and that one which a scene does not call for costs nothing.
+
+    python -m validation.cost.effects
+
+The table is of the paper's square web, thrown, alone and with one effect more: nanoseconds per element and step of a
+whole run with its history rows and peaks, without files and without a twin. CPU time, minimum of several warm runs that
+alternate, in this process, one thread. Steps are as each scene has them.
+
+What is never executed costs nothing: valgrind counts the instructions of the plain web's steps and rows, once with the
+package as it is and once with a copy of it in which every module that this run has not loaded is deleted, all effects
+and all other solvers among them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import refweb
+from refweb.dynamics.simulation import Motion
+from refweb.results.solution import Solution
+from refweb.scene import Scene
+
+PLAIN = {
+    "title": "square web, thrown",
+    "web": {"kind": "paper", "mesh": "square", "cable_length": 201.4},
+    "cable": {"law": "tension-only", "modulus": 7e7, "area": 1e-4, "density": 200.0},
+    "velocity": [{"node": "all", "value": [0.0, 0.0, 1.0]}],
+    "solve": {"kind": "dynamic", "duration": 0.05},
+    "output": {"interval": 1e-3, "frames": 1000},
+    "accuracy": {"error": "none"},
+}
+BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, 0.11], "velocity": [0.0, 0.0, -1.0]}
+RUBBING = {"stiffness": 1e5, "friction": 0.3, "damping": 0.1, "slip_velocity": 0.1}
+EFFECTS = {
+    "gravity": {"gravity": {"acceleration": [0.0, 0.0, -9.81]}},
+    "load": {"load": [{"node": "centre", "force": [0.0, 0.0, 1.0]}]},
+    "motion": {"motion": [{"node": "rim", "displacement": [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0]]}]},
+    "point mass": {"point_mass": [{"node": "centre", "mass": 1.0}]},
+    "contact": {"body": [BALL], "contact": {"stiffness": 1e5}},
+    "contact, friction": {"body": [BALL], "contact": RUBBING},
+    "frame": {"frame": {"angular_velocity": [0.0, 0.0, 1.0]}},
+    "pressure": {"pressure": [{"lines": "all", "normal": [0.0, 0.0, 1.0], "value": 0.1}]},
+    "thrust": {"thrust": [{"node": 0, "line": 0, "force": 1.0}]},
+    "damping, time": {"damping": {"time": 1e-5}},
+    "damping, rate": {"damping": {"rate": 1.0}},
+    "bending": {"bending": {"stiffness": 1e-3}},
+    "reel": {"reel": [{"lines": "all", "factor": [[0.0, 1.0], [1.0, 0.9]]}]},
+    "temperature": {"temperature": {"expansion": 1e-5, "change": -10.0}},
+}
+AGREEMENT = 1e-3
+"""Largest relative difference of the two counts, of what the interpreter does before the loop and after it."""
+
+COUNTED = """
+import ctypes, gc, json, sys
+import refweb
+from refweb.dynamics.simulation import Motion, row_times
+
+scene = refweb.Scene.from_dict(json.loads(sys.argv[1]))
+refweb.run(scene)
+solver = Motion(scene, scene.build(), refweb.Solution(scene)).solver(scene.solve.safety)
+run, times = solver.start(), row_times(scene)
+gc.disable()  # it would come when it likes
+toggle = ctypes.CDLL(sys.argv[2]) if len(sys.argv) > 2 else None
+if toggle:
+    toggle.start()
+history = solver.advance(run, times)
+if toggle:
+    toggle.stop()
+own = [sys.modules[name].__file__ for name in sys.modules if name.partition(".")[0] == "refweb"]
+print(json.dumps([own, run.nsteps, history[-1].tolist()]))
+"""
+TOGGLE = """
+#include <valgrind/callgrind.h>
+void start(void) { CALLGRIND_START_INSTRUMENTATION; }
+void stop(void) { CALLGRIND_STOP_INSTRUMENTATION; }
+"""
+
+
+def scenes():
+    """The plain scene, and it with each effect."""
+    return {"plain": Scene.from_dict(PLAIN)} | {name: Scene.from_dict(PLAIN | more) for name, more in EFFECTS.items()}
+
+
+def timed(scene, system):
+    """CPU time of a run and its follower per element and step [ns]."""
+    motion = Motion(scene, system, Solution(scene))
+    began = time.process_time()
+    motion.follow(None, lambda text, share: None)
+    seconds = time.process_time() - began
+    return 1e9 * seconds / (motion.solution.solver["nsteps"] * len(system.net.cells)), motion.solution.solver["nsteps"]
+
+
+def measure(repeats=7):
+    """Rows of (name, ns per element-step, ratio to the plain web, steps)."""
+    made = {name: (scene, scene.build()) for name, scene in scenes().items()}
+    found, steps = {name: [] for name in made}, {}
+    for _ in range(1 + repeats):
+        for name, one in made.items():
+            cost, steps[name] = timed(*one)
+            found[name].append(cost)
+    best = {name: min(costs[1:]) for name, costs in found.items()}
+    return [(name, cost, cost / best["plain"], steps[name]) for name, cost in best.items()]
+
+
+def ran(package, cache, *toggle):
+    """(files loaded, [steps, last row], standard error) of the plain scene with a copy of the package."""
+    environment = os.environ | {"PYTHONPATH": str(package), "NUMBA_CACHE_DIR": str(cache), "PYTHONHASHSEED": "0"}
+    environment |= {"NUMBA_CPU_NAME": "generic"}  # valgrind knows not every instruction that this machine has
+    tool = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--callgrind-out-file=/dev/null"] if toggle else []
+    command = [*tool, sys.executable, "-c", COUNTED, json.dumps(PLAIN), *map(str, toggle)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment, cwd=package)
+    files, *rest = json.loads(done.stdout.splitlines()[-1])
+    assert all(pathlib.Path(file).is_relative_to(package) for file in files)
+    return [pathlib.Path(file) for file in files], rest, done.stderr
+
+
+def counts():
+    """(instructions with the whole package, with what the run loads alone, modules deleted, whether results agree).
+
+    A text that says why instead where they cannot be counted.
+    """
+    for name in ("valgrind", "cc"):
+        if shutil.which(name) is None:
+            return f"no instructions counted: there is no {name}"
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder).resolve()
+        source, toggle = folder / "toggle.c", folder / "toggle.so"
+        source.write_text(TOGGLE)
+        made = subprocess.run(["cc", "-shared", "-fPIC", "-o", toggle, source], capture_output=True, text=True)
+        if made.returncode:
+            return "no instructions counted: cc finds no valgrind/callgrind.h"
+        whole, bare = folder / "whole", folder / "bare"
+        package, ignore = pathlib.Path(refweb.__file__).parent, shutil.ignore_patterns("__pycache__")
+        for place in (whole, bare):
+            shutil.copytree(package, place / "refweb", ignore=ignore)
+        loaded = {path.relative_to(whole) for path in ran(whole, folder / "cache")[0]}
+        idle = [path for path in bare.rglob("*.py") if path.relative_to(bare) not in loaded]
+        for path in idle:
+            path.unlink()
+        found = []
+        for place in (whole, bare):
+            ran(place, folder / "cache")  # compiles
+            _, result, errors = ran(place, folder / "cache", toggle)
+            found.append((int(re.search(r"Collected : (\d+)", errors)[1]), result))
+    (with_all, one), (alone, other) = found
+    return with_all, alone, len(idle), one == other
+
+
+def main():
+    """Print the table and the counts; the status says whether these agree."""
+    print(f"{'square web, thrown':24}{'per element-step':>18}{'ratio':>8}{'steps':>8}")
+    for name, cost, ratio, steps in measure():
+        print(f"{name:24}{cost:15.2f} ns{ratio:8.2f}{steps:8d}")
+    found = counts()
+    if isinstance(found, str):
+        print(found)
+        return 0
+    whole, bare, deleted, same = found
+    apart = abs(bare / whole - 1.0)
+    print(f"instructions of the plain steps: {whole:,}; with {deleted} modules that it does not load deleted: {bare:,}")
+    print(f"apart by {apart:.1e}, limit {AGREEMENT:.0e}; the results are {'the same' if same else 'DIFFERENT'}")
+    return 0 if apart <= AGREEMENT and same else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

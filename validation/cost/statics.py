@@ -1,0 +1,116 @@
+"""What statics costs beside its factorizations: CPU time of the shipped load series on the paper's square web.
+
+    python -m validation.cost.statics
+
+The series of `square-load`, 1 to 5 N from flat, runs on a system that is built and warm. Its calls of qdldl, orderings,
+factorizations and solves with their matrices and right-hand sides, are recorded once and then timed alone. CPU time,
+minimum of several runs that alternate, in one process with one thread; with the certificates and without them.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from contextlib import contextmanager
+
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[name] = "1"
+
+import qdldl  # noqa: E402
+
+from refweb.scene import Scene  # noqa: E402
+from refweb.statics import newton as statics  # noqa: E402
+from refweb.system.system import System  # noqa: E402
+
+LIMIT = 1.6
+"""Largest ratio of the series to its factorizations and solves."""
+
+
+class Recorder:
+    """Stands in for ``qdldl.Solver`` and notes every call: (name, argument)."""
+
+    solver, calls = qdldl.Solver, []
+
+    def __init__(self, matrix, upper):
+        self.calls.append(("order", matrix))
+        self._own = self.solver(matrix, upper=upper)
+
+    def update(self, matrix, upper):
+        self.calls.append(("factorize", matrix))
+        self._own.update(matrix, upper=upper)
+
+    def solve(self, b):
+        self.calls.append(("solve", b.copy()))
+        return self._own.solve(b)
+
+    def factors(self):
+        return self._own.factors()
+
+
+@contextmanager
+def replaced(owner, name, value):
+    """An attribute replaced for a while."""
+    before = getattr(owner, name)
+    setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        setattr(owner, name, before)
+
+
+def recorded(series):
+    """All calls of qdldl that a series makes."""
+    Recorder.calls = []
+    with replaced(qdldl, "Solver", Recorder):
+        series()
+    return Recorder.calls
+
+
+def replay(calls):
+    """The same calls alone."""
+    for name, argument in calls:
+        if name == "order":
+            solver = qdldl.Solver(argument, upper=True)
+        elif name == "factorize":
+            solver.update(argument, upper=True)
+        else:
+            solver.solve(argument)
+
+
+def cpu_time(call):
+    began = time.process_time()
+    call()
+    return time.process_time() - began
+
+
+def measure(repeats=15):
+    """Rows of (with certificates, calls, CPU time of the series, of its calls of qdldl alone) [s]."""
+    scene = Scene.load("square-load")
+    system, rows = scene.build(), []
+
+    def series():
+        return list(statics.solve(system, scene.solve.load_steps))
+
+    for certified in (True, False):
+        with replaced(System, "convex", System.convex if certified else False):
+            calls = recorded(series)
+            times = [(cpu_time(series), cpu_time(lambda: replay(calls))) for _ in range(repeats)]  # noqa: B023
+            rows.append((certified, calls, *map(min, zip(*times, strict=True))))
+    return rows
+
+
+def main():
+    """Print the ratios; the status says whether they are within the limit."""
+    ratios = []
+    for certified, calls, whole, alone in measure():
+        ratios.append(whole / alone)
+        count = [sum(name == kind for name, _ in calls) for kind in ("order", "factorize", "solve")]
+        print(f"{'with' if certified else 'without'} certificates: series {1e3 * whole:.0f} ms, its", end=" ")
+        print(f"{count[0]} orderings, {sum(count[:2])} factorizations and {count[2]} solves alone", end=" ")
+        print(f"{1e3 * alone:.0f} ms, ratio {ratios[-1]:.2f}, limit {LIMIT}")
+    return 0 if max(ratios) <= LIMIT else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,413 @@
+"""Hard cases: each either right by an invariant, or refused with a reason.
+
+Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of
+1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
+bodies that start inside of the web. Each is solved by every method that takes it; a number proves each result:
+
+- statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
+  positions and natural lengths by the law alone, assembled with numpy line by line.
+- dynamics: the balance of energy of the last state, over the largest energy there was. Kinetic and strain energy come
+  from positions, velocities and the law alone; what contact stores, what is lost and the work done are the run's. With
+  it the balance of momentum: that of all masses, less that at the start, less the impulse of the supports and of dead
+  loads, over the largest momentum.
+
+What is no result is a refusal, and its reason is listed. Which method refuses which case, and why, is foreseen in the
+table of cases: a method that refuses another, or takes one that it should refuse, fails the row of its group.
+
+The table of random trials counts nets of random lines, slack, supports and loads, and runs of slack nets that are
+thrown about and hit in steps just below the bound of stability. ``python -m pytest -m slow tests/test_hard_cases.py
+tests/test_fuzz.py tests/test_faults.py`` tries more of them, and worse: 2000 nets, 10 000 runs, 20 000 scene files,
+valid, changed and garbled, and 200 kills of a running process, each of which leaves a folder that opens and goes on to
+the same bytes. What such trials find has a test of its own, among them:
+
+- chains that hang slack under 1e-10 of EA, which no damped Newton step leads out of: softer nets do;
+- dynamic relaxation that comes to rest after every other step and hardly moves, where its steps are near the bound;
+- web files with entities, that refer to other files, or whose numbers are none; names of bodies that lead out of the
+  folder; checkpoints with pickles in them; scenes that need more memory than there is.
+"""
+
+import contextlib
+import tempfile
+from collections import Counter
+
+import numpy as np
+
+import refweb
+from refweb.dynamics.integrators.explicit_loop import DRIFT
+from refweb.errors import OpenBook
+
+from ..harness.case import Case, Row, Table
+from .balances import energy_left, momentum_left, unbalanced
+from .random_scenes import near_the_limit, outcome, random_net
+
+STATIC = ("newton", "relaxation")
+DYNAMIC = ("central-difference", "explicit", "cvode", "ida")
+UP = (0.0, 0.0, 1.0)
+
+# What is foreseen to be refused: methods, and words of their reasons.
+CARRIED_OFF = dict.fromkeys(STATIC, "no equilibrium: a mechanism of 12 nodes")
+MASSLESS = dict.fromkeys(("central-difference", "explicit", "cvode"), "has no mass, which")
+ADRIFT = {**MASSLESS, "ida": "it has no mass, and no tension holds it"}
+MOVED = {"explicit": "takes nothing that is moved"}
+
+
+def not_explicit(effect):
+    """Steps of high order refuse an effect whose force is not one of displacement alone, or does work."""
+    return {"explicit": f"takes no [{effect}]"}
+
+
+def cable(law="tension-only", **changes):
+    return refweb.Cable(**{"law": law, "modulus": 7e7, "area": 1e-4, "density": 200.0, **changes})
+
+
+def window(size=3):
+    return refweb.Window(mesh="square", rows=size, columns=size, side=0.2)
+
+
+def inline(points, lines, supports, **more):
+    return refweb.Inline(points=points, lines=lines, supports=supports, **more)
+
+
+def pull(force, node="centre"):
+    return refweb.Load(node=node, force=tuple(float(f) for f in np.multiply(force, UP)))
+
+
+# Statics
+
+
+def static(*effects, web=None, steps=(1.0,), supports=None, refused=None, **law):
+    return dict(
+        refused=refused or {},
+        web=web or window(),
+        cable=cable(**law),
+        effects=effects,
+        supports=supports,
+        solve=lambda method: refweb.Static(method=method, load_steps=steps),
+    )
+
+
+SPOKES = 200
+ANGLES = 2 * np.pi * np.arange(SPOKES) / SPOKES
+WHEEL = inline(
+    [[0.0, 0.0, 0.0], *np.column_stack([np.cos(ANGLES), np.sin(ANGLES), 0 * ANGLES]).tolist()],
+    [[0, i + 1] for i in range(SPOKES)],
+    list(range(1, SPOKES + 1)),
+)
+TRIANGLES = refweb.Window(mesh="triangle", rows=7, columns=5, side=0.2)
+ROW = [[float(i), 0.0, 0.0] for i in range(4)]
+SHORT = inline([[0, 0, 0], [1, 0, 0], [1 + 1e-6, 0, 0], [2, 0, 0]], [[0, 1], [1, 2], [2, 3]], [0, 3])
+SLACK = inline(ROW, [[0, 1], [1, 2], [2, 3]], [0, 3], natural_length=1.5)
+TAUT = inline(ROW, [[0, 1], [1, 2], [2, 3]], [0, 3], natural_length=[1.5, 0.9, 1.5])
+MET = inline([*ROW, ROW[1]], [[0, 1], [1, 2], [2, 3], [1, 4], [2, 4]], [0, 3], natural_length=[1.0] * 3 + [0.5] * 2)
+CROSSED = inline(
+    [[-1, 0, 0], [0, 0, 0], [1, 0, 0], [0, -1, -0.1], [0, 0, -0.1], [0, 1, -0.1]],
+    [[0, 1], [1, 2], [3, 4], [4, 5]],
+    [0, 2, 3, 5],
+)
+DANGLING = inline([*ROW, [1.0, 1.0, 0.0]], [[0, 1], [1, 2], [2, 3], [1, 4]], [0, 3])
+APART = inline([*ROW, [0, 1, 0], [1, 1, 0]], [[0, 1], [1, 2], [2, 3], [4, 5]], [0, 3, 4])
+RIM = refweb.Supports(nodes=["rim"])
+HANGING = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
+CORNER = refweb.Supports(nodes=["corners"])
+STATICS = {
+    "flat web under F [N]": {f: static(pull(f)) for f in (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)},
+    "smoothing η, 1 N": {e: static(pull(1.0), law="smooth", smoothing=e) for e in (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 0.0)},
+    "slackness ε0, 1 N": {
+        e: static(pull(1.0), law="smooth", smoothing=1e-6, slackness=e) for e in (0.0, 1e-6, 1e-3, 1e-2, 0.1)
+    },
+    "modulus [Pa], 1 N": {e: static(pull(1.0), modulus=e) for e in (1.0, 1e3, 1e6, 1e9, 1e12)},
+    "density [kg/m³] under gravity": {
+        d: static(HANGING, pull(1e-3), density=d) for d in (0.0, 1e-6, 1e-3, 200.0, 1e4)
+    },
+    "lengths": {"1 : 1e6": static(pull(1.0, 1), web=SHORT)},
+    "nets": {
+        "node of 200 lines": static(pull(1.0, 0), web=WHEEL),
+        "dangling end": static(HANGING, pull(-1.0, 1), web=DANGLING),
+        "two components": static(HANGING, web=APART),
+        "a slack line of no length": static(HANGING, web=MET),
+        "a line through its neighbour": static(pull(-3e3, 1), web=CROSSED),
+        "all slack": static(HANGING, web=SLACK),
+        "slack without load": static(web=SLACK),
+        "one line taut": static(HANGING, web=TAUT),
+        "hung from one corner": static(HANGING, supports=refweb.Supports(nodes=[0])),
+        "triangles hung from one corner": static(HANGING, web=TRIANGLES, supports=refweb.Supports(nodes=[0])),
+        "hung from two nodes": static(HANGING, supports=refweb.Supports(nodes=[0, 1])),
+        "hung from its corners": static(HANGING, supports=CORNER),
+        "1 % too long": static(HANGING, prestrain=-0.01),
+        "5 % too long, smooth": static(HANGING, prestrain=-0.05, law="smooth", smoothing=1e-6),
+        "prestress with a mechanism": static(pull(1e-3, 1), web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [0, 3],
+                                             natural_length=0.99)),
+        "pushed along, a mechanism": static(refweb.Load(node=1, force=(1.0, 0.0, 0.0)),
+                                            web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [0])),
+        "without supports": static(pull(1.0), supports=refweb.Supports(nodes=[]), refused=CARRIED_OFF),
+    },
+    "loads": {
+        "in the plane": static(refweb.Load(node="centre", force=(1.0, 0.3, 0.0))),
+        "sheared": static(refweb.Motion(node=[0, 1, 2], displacement=[[0, 0, 0, 0], [1, 0.05, 0.02, 0]])),
+        "reversed through flat": static(pull(1.0), steps=(1.0, 1e-3, 0.0, -1e-3, -1.0)),
+        "1 N to 1 MN in a step": static(pull(1.0), steps=(1.0, 1e6)),
+    },
+}  # fmt: skip
+
+
+# Dynamics
+
+
+NODE = window().web().points[window().web().centre]
+
+
+def ball(position=(0.01, 0.003, -0.101), velocity=(0.0, 0.0, 2.0), **changes):
+    """A ball at a position from the node in the centre."""
+    place = tuple(float(x) for x in NODE + position)
+    own = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": place, "velocity": velocity}
+    return refweb.Body(**{**own, **changes})
+
+
+def hit(*effects, stiffness=1e4, duration=0.02, web=None, contact=None, supports=None, refused=None, **law):
+    bodies = effects or (ball(),)
+    return dict(
+        refused=refused or {},
+        web=web or window(),
+        cable=cable(**law),
+        effects=(*bodies, refweb.Contact(stiffness=stiffness, **(contact or {}))),
+        supports=supports,
+        solve=lambda method: refweb.Dynamic(method=method, duration=duration),
+    )
+
+
+def free(*effects, web=None, duration=0.02, supports=None, refused=None, **law):
+    return dict(
+        refused=refused or {},
+        web=web or window(),
+        cable=cable(**law),
+        effects=effects,
+        supports=supports or refweb.Supports(nodes=[]),
+        solve=lambda method: refweb.Dynamic(method=method, duration=duration),
+    )
+
+
+def thrown(web, supports, velocity=UP, node=1, **more):
+    """Nodes of a web held, one of the others thrown."""
+    held = refweb.Supports(nodes=list(supports))
+    return free(refweb.Velocity(node=node, value=velocity), web=web, supports=held, **more)
+
+
+THROWN = refweb.Velocity(node="centre", value=UP)
+MASS = refweb.PointMass(node="centre", mass=1.0), THROWN
+CRITICAL = 0.2 / (7e7 / 200.0) ** 0.5
+"""Time constant of damping that is critical for the highest frequency 2c/L of lines of 0.2 m [s]."""
+HUB = tuple(float(x) for x in -NODE + [0.0, 0.0, -0.101])
+OUTWARD = [refweb.Velocity(node=i, value=(5.0 * (i - 1.5), 0.0, 0.0)) for i in range(4)]
+JUMP = refweb.Motion(node=[0], displacement=[[0.0, 0.0, 0.0, 0.0], [1e-5, 0.0, 0.0, 1e-3], [1.0, 0.0, 0.0, 1e-3]])
+MOTIONS = {
+    "impact at v [m/s]": {
+        v: hit(ball(velocity=(0.0, 0.0, v), mass=1e-3), stiffness=max(1e4, 0.4 * v * v), duration=2.0 / max(v, 100.0))
+        for v in (2.0, 100.0, 1000.0, 7000.0)
+    },
+    "contact stiffness [N/m]": {
+        k: hit(stiffness=k, duration=0.02 if k < 1e8 else 2e-3) for k in (1e2, 1e4, 1e6, 1e8, 1e10)
+    },
+    "mass of the ball [kg]": {
+        m: hit(ball(mass=m), duration=0.02 if m > 1e-3 else 1e-3) for m in (1e-6, 1e-3, 1.0, 1e3, 1e6)
+    },
+    "where it hits": {
+        "a node": hit(ball(position=(0.0, 0.0, -0.101))),
+        "a line": hit(ball(position=(0.1, 0.0, -0.101))),
+        "a cell": hit(ball(position=(0.1, 0.1, -0.101), radius=0.15)),
+        "the edge": hit(ball(position=(0.25, 0.01, -0.101))),
+        "from inside": hit(ball(position=(0.0, 0.0, -0.05))),
+        "from its middle": hit(ball(position=(1e-3, 2e-3, 1e-4))),
+        "two balls": hit(ball(), ball(name="other", position=(0.2, 0.1, 0.101), velocity=(0.0, 0.3, -2.0))),
+        "a slack web": hit(prestrain=-0.05),
+        "a free web": hit(supports=refweb.Supports(nodes=[])),
+        "a node of 200 lines": hit(ball(position=HUB, mass=0.1), web=WHEEL, duration=2e-3),
+    },
+    "friction": {
+        m: hit(ball(velocity=(1.0, 0.0, 2.0)), contact=dict(friction=m), refused=m and not_explicit("contact"))
+        for m in (0.0, 0.1, 1.0, 10.0)
+    },
+    "damping of contact [s/m]": {
+        d: hit(contact=dict(damping=d), refused=d and not_explicit("contact")) for d in (0.0, 0.1, 10.0)
+    },
+    "damping of lines over critical": {
+        z: free(refweb.Damping(time=z * CRITICAL), THROWN, supports=RIM, refused=not_explicit("damping"))
+        for z in (1e-3, 0.1, 1.0, 10.0)
+    },
+    "modulus [Pa]": {
+        e: hit(modulus=e, duration=0.02 if e < 1e9 else 1e-3) for e in (1.0, 1e6, 1e9, 1e12)
+    },
+    "motion": {
+        "all lines snap taut": free(*OUTWARD, web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [], natural_length=1.1),
+                                    duration=0.2),
+        "an end that jumps": free(JUMP, supports=RIM, refused=MOVED),
+        "lengths 1 : 1e6": thrown(SHORT, (0, 3), duration=1e-4),
+        "a slack line of no length": thrown(MET, (0, 3)),
+        "a line through its neighbour": thrown(CROSSED, (0, 2, 3, 5), (0.0, 0.0, -10.0)),
+        "a dangling end": thrown(DANGLING, (0, 3), node=4),
+        "two components": thrown(APART, (0, 3, 4)),
+        "density 1e-6 kg/m³": thrown(window(), ("rim",), node="centre", density=1e-6, duration=1e-6),
+        "no density, loaded": free(pull(1.0), density=0.0, prestrain=0.01, supports=RIM,
+                                   refused={**MASSLESS, **not_explicit("load")}),
+        "no density, a mass thrown": free(*MASS, density=0.0, prestrain=0.01, supports=RIM, refused=MASSLESS),
+        "no density, without tension": free(*MASS, density=0.0, supports=RIM, refused=ADRIFT),
+    },
+}  # fmt: skip
+
+
+def scene_of(fields, method):
+    """The scene of a case by a method."""
+    fields = {name: value for name, value in fields.items() if name != "refused"}
+    solve = fields.pop("solve")(method)
+    if solve.kind == "dynamic":
+        fields["output"] = refweb.Output(interval=solve.duration / 20, frames=20)
+        fields["accuracy"] = refweb.Accuracy(error="none")
+    return refweb.Scene(**fields, solve=solve)
+
+
+def attempt(fields, method):
+    """The solution of a case by a method, or the reason why there is none."""
+    try:
+        with np.errstate(all="ignore"):
+            return refweb.run(scene_of(fields, method)), ""
+    except (refweb.InputError, refweb.SolverError) as error:
+        return None, str(error)
+
+
+def struck():
+    """The momentum that a ball of 7 km/s leaves in the web: steps that miss the contact would make it nothing."""
+    given = []
+    for method in ("central-difference", "cvode"):
+        solution, _ = attempt(MOTIONS["impact at v [m/s]"][7000.0], method)
+        given.append(1e-3 * (7000.0 - solution.state.v[-1, 2]))
+    why = "10 steps while the ball moves by its radius, of order 2"
+    return Row("momentum that a ball of 7 km/s loses", given[0], given[1], "CVODE", 1e-2, why, "N s")
+
+
+def matrix(groups, methods, prove, tolerance, reason, quick):
+    """Rows, cells and reasons of a matrix of cases and methods; a group's row fails where a refusal is not foreseen."""
+    rows, cells, refusals = [], [], {}
+    for group, members in groups.items():
+        worst, unforeseen = 0.0, []
+        names = list(members)
+        ends = names[:: max(len(names) - 1, 1)]
+        for name in ends if quick and isinstance(names[0], float) else names:
+            line = [f"{group}: {name:g}" if isinstance(name, float) else name]
+            for method in methods:
+                solution, why = attempt(members[name], method)
+                foreseen = members[name]["refused"].get(method)
+                as_foreseen = foreseen in why if foreseen else not why
+                if not as_foreseen:
+                    unforeseen.append(f"{name} by {method}")
+                if solution is None:
+                    number = refusals.setdefault(why, len(refusals) + 1)
+                    line.append(f"refused ({number})")
+                    continue
+                proof = prove(solution)
+                worst = max(worst, proof if np.isfinite(proof) else np.inf)
+                line.append(f"{proof:.1e}")
+            cells.append(line)
+        if unforeseen:
+            group, worst = f"{group}, refused or solved against the table: {'; '.join(unforeseen)}", np.inf
+        rows.append(Row(group, worst, 0.0, "own balance of the state", tolerance, reason, scale=1.0))
+    reasons = [[str(number), why] for why, number in refusals.items()]
+    return rows, cells, reasons
+
+
+KICKS = (refweb.Velocity(node=0, value=(0.3, -0.2, 1.0)), refweb.Velocity(node=5, value=(-0.5, 0.1, 0.4)))
+LAWS = {"smooth, η = 1e-4": dict(law="smooth", smoothing=1e-4), "tension-only": dict(law="tension-only")}
+
+
+def long_run(steps, law):
+    """A free web that was thrown, after many steps: solution or reason, what momentum, turning and energy have lost."""
+    short, _ = attempt(free(*KICKS, duration=0.1, **law), "central-difference")
+    duration = steps * 0.1 / short.solver["nsteps"]
+    solution, why = attempt(free(*KICKS, duration=duration, **law), "central-difference")
+    if solution is None:
+        return [why], None
+    state = solution.state
+    mass, start = state.system.net.mass[:, None], state.system.initial_velocity()
+    turning = np.cross(state.position, mass * state.v).sum(axis=0)
+    turned = np.cross(state.system.net.points, mass * start).sum(axis=0)
+    moving = np.linalg.norm(np.cross(state.position, mass * state.v), axis=1).sum()
+    lost = momentum_left(solution), np.linalg.norm(turning - turned) / moving, energy_left(solution)
+    return lost, solution.solver["nsteps"]
+
+
+def restarted(method):
+    """Largest difference that an interruption in the middle makes to where a web is, over how far it has moved."""
+    scene = scene_of(hit(duration=0.01), method)
+    scene = scene.replace(output=refweb.Output(interval=5e-4, frames=4))
+
+    def stop(text, share):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with tempfile.TemporaryDirectory() as folder:
+        with contextlib.suppress(KeyboardInterrupt):
+            refweb.run(scene, out=f"{folder}/run", progress=stop)
+        solution = refweb.resume(f"{folder}/run")
+    undisturbed = refweb.run(scene)
+    difference = np.abs(solution.state.x - undisturbed.state.x).max()
+    return difference / np.abs(undisturbed.state.x).max()
+
+
+def random_trials(nets, runs):
+    """Rows and a table of random nets, and of random runs near the limit of stability."""
+    kinds, tried = (
+        ("solved", "relaxed", "carried off", "pushed"),
+        Counter(outcome(random_net(seed)) for seed in range(nets)),
+    )
+    wrong = nets - sum(tried[kind] for kind in kinds)
+    proven, refused, worst = tried["solved"] + tried["relaxed"], 0, 0.0
+    for seed in range(runs):
+        try:
+            with np.errstate(all="ignore"):
+                worst = max(worst, energy_left(refweb.run(near_the_limit(seed))))
+        except OpenBook:
+            refused += 1
+    rows = [
+        Row("random nets without a proof or a reason", wrong, 0.0, "forces, gap of duality", 0.0, "none", scale=1.0),
+        Row("energy of random runs near the limit", worst, 0.0, "own balance", DRIFT, "the budget of a run", scale=1.0),
+    ]
+    cells = [
+        ["nets in statics", str(nets), str(proven), str(nets - proven - wrong), str(wrong)],
+        ["runs near the limit", str(runs), str(runs - refused), str(refused), str(int(worst > DRIFT))],
+    ]
+    return rows, Table("Random trials", ["what", "tried", "solved", "refused with a reason", "wrong"], cells)
+
+
+def case(quick):
+    tolerance, reason = 1e-7, "Newton and relaxation end below 1e-9 of their own scale, which may be 100 times larger"
+    rows, cells, reasons = matrix(STATICS, STATIC, unbalanced, tolerance, reason, quick)
+    tables = [Table("Statics: force left over scale", ["case", *STATIC], cells)]
+    tables.append(Table("Statics: reasons of refusals", ["number", "reason"], reasons))
+
+    def prove(solution):
+        return max(energy_left(solution), momentum_left(solution))
+
+    reason = "the budget of energy of a run"
+    more, cells, reasons = matrix(MOTIONS, DYNAMIC, prove, DRIFT, reason, quick)
+    rows += more
+    tables.append(Table("Dynamics: energy or momentum left", ["case", *DYNAMIC], cells))
+    tables.append(Table("Dynamics: reasons of refusals", ["number", "reason"], reasons))
+    rows.append(struck())
+    for method in ("central-difference",) if quick else ("central-difference", "cvode", "ida"):
+        exact = method == "central-difference"
+        within = (0.0, "bit for bit") if exact else (1e-3, "rtol 1e-6, and what slackness adds")
+        name = f"restart in the middle, {method}"
+        rows.append(Row(name, restarted(method), 0.0, "the undisturbed run", *within, scale=1.0))
+    long = []
+    for name, law in LAWS.items():
+        lost, steps = long_run(1e4 if quick else 1e6, law)
+        if steps is None:
+            long.append([name, "refused", *3 * ["none"], *lost])
+            continue
+        long.append([name, str(steps), *(f"{value:.1e}" for value in lost), "none"])
+        bound, why = 4e-16 * steps, "2 roundings in every step, all of one sign"
+        bounds = (bound, why), (bound, why), (DRIFT, "the budget of energy of a run")
+        for what, value, within in zip(("momentum", "angular momentum", "energy"), lost, bounds, strict=True):
+            rows.append(Row(f"{what} of a free web, {name}", value, 0.0, "conserved", *within, scale=1.0))
+    more, table = random_trials(*((30, 30) if quick else (300, 1000)))
+    columns = ["law", "steps", "momentum lost", "angular momentum lost", "energy lost", "reason of refusal"]
+    tables.append(Table("A free web, thrown, in many steps", columns, long))
+    return Case(rows=rows + more, tables=[*tables, table])

@@ -1,0 +1,146 @@
+"""Every impact by three methods.
+
+Central differences (explicit, fixed steps from a bound of stability), CVODE (Adams methods of order 1 to 12) and IDA
+(BDF of order 2 on the residual) share forces and tangents, nothing else. Each run of a shipped impact brings an error
+with every observable, from a second run of its own at a neighbouring accuracy; two methods have to agree within the sum
+of theirs. The errors of peaks of stress are large because a peak is the highest of many waves that meet, and which one
+that is changes with every digit.
+
+Where nothing is hit there are digits to compare: 1 kg thrown at 1 m/s from the centre of a square web (smooth law,
+η = 1e-4). Central differences of two step sizes, extrapolated by their order 2, CVODE at rtol = 1e-10 and the explicit
+Runge–Kutta method DOP853 of scipy (E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I,
+2nd ed. 1993, doi:10.1007/978-3-540-78862-1) at rtol = 1e-12 have to agree to nine digits.
+"""
+
+import itertools
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.cvode import Cvode
+from refweb.scene import Scene
+
+from ..harness import plots
+from ..harness.case import Case, Figure, Row
+
+IMPACTS = ("square-impact", "triangle-impact", "hexagon-impact", "square-oblique-impact")
+METHODS = {
+    "central-difference": dict(method="central-difference", safety=0.25),
+    "cvode": dict(method="cvode", family="adams", rtol=1e-5),
+    "ida": dict(method="ida", rtol=1e-4),
+}
+QUICK = {
+    "central-difference": dict(method="central-difference"),
+    "cvode": dict(method="cvode", family="adams", rtol=1e-4),
+    "ida": dict(method="ida", rtol=1e-3),
+}
+"""Keys of [solve] for each method; the quick ones on a shorter run."""
+END = 0.03
+"""Duration of the quick impact [s]: the ball has hit, and the centre follows it."""
+
+
+def solutions(name, quick):
+    """Solutions of an impact by method."""
+    scene, found = Scene.load(name), {}
+    for method, keys in (QUICK if quick else METHODS).items():
+        solve = refweb.Dynamic(duration=END if quick else scene.solve.duration, **keys)
+        found[method] = refweb.run(scene.replace(solve=solve))
+    return found
+
+
+def compared(name, found):
+    """Rows for each pair of methods and each observable."""
+    for first, second in itertools.combinations(found, 2):
+        for key, one in found[first].results.items():
+            other = found[second].results[key]
+            yield Row(
+                f"{name}, {key} by {first}",
+                one.value,
+                other.value,
+                second,
+                (one.error + other.error) / abs(other.value),
+                f"± {one.error:.2g} and ± {other.error:.2g}, added",
+                one.unit,
+                one.error,
+            )
+
+
+def by_central_differences(system, steps, end, node):
+    """Height of a node [m] after so many steps and after twice as many, extrapolated."""
+    found = []
+    for count in (steps, 2 * steps):
+        solver = CentralDifference(system, step_size=end / count * (1 + 1e-12))
+        run = solver.start()
+        solver.advance(run, [end])
+        found.append(run.x[node, 2])
+    return (4 * found[1] - found[0]) / 3
+
+
+def by_cvode(system, end, node):
+    """Height of a node [m] by Adams methods at rtol = 1e-10."""
+    solver = Cvode(system, family="adams", rtol=1e-10)
+    run = solver.start()
+    solver.advance(run, [end])
+    return run.x[node, 2]
+
+
+def by_dop853(system, end, node):
+    """Height of a node [m] by DOP853 at rtol = 1e-12."""
+    free, n = system.free, len(system.free)
+    mass = np.repeat(system.net.mass, 3)[free]
+
+    def placed(unknowns):
+        rows = np.zeros((system.rows, 3))
+        rows.ravel()[free] = unknowns
+        return rows
+
+    def rate(t, y):
+        return np.concatenate([y[n:], system.force(t, placed(y[:n]), placed(y[n:])).ravel()[free] / mass])
+
+    start = np.concatenate([np.zeros(n), system.initial_velocity().ravel()[free]])
+    y = solve_ivp(rate, (0, end), start, "DOP853", t_eval=[end], rtol=1e-12, atol=1e-14).y[:, 0]
+    return placed(y[:n])[node, 2]
+
+
+def digits(quick):
+    """Rows that compare the height of a thrown mass."""
+    if quick:
+        web, end, steps = refweb.Window(mesh="square", rows=8, columns=8, side=0.0646), 0.05, 8000
+    else:
+        web, end, steps = refweb.Paper(mesh="square", cable_length=201.4), 0.25, 12000
+    system = refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="smooth", smoothing=1e-4, modulus=7e7, area=1e-4, density=200.0),
+        effects=[refweb.PointMass(node="centre", mass=1.0), refweb.Velocity(node="centre", value=(0.0, 0.0, 1.0))],
+        solve=refweb.Dynamic(duration=end),
+    ).build()
+    node = system.net.web.centre
+    found = {
+        f"central differences, {steps} and {2 * steps} steps": by_central_differences(system, steps, end, node),
+        "CVODE, rtol = 1e-10": by_cvode(system, end, node),
+        "DOP853, rtol = 1e-12": by_dop853(system, end, node),
+    }
+    for first, second in itertools.combinations(found, 2):
+        name = f"thrown mass after {end} s, {first}"
+        yield Row(name, found[first], found[second], second, 1e-9, "nine digits are asked for", "m")
+
+
+def drawing(name, found):
+    """Deflection over time by each method."""
+    page, plot = plots.axes("time [s]", "deflection [mm]")
+    for (method, solution), style in zip(found.items(), ("-", "--", ":"), strict=True):
+        plot.plot(solution.history["time"], 1e3 * np.asarray(solution.history["deflection"]), style, label=method)
+    plot.set_title(name)
+    plot.legend(frameon=False)
+    return page
+
+
+def case(quick):
+    rows, figures = list(digits(quick)), []
+    for name in IMPACTS[:1] if quick else IMPACTS:
+        found = solutions(name, quick)
+        rows += compared(name, found)
+        figures.append(Figure(f"{name}: three methods, one curve.", lambda n=name, f=found: drawing(n, f)))
+    return Case(rows=rows, figures=figures)
