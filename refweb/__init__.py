@@ -29,38 +29,33 @@ _HOME = {
     "Paper": "net.lattices",
     "Window": "net.lattices",
     "Layers": "net.lattices",
-    "Gravity": "effects.gravity",
-    "Load": "effects.load",
-    "Motion": "effects.motion",
-    "PointMass": "effects.point_mass",
-    "Velocity": "effects.velocity",
-    "Body": "effects.body",
-    "Contact": "effects.contact.table",
-    "Link": "effects.link",
-    "Frame": "effects.frame",
-    "Pressure": "effects.pressure",
-    "Thrust": "effects.thrust",
-    "Damping": "effects.damping",
-    "Bending": "effects.bending",
-    "Reel": "effects.reel",
-    "Temperature": "effects.temperature",
     "Accuracy": "settings",
     "Event": "settings",
     "InputError": "errors",
     "SolverError": "errors",
 }
-__all__ = sorted(_HOME)
+
+
+def _homes():
+    """Module of each exported name; effects stand in the table of all effects."""
+    from .registry import EFFECTS
+
+    effects = (reference.removeprefix("refweb.").split(":") for reference in EFFECTS.values())
+    return {**_HOME, **{name: module for module, name in effects}}
 
 
 def __getattr__(name):
     import importlib
 
-    if name not in _HOME:
+    homes = _homes()
+    if name == "__all__":
+        return sorted(homes)
+    if name not in homes:
         from .tables import nearest
 
-        raise AttributeError(f"module 'refweb' has no attribute {name!r}, {nearest(name, _HOME)}")
-    return getattr(importlib.import_module(f"{__name__}.{_HOME[name]}"), name)
+        raise AttributeError(f"module 'refweb' has no attribute {name!r}, {nearest(name, homes)}")
+    return getattr(importlib.import_module(f"{__name__}.{homes[name]}"), name)
 
 
 def __dir__():
-    return __all__
+    return sorted(_homes())

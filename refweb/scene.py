@@ -7,7 +7,6 @@ an effect is imported when its table is.
 from __future__ import annotations
 
 import contextlib
-import importlib
 import os
 import pathlib
 import re
@@ -17,34 +16,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .errors import InputError
+from .registry import EFFECTS, LISTS, WEBS, load
 from .settings import Accuracy, Dynamic, Event, Output, Static, Supports
 from .tables import Table, choice, integer, nearest, short, shown, text
 
-WEBS = {
-    "paper": "refweb.net.lattices:Paper",
-    "window": "refweb.net.lattices:Window",
-    "layers": "refweb.net.lattices:Layers",
-    "cable": "refweb.net.single_cable:SingleCable",
-    "inline": "refweb.net.inline:Inline",
-    "file": "refweb.net.inline:File",
-}
-EFFECTS = {
-    "gravity": "refweb.effects.gravity:Gravity",
-    "load": "refweb.effects.load:Load",
-    "motion": "refweb.effects.motion:Motion",
-    "point_mass": "refweb.effects.point_mass:PointMass",
-    "velocity": "refweb.effects.velocity:Velocity",
-    "body": "refweb.effects.body:Body",
-    "contact": "refweb.effects.contact.table:Contact",
-    "link": "refweb.effects.link:Link",
-    "frame": "refweb.effects.frame:Frame",
-    "pressure": "refweb.effects.pressure:Pressure",
-    "thrust": "refweb.effects.thrust:Thrust",
-    "damping": "refweb.effects.damping:Damping",
-    "bending": "refweb.effects.bending:Bending",
-    "reel": "refweb.effects.reel:Reel",
-    "temperature": "refweb.effects.temperature:Temperature",
-}
 KINDS = {
     "cable": ("Cable",),
     "supports": ("Supports", "NoneType"),
@@ -56,16 +31,9 @@ KINDS = {
     "event": ("Event",),
 }
 """Classes of the other parts of a scene."""
-LISTS = ("load", "motion", "point_mass", "velocity", "body", "link", "pressure", "thrust", "reel")
-"""Effects whose table may stand several times, ``[[load]]``."""
 STARTS = ("web", "equilibrium")
 """What ``start`` may be besides a result folder."""
 SHIPPED = pathlib.Path(__file__).parent / "scenes"
-
-
-def _load(reference):
-    module, name = reference.split(":")
-    return getattr(importlib.import_module(module), name)
 
 
 ROWS = 10_000_000
@@ -221,7 +189,7 @@ class Scene:
         effects = []
         for key in given:
             if key in EFFECTS:
-                table = _load(EFFECTS[key])
+                table = load(EFFECTS[key])
                 effects += _each(key, table, given[key]) if key in LISTS else [table.read(f"[{key}]", given[key])]
         return Scene(**parts, effects=tuple(effects))
 
@@ -414,7 +382,7 @@ def _as_given(key, value):
 
 
 def _resolve(table):
-    return _load(table) if isinstance(table, str) else table
+    return load(table) if isinstance(table, str) else table
 
 
 def _in(where, call, *arguments, **named):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .errors import InputError
+from .registry import INTEGRATORS
 from .tables import (
     Table,
     boolean,
@@ -73,14 +74,7 @@ class Static(Table):
             raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
 
 
-_TOLERANCES = ("rtol", "atol_position", "atol_velocity")
-OWN = {
-    "central-difference": ("safety", "step_size"),
-    "explicit": ("safety", "step_size", "order"),
-    "cvode": (*_TOLERANCES, "family", "max_order", "linear_solver"),
-    "ida": (*_TOLERANCES, "max_order", "linear_solver"),
-    "auto": (),
-}
+KEYS_OF_METHOD = {**{name: method.keys for name, method in INTEGRATORS.items()}, "auto": ()}
 """Keys of `Dynamic` that have a meaning with one method or another."""
 
 
@@ -142,9 +136,9 @@ class Dynamic(Table):
 
     def check(self):
         """Refuse keys of another method, and fill in the defaults of this one."""
-        for key in {key for keys in OWN.values() for key in keys}:
-            if getattr(self, key) is not None and key not in OWN[self.method]:
-                methods = " or ".join(f'"{name}"' for name, keys in OWN.items() if key in keys)
+        for key in {key for keys in KEYS_OF_METHOD.values() for key in keys}:
+            if getattr(self, key) is not None and key not in KEYS_OF_METHOD[self.method]:
+                methods = " or ".join(f'"{name}"' for name, keys in KEYS_OF_METHOD.items() if key in keys)
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning with method = "{self.method}", only with {methods}')
         if self.order == 5:
@@ -152,7 +146,7 @@ class Dynamic(Table):
         defaults = {"safety": 0.5, "order": 6, "rtol": 1e-6, "family": "bdf", "linear_solver": "auto"}
         defaults["max_order"] = 12 if self.family == "adams" else 2
         for key, value in defaults.items():
-            if getattr(self, key) is None and key in OWN[self.method]:
+            if getattr(self, key) is None and key in KEYS_OF_METHOD[self.method]:
                 object.__setattr__(self, key, value)
         if self.family != "adams" and (self.max_order or 0) > 5:
             raise InputError(f"max_order = {self.max_order} must be ≤ 5 for BDF")

@@ -13,7 +13,7 @@ import re
 import pytest
 
 import refweb
-from refweb.scene import EFFECTS
+from refweb.registry import EFFECTS
 from refweb.tables import Table
 
 ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of its docstring
@@ -162,9 +162,10 @@ def test_a_package_says_what_it_knows(room):
 
 def test_the_package_imports_nothing_at_its_head():
     head = [node for node in MODULES[""].body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert head == [] and uses("") == {"tables"}
+    assert head == [] and uses("") == {"tables", "registry"}
 
 
+ELASTICITY = "effects.elasticity"
 OWNERS = {reference.split(":")[0].removeprefix("refweb.") for reference in EFFECTS.values()} | {"effects.elasticity"}
 """Modules that hold an effect each."""
 
@@ -181,12 +182,17 @@ def test_no_effect_knows_another(name):
 
 
 def test_one_table_names_the_effects():
-    """The package exports them by name; elasticity, which every net has, is known to what reads lines as well."""
+    """Elasticity, which every net has, is known to what reads lines as well."""
     found = {name: named(name) for name in INSIDE if not name.startswith("effects") and named(name)}
-    assert found.pop("scene") == OWNERS
-    assert found.keys() <= {"results.state", "statics.interior_point", "statics.duality_bound", "system.system"}
+    assert found.pop("registry") == OWNERS - {"effects.elasticity"}
+    assert found.keys() <= {
+        "scene",
+        "results.state",
+        "statics.interior_point",
+        "statics.duality_bound",
+        "system.system",
+    }
     assert all(names == {"effects.elasticity"} for names in found.values())
-    assert named("") == OWNERS - {"effects.elasticity"}
 
 
 @pytest.mark.parametrize("name", sorted(MODULES))

@@ -17,14 +17,15 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
-from refweb.scene import EFFECTS, LISTS, SHIPPED, WEBS
+from refweb.registry import EFFECTS, LISTS, WEBS
+from refweb.scene import SHIPPED
 
 ROOT = pathlib.Path(refweb.__file__).parent
 MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in ROOT.rglob("*.py")}
 
 # Modules
 
-EVERY = {"errors", "tables", "kernels", "memory", "settings", "scene", "runner"}
+EVERY = {"errors", "tables", "kernels", "memory", "settings", "registry", "scene", "runner"}
 EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.shapes", "net.rigid_body"}
 EVERY |= {"effects", "effects.base", "effects.elasticity", "system", "system.system"}
 EVERY |= {f"results.{name}" for name in ("state", "observables", "solution", "folder", "provenance")} | {"results"}

@@ -8,7 +8,8 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators.explicit_loop import DRIFT
-from refweb.scene import EFFECTS, SHIPPED
+from refweb.registry import EFFECTS
+from refweb.scene import SHIPPED
 
 README = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 

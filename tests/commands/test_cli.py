@@ -308,7 +308,7 @@ def test_help_imports_nothing_heavy():
 def test_import_is_lazy():
     names = loaded("import refweb; refweb.__version__, dir(refweb)")
     assert not {"numpy", "pyvista", "matplotlib", "numba", "meshio", "sksundae"} & names
-    assert {name for name in names if name.startswith("refweb")} == {"refweb"}
+    assert {name for name in names if name.startswith("refweb")} == {"refweb", "refweb.registry"}
 
 
 def test_unknown_name_of_the_package():

@@ -1,0 +1,71 @@
+"""Tables of names: what a scene or the command line may call for, and where it lives.
+
+A line is a name and the ``"module:name"`` that brings it, imported when it is called for and not before. What is in a
+table is known to scene files, checks, messages and help; nothing else has to be told.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import NamedTuple
+
+WEBS = {
+    "paper": "refweb.net.lattices:Paper",
+    "window": "refweb.net.lattices:Window",
+    "layers": "refweb.net.lattices:Layers",
+    "cable": "refweb.net.single_cable:SingleCable",
+    "inline": "refweb.net.inline:Inline",
+    "file": "refweb.net.inline:File",
+}
+"""Kinds of ``[web]``."""
+EFFECTS = {
+    "gravity": "refweb.effects.gravity:Gravity",
+    "load": "refweb.effects.load:Load",
+    "motion": "refweb.effects.motion:Motion",
+    "point_mass": "refweb.effects.point_mass:PointMass",
+    "velocity": "refweb.effects.velocity:Velocity",
+    "body": "refweb.effects.body:Body",
+    "contact": "refweb.effects.contact.table:Contact",
+    "link": "refweb.effects.link:Link",
+    "frame": "refweb.effects.frame:Frame",
+    "pressure": "refweb.effects.pressure:Pressure",
+    "thrust": "refweb.effects.thrust:Thrust",
+    "damping": "refweb.effects.damping:Damping",
+    "bending": "refweb.effects.bending:Bending",
+    "reel": "refweb.effects.reel:Reel",
+    "temperature": "refweb.effects.temperature:Temperature",
+}
+"""Effects by the name of their table."""
+LISTS = ("load", "motion", "point_mass", "velocity", "body", "link", "pressure", "thrust", "reel")
+"""Effects whose table may stand several times, ``[[load]]``."""
+
+
+class Method(NamedTuple):
+    """A method of dynamics: where its integrator lives, and the keys of ``[solve]`` that mean something to it.
+
+    The first key is its knob: what trades accuracy for time.
+    """
+
+    integrator: str
+    keys: tuple
+
+    @property
+    def knob(self):
+        """Name of the key that trades accuracy for time."""
+        return self.keys[0]
+
+
+_STEPS, _TOLERANCES = ("safety", "step_size"), ("rtol", "atol_position", "atol_velocity")
+INTEGRATORS = {
+    "central-difference": Method("refweb.dynamics.integrators.central_difference:CentralDifference", _STEPS),
+    "explicit": Method("refweb.dynamics.integrators.splitting:Nystrom", (*_STEPS, "order")),
+    "cvode": Method("refweb.dynamics.integrators.cvode:Cvode", (*_TOLERANCES, "family", "max_order", "linear_solver")),
+    "ida": Method("refweb.dynamics.integrators.ida:Ida", (*_TOLERANCES, "max_order", "linear_solver")),
+}
+"""Methods of dynamics."""
+
+
+def load(reference):
+    """What a ``"module:name"`` stands for."""
+    module, name = reference.split(":")
+    return getattr(importlib.import_module(module), name)
