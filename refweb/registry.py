@@ -63,6 +63,11 @@ INTEGRATORS = {
     "ida": Method("refweb.dynamics.integrators.ida:Ida", (*_TOLERANCES, "max_order", "linear_solver")),
 }
 """Methods of dynamics."""
+STATICS = {
+    "newton": "refweb.statics.load_steps:solve",
+    "relaxation": "refweb.statics.dynamic_relaxation:solve",
+}
+"""Methods of statics: functions of a system, load steps and progress that yield an equilibrium at each."""
 
 
 def load(reference):

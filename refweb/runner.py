@@ -8,12 +8,9 @@ import time
 import numpy as np
 
 from .errors import InputError, SolverError
-from .net.tension_laws import LINEAR, SMOOTH
 from .results.folder import Folder, check_folder, read_summary
-from .results.observables import Result
 from .results.provenance import versions, web_of
-from .results.solution import SOLVER, Solution, as_history
-from .results.state import State, floor_remark, strength_remark
+from .results.solution import Solution, as_history
 from .scene import Scene, in_file
 from .tables import short
 
@@ -146,7 +143,7 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
 
 def _refine(scene, solution):
     """Add the errors of elements to the results."""
-    from .statics.smoothing_error import discretisation_errors
+    from .studies.discretisation_error import discretisation_errors
 
     def results(solution):
         return [step["results"] for step in solution.steps] or [solution.reduced]
@@ -174,94 +171,12 @@ def follower_of(scene, system, solution, kept=None):
     """What leads a scene from start to end; refuses what its solver cannot take, with an `InputError`."""
     with in_file(scene.file):
         if scene.solve.kind == "static":
-            return _LoadSteps(scene, system, solution)
+            from .statics.simulation import Simulation
+
+            return Simulation(scene, system, solution)
         from .dynamics.simulation import Motion
 
         return Motion(scene, system, solution, kept)
-
-
-class _LoadSteps:
-    """Follows the load steps of a static scene: results, history row and remarks of each, and frames."""
-
-    def __init__(self, scene, system, solution):
-        self.scene, self.system, self.solution = scene, system, solution
-        self.rows, self._remarks = [], {}
-        self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
-        self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
-
-    @property
-    def done(self):
-        """How far it came."""
-        return f"{len(self.rows)} load steps"
-
-    def _solver(self):
-        if self.scene.solve.method == "relaxation":
-            from .statics import dynamic_relaxation as relaxation
-
-            return relaxation.solve
-        from .statics import newton as statics
-
-        return statics.solve
-
-    def follow(self, folder, tell):
-        """Solve; write rows and frames to ``folder`` as they come."""
-        scene, solution, steps = self.scene, self.solution, self.scene.solve.load_steps
-
-        def frame():
-            solution.frames.append((len(self.rows) - 1, solution.state))
-            if folder is not None:
-                folder.frame(*solution.frames[-1])
-
-        smoothing = None
-        if self.system.net.law.number == SMOOTH and scene.solve.method == "newton" and scene.accuracy.error != "none":
-            from .statics.smoothing_error import Smoothing
-
-            smoothing = Smoothing(scene)
-        totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-        solution.solver = {**SOLVER, "method": scene.solve.method, **totals}
-        try:
-            for found in self._solver()(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
-                state = State(self.system, found.step, found.x)
-                values = [o.value(state) for o in scene.observables]
-                errors = [o.error(state, found) for o in scene.observables]
-                smoothed = [None] * len(values)
-                if smoothing is not None:
-                    smoothed = smoothing.errors(found, [value.value for value in values])
-                results = {
-                    o.name: Result(value.value, error, o.unit, found.step, value.where, moved)
-                    for o, value, error, moved in zip(scene.observables, values, errors, smoothed, strict=True)
-                }
-                stats = {key: found.stats.get(key) for key in SOLVER} | {
-                    "method": scene.solve.method,
-                    "duality_gap": found.certificate.gap if found.certificate else None,
-                    "slack_nodes": len(state.slack_nodes),
-                }
-                totals = {key: totals[key] + stats[key] for key in totals}
-                row = [found.step, *(v.value for v in values), *state.energies.values()]
-                if not np.isfinite(row).all():
-                    bad = self.columns[np.isfinite(row).argmin()]
-                    raise SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
-                solution.steps.append({"step": found.step, "results": results, "solver": stats})
-                solution.solver = {**stats, **totals}
-                solution.state = state
-                if (used := state.utilisation) is not None:
-                    solution.utilisation = float(used.max()), int(used.argmax())
-                for kind, text in _remarks(state, stats, solution.utilisation):
-                    self._remarks.setdefault(kind, []).append((found.step, text))
-                self.rows.append(row)
-                if folder is not None:
-                    folder.row(row)
-                if (len(self.rows) - 1) % scene.output.frames == 0:
-                    frame()
-        finally:
-            if self.rows and (not solution.frames or solution.frames[-1][0] < len(self.rows) - 1):
-                frame()
-
-    def remarks(self):
-        """Each kind of remark once, as it was last made, with its load steps unless it was made at all of them."""
-        for made in self._remarks.values():
-            steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
-            yield made[-1][1] + (f" (load step {steps})" if len(made) < len(self.rows) else "")
 
 
 def _notices(scene, system):
@@ -285,22 +200,3 @@ def _cost(system, solution, started):
             best = min(best, time.process_time() - begin)
         share[family.name] = share.get(family.name, 0.0) + best * (solution.solver["nfev"] or 0)
     return {"cpu_s": cpu, "wall_s": wall, "by_effect": share}
-
-
-def _remarks(state, stats, utilisation):
-    """What a reader of a state has to know: pairs of a kind and a text."""
-    net = state.system.net
-    for text in floor_remark(net, float(state.stress.max())):
-        yield "floor", text
-    if stats["smallest_pivot"] == -1:
-        law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
-        reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
-        reason += 'law = "tension-only" has no such states'
-        if state.system.turns:
-            reason = "the web would leave this state by itself; start from a web that is deflected"
-        yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
-    if stats["slack_nodes"]:
-        some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
-        yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
-    for text in strength_remark(utilisation):
-        yield "strength", text

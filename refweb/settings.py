@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .errors import InputError
-from .registry import INTEGRATORS
+from .registry import INTEGRATORS, STATICS
 from .tables import (
     Table,
     boolean,
@@ -64,7 +64,7 @@ class Static(Table):
     """
 
     kind: str = choice("static", default="static")
-    method: str = choice("newton", "relaxation", default="newton")
+    method: str = choice(*STATICS, default="newton")
     load_steps: tuple = numbers_list((1.0,))
     mass: str = choice("lumped", "consistent", default="lumped")
 

@@ -10,16 +10,18 @@ from ..tables import short
 
 
 def equilibrium(system, progress=None):
-    """The `refweb.statics.newton.Equilibrium` at t = 0 under gravity, loads, motion and fixed bodies; free bodies wait.
+    """The `refweb.statics.equilibrium.Equilibrium` at t = 0 under gravity, loads, motion and fixed bodies.
+
+    Free bodies wait.
 
     Raises
     ------
     SolverError
         Where there is no equilibrium, or none is found.
     """
-    from ..statics import newton as statics
+    from ..statics.load_steps import solve
 
-    (found,) = statics.solve(system.at_rest(), [0.0], progress)
+    (found,) = solve(system.at_rest(), [0.0], progress)
     return found
 
 

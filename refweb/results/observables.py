@@ -180,14 +180,14 @@ class Observe(Table):
         return Value(float(values[at]), None if rows[at] is None or self.body is not None else int(rows[at]))
 
     def error(self, state, equilibrium):
-        """± of the value in a `refweb.statics.newton.Equilibrium`, None where none is known.
+        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None where none is known.
 
-        A proven bound from the certificate where there is one that speaks of the quantity, else an estimate from the
+        A proven bound from duality where there is one that speaks of the quantity, else an estimate from the
         equilibrium's deviations: what the residual makes of the value, three times what rounding makes of it, and the
         rounding of the value itself.
         """
-        if equilibrium.certificate is not None and (self.quantity in LINE or self.quantity == "strain_energy"):
-            return self._bound(state, equilibrium.certificate)
+        if equilibrium.duality_bound is not None and (self.quantity in LINE or self.quantity == "strain_energy"):
+            return self._bound(state, equilibrium.duality_bound)
         place = self.value(state)
         loose = self.quantity in NODAL and place.where in state.slack_nodes
         if equilibrium.deviations is None or loose or self.quantity == "slack_fraction":
@@ -200,11 +200,11 @@ class Observe(Table):
             changes.append(abs(self.value(there).value - place.value) / share if share > 0.0 else 0.0)
         return float(changes[0] + 3.0 * max(changes[1:]) + 2.0 * np.finfo(float).eps * abs(place.value))
 
-    def _bound(self, state, certificate):
+    def _bound(self, state, proven):
         if self.quantity == "strain_energy":
-            return certificate.strain_energy
+            return proven.strain_energy
         net = state.system.net
-        bound = certificate.tension
+        bound = proven.tension
         if self.quantity == "stress":
             bound = bound / net.area
         if self.quantity == "strain":

@@ -28,7 +28,7 @@ from ..system.factorization import Factor
 
 
 @dataclass(frozen=True, eq=False)
-class Certificate:
+class DualityBound:
     """Bounds on a static solution.
 
     Attributes
@@ -46,57 +46,82 @@ class Certificate:
     strain_energy: float
 
 
-def certify(system, equilibrium, factor=None):
-    """The `Certificate` of an equilibrium of a system that is ``convex``; ``factor``, if given, is used again."""
-    net, x, bars = system.net, equilibrium.x, system.net.bars
+def duality_bound(system, equilibrium, factor=None):
+    """The `DualityBound` of an equilibrium.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        One that is ``convex``.
+    equilibrium : refweb.statics.equilibrium.Equilibrium
+        Its state.
+    factor : refweb.system.factorization.Factor, optional
+        Used again where there is one.
+    """
+    net, x = system.net, equilibrium.x
     system.prepare(equilibrium.step)
-    points = len(net.weights)
-    weights = np.tile(net.weights, len(net.cells))
-    axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
-    natural = weights * np.repeat(net.natural_length, points)
-    stiffness = axial / natural
-    vector = bars @ net.points + bars @ x
-    length = np.linalg.norm(vector, axis=1)
-    tension = axial * np.maximum(strains(net, x).ravel(), 0.0)
-    direction = vector / np.where(length > 0, length, 1.0)[:, None]
+    bars = _Bars(net, x)
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
+    force, unbalanced = _balanced(system, bars, outer, factor or Factor(system.pattern))
 
-    weight = stiffness * np.where(tension > 0.0, 1.0, 1e-9)
+    size = np.sqrt((force**2).sum(axis=1))
+    reach = 2.0 * np.linalg.norm(x, axis=1).max()
+    own = 0.5 * bars.tension**2 / bars.stiffness + size * bars.length * np.finfo(float).eps
+    rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum()) + np.abs(unbalanced).sum() * reach
+    gap = float(_gaps(bars, force, size).sum() + rounding)
+    strain_energy = float(0.5 * (bars.tension**2 / bars.stiffness).sum())
+    tension = np.sqrt(2.0 * bars.stiffness * gap).reshape(-1, len(net.weights)).max(axis=1)
+    return DualityBound(gap, tension, 2.0 * np.sqrt(strain_energy * gap) + gap)
+
+
+class _Bars:
+    """What the bars of a net are at a displacement: arrays over them."""
+
+    def __init__(self, net, x):
+        points = len(net.weights)
+        axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
+        self.natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.natural_length, points)
+        self.stiffness = axial / self.natural
+        vector = net.bars @ net.points + net.bars @ x
+        self.length = np.linalg.norm(vector, axis=1)
+        self.tension = axial * np.maximum(strains(net, x).ravel(), 0.0)
+        self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]
+
+
+def _balanced(system, bars, outer, factor):
+    """Forces of the bars [N] that balance the outer ones, shape (bars, 3), and what they leave, shape (rows, 3)."""
+    net, of_bars = system.net, system.net.bars
+    weight = bars.stiffness * np.where(bars.tension > 0.0, 1.0, 1e-9)
     unit = np.einsum("q,qa,qb->qab", net.weights**2, net.gradients, net.gradients)
-    blocks = np.einsum("cq,qab->cab", weight.reshape(-1, points), unit)
+    blocks = np.einsum("cq,qab->cab", weight.reshape(-1, len(net.weights)), unit)
     values = system.assemble_lines(np.kron(blocks, np.eye(3)))
-    values[system.pattern.diagonal] += 1e-14 * stiffness.max()
-    factor = factor or Factor(system.pattern)
+    values[system.pattern.diagonal] += 1e-14 * bars.stiffness.max()
     factor.update(values)
-    resultant = -bars.T.tocsc().astype(np.longdouble)
+    resultant = -of_bars.T.tocsc().astype(np.longdouble)
 
-    force = (tension[:, None] * direction).astype(np.longdouble)
+    def unbalanced(force):
+        rest = outer + resultant @ force
+        rest[system.supported] = 0.0
+        return rest
+
+    force = (bars.tension[:, None] * bars.direction).astype(np.longdouble)
     correction = np.zeros_like(force)
     for _ in range(3):
-        unbalanced = outer + resultant @ (force + correction)
-        unbalanced[system.supported] = 0.0
-        y = np.zeros((system.rows, 3))
-        p = factor.solve(unbalanced.ravel()[system.free].astype(float))
+        p = factor.solve(unbalanced(force + correction).ravel()[system.free].astype(float))
         if p is None:  # what stays unbalanced enters the gap
             break
+        y = np.zeros((system.rows, 3))
         y.ravel()[system.free] = p
-        correction += weight[:, None] * (bars @ y)
-    unbalanced = outer + resultant @ (force + correction)
-    unbalanced[system.supported] = 0.0
-    balanced = force + correction
+        correction += weight[:, None] * (of_bars @ y)
+    force = force + correction
+    return force, unbalanced(force)
 
-    size = np.sqrt((balanced**2).sum(axis=1))
-    across = balanced - (balanced * direction).sum(axis=1)[:, None] * direction
-    along = (balanced * direction).sum(axis=1)
+
+def _gaps(bars, force, size):
+    """What each bar adds to the gap [J], for forces of that ``size``."""
+    along = (force * bars.direction).sum(axis=1)
+    across = force - along[:, None] * bars.direction
     turned = (across**2).sum(axis=1) / np.where(size + along > 0, size + along, 1.0)
-    turned = np.where(along > 0, turned, size - along) * length
-    slack = np.where(tension > 0.0, 0.0, natural - length)
-    terms = (tension - size) ** 2 / (2 * stiffness) + size * np.maximum(slack, 0.0) + turned
-
-    reach = 2.0 * np.linalg.norm(x, axis=1).max()
-    own = 0.5 * tension**2 / stiffness + size * length * np.finfo(float).eps
-    rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum()) + np.abs(unbalanced).sum() * reach
-    gap = float(terms.sum() + rounding)
-    strain_energy = float(0.5 * (tension**2 / stiffness).sum())
-    bound = np.sqrt(2.0 * stiffness * gap).reshape(-1, points).max(axis=1)
-    return Certificate(gap, bound, 2.0 * np.sqrt(strain_energy * gap) + gap)
+    turned = np.where(along > 0, turned, size - along) * bars.length
+    slack = np.where(bars.tension > 0.0, 0.0, bars.natural - bars.length)
+    return (bars.tension - size) ** 2 / (2 * bars.stiffness) + size * np.maximum(slack, 0.0) + turned

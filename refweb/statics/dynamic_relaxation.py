@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels import FORCE, INDICES, MATRIX, kernel, typed_list
-from .newton import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
+from .equilibrium import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
 
 SAFETY = 0.6
 """Half a kick from rest takes the stiffest vibration 2 `SAFETY`² of the way to its middle. Where it goes beyond, a net
@@ -20,7 +20,7 @@ STALLED, TOUCHING = 2_000_000, 500_000
 
 
 @kernel()
-def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
+def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell):
     """``count`` steps of x, v and f."""
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     before = 0.0
@@ -39,7 +39,7 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, outs):
             flat_x[q] += flat_v[q]
             flat_f[q] = 0.0
         for i in range(len(kernels)):
-            kernels[i](t, x, v, f, cells[i], data[i], outs[i])
+            kernels[i](t, x, v, f, cells[i], data[i], per_cell[i])
 
 
 def _inverse_mass(system, t):
@@ -71,7 +71,7 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
 
     Yields
     ------
-    refweb.statics.newton.Equilibrium
+    refweb.statics.equilibrium.Equilibrium
 
     Raises
     ------
@@ -113,7 +113,7 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
         stats = dict(nsteps=done, nfev=done, njev=0, nlu=0, residual=float(error))
         state = Equilibrium(t, x, tension.copy(), f, stats)
         if system.convex:
-            from ..statics import duality_bound as certificate
+            from .duality_bound import duality_bound
 
-            state.certificate = certificate.certify(system, state)
+            state.duality_bound = duality_bound(system, state)
         yield state

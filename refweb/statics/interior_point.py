@@ -32,12 +32,12 @@ class InteriorPoint:
         Load step.
     x : ndarray, shape (rows, 3)
         Start [m], supports in place.
-    loose : ndarray of int
+    anchors : ndarray of int
         Places of the pattern's diagonal to hold, see `refweb.statics.newton.Newton`.
     """
 
-    def __init__(self, system, t, x, loose):
-        self.system, self.x, self.loose = system, x.copy(), loose
+    def __init__(self, system, t, x, anchors):
+        self.system, self.x, self.anchors = system, x.copy(), anchors
         net, points = system.net, len(system.net.weights)
         system.prepare(t)
         self.bars = net.bars
@@ -70,7 +70,7 @@ class InteriorPoint:
             block = (along - across)[:, None, None] * direction[:, :, None] * direction[:, None, :]
             block += across[:, None, None] * np.eye(3)
             values = self.system.assemble_lines(self._by_cell(block))
-            values[self.loose] += 1e-10 * np.max(self.axial / self.natural)
+            values[self.anchors] += 1e-10 * np.max(self.axial / self.natural)
             self.factor.update(values)
             self.nlu += 1
             yield

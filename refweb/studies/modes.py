@@ -11,13 +11,13 @@ from ..dynamics import initial_state as starts
 from ..errors import InputError, SolverError
 from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
+from ..registry import STATICS, load
 from ..results.folder import Folder, check_folder
 from ..results.observables import Result
 from ..results.provenance import versions, web_of
 from ..results.solution import SOLVER, Solution, as_history
 from ..results.state import State, floor_remark
 from ..scene import Scene, in_file
-from ..statics import newton as statics
 from ..tables import integer
 from .spectrum import STRAIN, spectrum
 
@@ -171,12 +171,8 @@ def _at_rest(system):
 def _equilibria(scene, rest, tell):
     if scene.solve.kind == "dynamic":
         yield starts.equilibrium(rest, tell)
-    elif scene.solve.method == "relaxation":
-        from ..statics import dynamic_relaxation as relaxation
-
-        yield from relaxation.solve(rest, scene.solve.load_steps, tell)
     else:
-        yield from statics.solve(rest, scene.solve.load_steps, tell)
+        yield from load(STATICS[scene.solve.method])(rest, scene.solve.load_steps, tell)
 
 
 def _follow(found, rest, number, tell):
@@ -193,7 +189,7 @@ def _follow(found, rest, number, tell):
         found.spectra.append(here)
         stats = {key: equilibrium.stats.get(key) for key in SOLVER} | {
             "method": method,
-            "duality_gap": equilibrium.certificate.gap if equilibrium.certificate else None,
+            "duality_gap": equilibrium.duality_bound.gap if equilibrium.duality_bound else None,
             "smallest_pivot": -1 if here.unstable else 0 if here.zero else 1,
             "slack_nodes": len(found.state.slack_nodes),
         }

@@ -307,7 +307,7 @@ class Statics:
 
             options = {"tolerance": trial.value}
         else:
-            from ..statics.newton import solve
+            from ..statics.load_steps import solve
         began, found = time.process_time(), []
         for equilibrium in solve(system, steps, lambda text: _check(deadline), **options):
             found.append(equilibrium)

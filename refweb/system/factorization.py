@@ -1,4 +1,4 @@
-"""Symmetric factorization of the tangent: LDLᵀ by qdldl, whose D shows the signs of the pivots."""
+"""Factorizations of tangents: LDLᵀ by qdldl, whose D shows the signs of the pivots, and LU of what is not symmetric."""
 
 from __future__ import annotations
 
@@ -53,6 +53,30 @@ class Factor:
         if not self.pattern.size:
             return 0
         return int(np.count_nonzero(~(self._solver.factors()[1] > 0.0)))
+
+
+class Lu:
+    """LU of matrices of one `refweb.system.sparsity.Pattern`, with `update` and `solve` of a `Factor`."""
+
+    def __init__(self, pattern):
+        self.pattern = pattern
+        self._solver = None
+
+    def update(self, values):
+        """Factorize the matrix of these values."""
+        from scipy.sparse.linalg import splu
+
+        try:
+            self._solver = splu(self.pattern.matrix(values), permc_spec="MMD_AT_PLUS_A")
+        except RuntimeError:  # exactly singular
+            self._solver = None
+
+    def solve(self, b):
+        """Solution of A y = b, shape (n,); None where there is none."""
+        if self._solver is None:
+            return None
+        y = self._solver.solve(b)
+        return y if np.isfinite(y).all() else None
 
 
 def weak_pivot(solver):

@@ -11,7 +11,7 @@ import pytest
 import refweb
 from refweb import scene
 from refweb.__main__ import main
-from refweb.statics import newton as statics
+from refweb.statics import load_steps
 
 SCENE = """
 title = "Small web"
@@ -190,20 +190,20 @@ def test_numbers_that_overflow(here, capsys, old, new):
 
 STOPS = [
     (KeyboardInterrupt(), 130, "interrupted", "interrupted"),
-    (statics.SolverError("no equilibrium at step 2"), 1, "no equilibrium at step 2", "failed"),
+    (refweb.SolverError("no equilibrium at step 2"), 1, "no equilibrium at step 2", "failed"),
     (ZeroDivisionError("a fault"), 1, "internal error, ZeroDivisionError: a fault", "failed"),
 ]
 
 
 @pytest.mark.parametrize("error, status, message, marked", STOPS)
 def test_what_was_computed_is_kept(here, capsys, monkeypatch, error, status, message, marked):
-    solve = statics.solve
+    solve = load_steps.solve
 
     def stops(system, load_steps, *more):
         yield from solve(system, load_steps[:2], *more)
         raise error
 
-    monkeypatch.setattr(statics, "solve", stops)
+    monkeypatch.setattr(load_steps, "solve", stops)
     text = SCENE.replace("[solve]", "[output]\nframes = 5\n\n[solve]")
     (here.parent / "scenes" / "web.toml").write_text(text, encoding="utf-8")
     assert main(["run", WEB, "--out", "out"]) == status

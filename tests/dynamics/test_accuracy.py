@@ -60,7 +60,7 @@ def test_deviations_cover_what_is_off(load, sag):
 def test_a_looser_residual_has_a_larger_error(monkeypatch):
     """An equilibrium that Newton's method leaves early says how far off it is."""
     monkeypatch.setattr(refweb.statics.newton, "TOLERANCE", 1e-4)
-    monkeypatch.setattr(refweb.statics.newton.Newton, "_polished", lambda self, t, x, *found: (x, *found[:3]))
+    monkeypatch.setattr(refweb.statics.newton.Newton, "_polished", lambda self, t, here, *more: here)
     result = refweb.run(arms(37.0, 0.0, OBSERVE)).results["depth"]
     off = abs(result.value + depth(37.0, 0.0))
     assert 1e-12 < off <= result.error * (1.0 + 1e-6) < 1.1 * off

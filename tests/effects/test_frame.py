@@ -17,7 +17,7 @@ from refweb.net import net as lines
 from refweb.net.web import Web
 from refweb.scene import SHIPPED
 from refweb.statics import dynamic_relaxation as relaxation
-from refweb.statics import newton as statics
+from refweb.statics import load_steps
 from refweb.system.system import System
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
@@ -57,7 +57,7 @@ def test_arm_with_a_tip_mass(law, share):
     """(EA/L)(l − L) = m Ω² l: l = L/(1 − share²) at a share of the limit √(EA/mL)."""
     speed = share * np.sqrt(EA / 2.0)
     system = turning(arm(), cable(law, density=0.0), speed, [refweb.PointMass(node=1, mass=2.0)], [0])
-    (found,) = statics.solve(system, [1.0])
+    (found,) = load_steps.solve(system, [1.0])
     # Relative errors of 1e-15 in EA and mΩ² grow by 1/(1 − share²), 50 at most.
     np.testing.assert_allclose(1.0 + found.x[1, 0], 1.0 / (1.0 - share**2), rtol=1e-12)
     assert not found.x[1, 1:].any() and found.stats["smallest_pivot"] == 0  # it turns about the hub for nothing
@@ -74,7 +74,7 @@ def nodal_errors(order, consistent):
     speed, errors = k * np.sqrt(MODULUS / DENSITY), []
     for count in counts:
         system = turning(arm(count, hub), cable(order=order), speed, supports=[0], consistent=consistent)
-        (found,) = statics.solve(system, [1.0])
+        (found,) = load_steps.solve(system, [1.0])
         s = np.linspace(0.0, 1.0, count + 1)
         exact = hub * np.cos(k * s) + (1.0 + hub * k * np.sin(k)) / (k * np.cos(k)) * np.sin(k * s)
         errors.append(np.abs((system.net.points + found.x)[: count + 1, 0] - exact).max())
@@ -95,14 +95,14 @@ def test_consistent_mass_feels_the_position_between_nodes():
     assert (consistent < 0.5 * lumped).all()
 
 
-def refused_at(system, solve=statics.solve):
+def refused_at(system, solve=load_steps.solve):
     """The limit that the refusal names [rad/s]."""
     with pytest.raises(refweb.SolverError, match=r"\[frame\] turns at .*must be below .* lower angular_velocity") as e:
         list(solve(system, [1.0]))
     return float(str(e.value).split("must be below ")[1].split(" rad/s")[0])
 
 
-@pytest.mark.parametrize("solve", [statics.solve, relaxation.solve])
+@pytest.mark.parametrize("solve", [load_steps.solve, relaxation.solve])
 @pytest.mark.parametrize("law", nets.LAWS)
 def test_limit_of_an_arm_with_a_tip_mass(law, solve):
     """√(EA/mL) for every law: far out all of them are linear. 1e-6 above it is refused, 1e-4 below it is solved."""
@@ -114,7 +114,7 @@ def test_limit_of_an_arm_with_a_tip_mass(law, solve):
 
     for share in (1.0 + 1e-6, 2.0, 1e3):
         assert abs(refused_at(system(share * limit), solve) - limit) < 1e-6 * limit
-    if solve is statics.solve:
+    if solve is load_steps.solve:
         (found,) = solve(system((1.0 - 1e-4) * limit), [1.0])
         assert found.stats["residual"] <= 1e-9 and found.x[1, 0] > 4e3
 
@@ -125,7 +125,7 @@ def test_limit_of_two_free_masses():
     mass, limit = refweb.PointMass(node="all", mass=2.0), np.sqrt(2.0 * EA / 2.0)
     system = turning(web, cable(density=0.0), 1.01 * limit, [mass])
     assert abs(refused_at(system) - limit) < 1e-6 * limit
-    (found,) = statics.solve(turning(web, cable(density=0.0), 0.5 * limit, [mass]), [1.0])
+    (found,) = load_steps.solve(turning(web, cable(density=0.0), 0.5 * limit, [mass]), [1.0])
     np.testing.assert_allclose(found.x[:, 0], [-1.0 / 6.0, 1.0 / 6.0], rtol=1e-12)
 
 
@@ -165,7 +165,7 @@ def free_net(mesh, speed, law="tension-only", corner=1.0):
 def test_free_net_turns_steadily(mesh, law):
     """Nothing holds it; every line's tension and the force on every mass, put together here, balance."""
     system = free_net(mesh, 10.0, law)
-    (found,) = statics.solve(system, [1.0])
+    (found,) = load_steps.solve(system, [1.0])
     net, position = system.net, system.net.points + found.x
     ends = net.web.lines
     along = position[ends[:, 1]] - position[ends[:, 0]]
@@ -180,7 +180,7 @@ def test_free_net_turns_steadily(mesh, law):
 def test_free_net_off_the_axis_is_carried_off():
     system = free_net("triangle", 10.0)
     with pytest.raises(refweb.SolverError, match=r"carried off along y .* centre of mass is on the axis of \[frame\]"):
-        list(statics.solve(system, [1.0]))
+        list(load_steps.solve(system, [1.0]))
 
 
 def test_newton_and_relaxation_agree():
@@ -189,10 +189,10 @@ def test_newton_and_relaxation_agree():
     ball = refweb.Body(name="ball", radius=0.1, position=(0.01, 0.02, -0.06), fixed=True)
     effects = [refweb.PointMass(node=7, mass=0.5), refweb.Gravity(acceleration=(0.0, 0.0, -9.81))]
     net_system = turning(web, cable("tension-only", prestrain=0.01), 8.0, effects, web.rim, axis=(0.2, 0.0, 1.0))
-    (newton,), (relaxed,) = (solve(net_system, [1.0]) for solve in (statics.solve, relaxation.solve))
+    (newton,), (relaxed,) = (solve(net_system, [1.0]) for solve in (load_steps.solve, relaxation.solve))
     np.testing.assert_allclose(relaxed.tension, newton.tension, rtol=0, atol=1e-8 * newton.tension.max())
     with_ball = turning(web, cable("tension-only"), 8.0, [*effects, ball, refweb.Contact(stiffness=1e5)], web.rim)
-    (newton,), (relaxed,) = (solve(with_ball, [1.0]) for solve in (statics.solve, relaxation.solve))
+    (newton,), (relaxed,) = (solve(with_ball, [1.0]) for solve in (load_steps.solve, relaxation.solve))
     assert sum(with_ball.energy_of(f, 1.0, newton.x).sum() for f in with_ball.families if f.name == "contact") > 0.0
     np.testing.assert_allclose(relaxed.tension, newton.tension, rtol=0, atol=1e-8 * newton.tension.max())
 

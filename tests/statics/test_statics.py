@@ -24,8 +24,10 @@ from refweb.net.lattices import Paper, Window
 from refweb.net.single_cable import SingleCable
 from refweb.net.web import Web
 from refweb.results.state import State
-from refweb.statics import duality_bound as certificate
-from refweb.statics import newton as statics
+from refweb.statics import load_steps
+from refweb.statics.duality_bound import duality_bound
+from refweb.statics.equilibrium import Equilibrium
+from refweb.statics.newton import Newton
 
 RESIDUAL = 1e-9
 GAP = 1e-10
@@ -41,12 +43,12 @@ def law(smoothing):
 
 
 def solve(net_system, steps=(1.0,)):
-    return list(statics.solve(net_system, steps))
+    return list(load_steps.solve(net_system, steps))
 
 
 def relative_gap(net_system, found):
     """Duality gap over |Π|."""
-    return found.certificate.gap / abs(net_system.energy(found.step, found.x))
+    return found.duality_bound.gap / abs(net_system.energy(found.step, found.x))
 
 
 def joined(points, pairs, natural_length, rim, cable, *effects, **options):
@@ -207,7 +209,7 @@ def test_hanger_of_three_cables_of_which_one_is_slack():
     assert found.tension[2] == 0.0
     np.testing.assert_allclose(found.x[0], [float(x), 0.0, float(z)], atol=1e-11, rtol=0)
     np.testing.assert_allclose(found.tension[:2], tension, atol=1e-9, rtol=0)
-    assert (np.abs(found.tension[:2] - tension) <= found.certificate.tension[:2]).all()
+    assert (np.abs(found.tension[:2] - tension) <= found.duality_bound.tension[:2]).all()
 
 
 def polygon(links, length, axial, weight, span):
@@ -361,9 +363,9 @@ def test_certificate_contains_the_solution_of_a_conic_solver(mesh, prestrain):
     assert "Solved" in str(answer.status)
     its_gap = abs(answer.obj_val - answer.obj_val_dual) + 1e-10 * abs(energy)
     tension = stiffness * np.array(answer.x)[unknowns:]
-    print(f"energies {energy:.12g} and {answer.obj_val:.12g} J, gaps {found.certificate.gap:.1e} and {its_gap:.1e} J")
-    assert abs(energy - answer.obj_val) <= found.certificate.gap + its_gap
-    bound = found.certificate.tension + np.sqrt(2 * stiffness * its_gap)
+    print(f"energies {energy:.12g} and {answer.obj_val:.12g} J, gaps {found.duality_bound.gap:.1e} and {its_gap:.1e} J")
+    assert abs(energy - answer.obj_val) <= found.duality_bound.gap + its_gap
+    bound = found.duality_bound.tension + np.sqrt(2 * stiffness * its_gap)
     assert (np.abs(found.tension - tension) <= bound).all()
 
 
@@ -373,13 +375,13 @@ def test_certificate_holds_away_from_the_equilibrium(prestrain, size):
     """It bounds the error of whatever positions it is given, not only of those that Newton's method returns."""
     net_system = small_web(prestrain=prestrain)
     (best,) = solve(net_system)
-    least, own = net_system.energy(1.0, best.x), best.certificate
+    least, own = net_system.energy(1.0, best.x), best.duality_bound
     stored = net_system.energy_of(net_system.families[0], 1.0, best.x).sum()
     for seed in range(5):
         x = best.x.copy()
         x.ravel()[net_system.free] += size * np.random.default_rng(seed).standard_normal(len(net_system.free))
         force, out = net_system.forces(1.0, x)
-        found = certificate.certify(net_system, statics.Equilibrium(1.0, x, out[0][:, 0].copy(), force))
+        found = duality_bound(net_system, Equilibrium(1.0, x, out[0][:, 0].copy(), force))
         error = net_system.energy(1.0, x) - least
         # Energies of this size are sums of a hundred terms: rounding of 1e-15 of them.
         assert -own.gap - 1e-15 <= error <= found.gap + 1e-15
@@ -400,7 +402,7 @@ def test_gap_of_a_hanging_line_is_its_energy_above_the_least(seed):
     x = np.zeros((2, 3))
     x[1] = np.random.default_rng(seed).standard_normal(3)
     force, out = net_system.forces(1.0, x)
-    found = certificate.certify(net_system, statics.Equilibrium(1.0, x, out[0][:, 0].copy(), force))
+    found = duality_bound(net_system, Equilibrium(1.0, x, out[0][:, 0].copy(), force))
     stretched = max(np.linalg.norm(points[1] + x[1]) - length, 0.0)
     above = axial / length * stretched**2 / 2 + weight * x[1, 2] + weight**2 * length / axial / 2
     assert found.gap == pytest.approx(above, rel=1e-13, abs=1e-14)
@@ -414,11 +416,11 @@ def test_gap_of_a_hanging_line_is_its_energy_above_the_least(seed):
 def test_tensions_do_not_depend_on_the_start(seed):
     net_system = small_web()
     (flat,) = solve(net_system)
-    newton, start = statics.Newton(net_system), flat.x.copy()
+    newton, start = Newton(net_system), flat.x.copy()
     start.ravel()[net_system.free] += 0.03 * np.random.default_rng(seed).standard_normal(len(net_system.free))
     other = newton.solve(1.0, start)
-    other.certificate = certificate.certify(net_system, other)
-    assert (np.abs(other.tension - flat.tension) <= other.certificate.tension + flat.certificate.tension).all()
+    other.duality_bound = duality_bound(net_system, other)
+    assert (np.abs(other.tension - flat.tension) <= other.duality_bound.tension + flat.duality_bound.tension).all()
 
 
 @pytest.mark.parametrize("mesh", MESHES)
@@ -509,13 +511,13 @@ def test_a_load_that_nothing_carries_is_refused_with_nodes_and_direction(name):
     points = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [5, 0, 0], [6, 0, 0]]
     pairs, cable = [[0, 1], [1, 2], [3, 4]], Cable(**LAWS[name], **PAPER)
     loads = [Load(node=1, force=(0.0, 0.0, 1.0)), Load(node=3, force=(0.0, -2.0, 0.0))]
-    with pytest.raises(statics.SolverError, match=r"mechanism of 2 nodes \(3, 4\) .* along y by -2 N .* no support"):
+    with pytest.raises(refweb.SolverError, match=r"mechanism of 2 nodes \(3, 4\) .* along y by -2 N .* no support"):
         solve(joined(points, pairs, None, [0, 2], cable, *loads))
     # A support in x alone carries nothing along y.
     supported = np.zeros((5, 3), dtype=bool)
     supported[[0, 2]] = True
     supported[3, 0] = True
-    with pytest.raises(statics.SolverError, match="along y"):
+    with pytest.raises(refweb.SolverError, match="along y"):
         solve(joined(points, pairs, None, [], cable, *loads, supported=supported))
 
 
@@ -554,7 +556,7 @@ def test_sign_of_the_smallest_pivot(options, sign):
     """A straight chain at rest would buckle under compression, is indifferent without tension, and firm with it."""
     web = SingleCable(start=(0.0, 0.0, 0.0), end=(1.0, 0.0, 0.0), elements=5).web()
     net_system = system(web, Cable(**options, **PAPER))
-    newton = statics.Newton(net_system)
+    newton = Newton(net_system)
     found = newton.solve(1.0, np.zeros((6, 3)))
     # The straight chain is in equilibrium up to the rounding of its tensions.
     assert np.abs(found.x).max() <= 1e-12

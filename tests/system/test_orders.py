@@ -24,7 +24,7 @@ from refweb.net import net as lines
 from refweb.net.cable import Cable
 from refweb.net.web import Web
 from refweb.results.state import State
-from refweb.statics import newton as statics
+from refweb.statics import load_steps
 from refweb.system.system import System
 
 MODULUS, AREA, GRAVITY = 7e7, 1e-4, 9.81
@@ -111,7 +111,7 @@ def hanging(case, law, order, count=1, subdivide=1):
     gravity = refweb.Gravity(acceleration=(0.0, 0.0, -GRAVITY))
     web = straight_web((x, 0.0, z), natural, count)
     net_system = nets.system(web, replace(cable, subdivide=subdivide), [gravity], supported=held_ends(web, cable))
-    (found,) = statics.solve(net_system, [1.0])
+    (found,) = load_steps.solve(net_system, [1.0])
     return net_system, found.x
 
 

@@ -20,7 +20,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 import qdldl  # noqa: E402
 
 from refweb.scene import Scene  # noqa: E402
-from refweb.statics import newton as statics  # noqa: E402
+from refweb.statics import load_steps  # noqa: E402
 from refweb.system.system import System  # noqa: E402
 
 LIMIT = 1.6
@@ -90,7 +90,7 @@ def measure(repeats=15):
     system, rows = scene.build(), []
 
     def series():
-        return list(statics.solve(system, scene.solve.load_steps))
+        return list(load_steps.solve(system, scene.solve.load_steps))
 
     for certified in (True, False):
         with replaced(System, "convex", System.convex if certified else False):

@@ -16,7 +16,7 @@ from refweb.effects.link import Link
 from refweb.errors import InputError, SolverError
 from refweb.net import net as lines
 from refweb.results import probes
-from refweb.statics import newton as statics
+from refweb.statics import load_steps
 from refweb.system.system import System
 
 SOLVERS = ["block", "sparse", "dense"]
@@ -190,7 +190,7 @@ def test_window_goes_as_far_as_its_energy():
         moved = refweb.Motion(node=middle, displacement=[(0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, w)])
         cable = refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=0.0, prestrain=1e-2)
         system = nets.system(web, cable, [moved])
-        (found,) = statics.solve(system, [1.0])
+        (found,) = load_steps.solve(system, [1.0])
         return system.energy(1.0, found.x)
 
     furthest = brentq(lambda w: strained(w) - strained(0.0) - 0.5 * 0.1, 0.0, 0.1, xtol=1e-12)
@@ -394,7 +394,7 @@ def test_other_methods_refuse_links(method):
 
 def test_other_solvers_refuse_links():
     system = chain(4, True)
-    for solve in (Cvode, CentralDifference, lambda system: next(statics.solve(system, [1.0]))):
+    for solve in (Cvode, CentralDifference, lambda system: next(load_steps.solve(system, [1.0]))):
         with pytest.raises(InputError, match=r'^\[\[link\]\] needs .*method = "ida"'):
             solve(system)
 

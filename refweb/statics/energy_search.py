@@ -1,0 +1,71 @@
+"""How far to go along a step where forces have a potential: down the energy.
+
+Near the end differences of the energy drown in rounding, and the slope, force times step, is looked at instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class EnergySearch:
+    """Searches along the steps of one iteration; keeps the energy between them.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts, with a potential.
+    t : float
+        Load step.
+    x : ndarray, shape (rows, 3)
+        Where the iteration starts [m].
+    """
+
+    def __init__(self, system, t, x):
+        self._system, self._t, self._energy = system, t, system.energy(t, x)
+
+    def along(self, p, x, r, shift, stats):
+        """Take a step, or a part of it.
+
+        Parameters
+        ----------
+        p : ndarray, shape (unknowns,)
+            The step [m].
+        x : ndarray, shape (rows, 3)
+            Displacement [m].
+        r : ndarray, shape (unknowns,)
+            Force there [N]; r·p > 0.
+        shift : float
+            Prestress τ of the tangent that p comes from [N].
+        stats : dict
+            ``nfev`` grows by what is evaluated.
+
+        Returns
+        -------
+        x : ndarray, shape (rows, 3)
+            Displacement after the step [m].
+        shift : float
+            The next τ [N]: less after a step that went as its model said, more after one that had to be cut.
+        """
+        system, slope, energy, a = self._system, r @ p, self._energy, 1.0
+        y = x.copy()
+        flat, drowned = y.ravel(), 0.5 * slope < 1e-9 * abs(energy)
+        start = x.ravel()[system.free]
+        for _ in range(40):
+            flat[system.free] = start + a * p
+            self._energy = system.energy(self._t, y)
+            stats["nfev"] += 1
+            if drowned:
+                here = system.force(self._t, y).ravel()[system.free] @ p
+                if here >= -0.9 * slope:
+                    break
+                a *= 0.5
+                continue
+            rise = self._energy - energy + a * slope
+            if self._energy <= energy - 1e-4 * a * slope:
+                break
+            a *= min(max(0.5 * a * slope / rise, 0.1), 0.5) if np.isfinite(rise) else 0.1
+        if a < 1.0:
+            return y, 4.0 * shift
+        good = drowned or energy - self._energy > 0.25 * 0.5 * slope
+        return y, 0.1 * shift if good else shift

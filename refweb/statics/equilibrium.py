@@ -1,0 +1,101 @@
+"""What an equilibrium is: its state, the residual that it is judged by, and the loads that have none.
+
+An equilibrium exists unless the net can be carried off, a part of it without support in a direction in which the forces
+on it do not balance, or turns too fast, see `refweb.statics.critical_speed`. `check_supported` looks before anything is
+solved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from ..net.net import AXIAL_STIFFNESS
+
+TOLERANCE = 1e-10
+"""Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
+LIMIT = 1e-9
+
+
+class NotFound(SolverError):
+    """An equilibrium exists but the iteration did not reach it; ``stats`` tells what it spent."""
+
+    def __init__(self, message, stats):
+        super().__init__(message)
+        self.stats = stats
+
+
+@dataclass(eq=False)
+class Equilibrium:
+    """One state of statics.
+
+    Attributes
+    ----------
+    step : float
+        Load step.
+    x : ndarray, shape (rows, 3)
+        Displacement of every row [m].
+    tension : ndarray, shape (cells,)
+        Tension of every element [N].
+    force : ndarray, shape (rows, 3)
+        Resultant force on every row [N]; at a support the negative of the reaction.
+    stats : dict
+        ``nsteps`` iterations, ``nfev`` force and energy evaluations, ``njev`` tangents, ``nlu`` factorizations,
+        ``residual`` [1], ``smallest_pivot`` (its sign, None where not asked for).
+    duality_bound : refweb.statics.duality_bound.DualityBound, optional
+        Of energy and tension, for the tension-only law.
+    deviations : ndarray, shape (k, rows, 3), optional
+        Displacements by which x may be off [m]: the first what is left of the residual, the others what the rounding of
+        forces may come to; None where the tangent is singular.
+    """
+
+    step: float
+    x: np.ndarray
+    tension: np.ndarray
+    force: np.ndarray
+    stats: dict = field(default_factory=dict)
+    duality_bound: object = None
+    deviations: object = None
+
+
+def check_supported(system, t):
+    """Refuse a load that no support carries, a frame that turns too fast, and links."""
+    if system.constraints:
+        raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
+    outer = system.outer_force(t)
+    for rows, axis in system.loose:
+        resultant = np.sum(outer[rows, axis])
+        if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
+            first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
+            remedy = "support one of them"
+            if system.turns:
+                remedy += ", or move the web so that its centre of mass is on the axis of [frame]"
+            raise SolverError(
+                f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
+                f"{resultant:.4g} N at step {t:g}, with no support in that direction: {remedy}"
+            )
+    if system.turns:
+        from .critical_speed import check_speed
+
+        check_speed(system, t)
+
+
+def force_scale(system, t, x, tension):
+    """What residuals are measured against [N]: the largest of nodal load, weight and contact, and of tension.
+
+    At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
+    under loads below 1e-7 EA.
+    """
+    stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.net.natural_length
+    rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
+    outer = [f for f in system.families if f.cells is not system.net.cells]
+    loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
+    return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
+
+
+def residual(system, force, scale):
+    """Largest force on a free node over the scale [1]."""
+    free = np.where(system.supported, 0.0, force)
+    return np.linalg.norm(free, axis=1).max(initial=0.0) / scale if scale else 0.0

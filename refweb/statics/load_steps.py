@@ -1,0 +1,133 @@
+"""Equilibria at load steps, each from the one before, by Newton's method and by ways around where it finds none.
+
+Where all loads are dead the interior point of `refweb.statics.interior_point` leads near an equilibrium. Where Newton's
+method does not end from there either, a series of softer nets does for the tension-only law, and many small steps for
+the smooth one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..net.net import AXIAL_STIFFNESS, G0
+from ..net.tension_laws import LINEAR, TENSION_ONLY
+from .equilibrium import NotFound
+from .newton import Newton
+
+MOST, WITH_A_WAY_AROUND = 400, 25
+"""Largest number of factorizations from the last state; the second where an interior point can take over."""
+PATIENCE = 3000
+"""Largest number of factorizations of the smooth law where the central path has led to nothing."""
+SOFTEST = 1e-2
+"""Load over EA of the first net of those that grow stiffer."""
+
+
+def solve(system, load_steps, progress=None):
+    """Equilibria at load steps, one after another, each from the one before.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a net whose ``quasi_static`` is True.
+    load_steps : sequence of float
+        Values of t.
+    progress : callable, optional
+        Called with a line of text after each iteration.
+
+    Yields
+    ------
+    refweb.statics.equilibrium.Equilibrium
+
+    Raises
+    ------
+    SolverError
+        Where there is no equilibrium, or none is found; the states before have been yielded.
+    """
+    system = system.at_rest()
+    system.prepare(load_steps[0])
+    newton, x = Newton(system, progress), np.zeros((system.rows, 3))
+    for k, t in enumerate(load_steps):
+        state = _equilibrium(newton, t, x, warm=k > 0)
+        state.deviations = newton.deviations(state)
+        if system.convex:
+            from .duality_bound import duality_bound
+
+            state.duality_bound = duality_bound(system, state, newton.factor)
+        x = state.x
+        yield state
+
+
+def _equilibrium(newton, t, x, warm):
+    """Equilibrium from the last state, or by a way around."""
+    law, spent = newton.system.net.law.number, dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    path = law != LINEAR and newton.system.dead
+    convex = law == TENSION_ONLY and not newton.turns
+    try:
+        state = newton.solve(t, x, warm=warm, most=WITH_A_WAY_AROUND if path else MOST)
+    except NotFound as error:
+        if not path:
+            raise
+        _add(spent, error.stats)
+        try:
+            state = _by_interior_point(newton, t, x, spent)
+        except NotFound:
+            if convex:
+                state = _by_stiffening(newton, t, x, spent)
+            else:  # slack lines that push fold up, one after another
+                state = _by_patience(newton, t, x)
+    if not (convex or newton.follows):
+        state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
+    _add(state.stats, spent)
+    return state
+
+
+def _add(stats, other):
+    for key in ("nsteps", "nfev", "njev", "nlu"):
+        stats[key] += other.get(key, 0)
+    return stats
+
+
+def _by_interior_point(newton, t, x, spent):
+    """Equilibrium from the central path; the nearer its end, the better Newton's start."""
+    from .interior_point import InteriorPoint
+
+    inner = InteriorPoint(newton.system, t, x, newton.anchors)
+    for tolerance in (1e-7, 1e-11, 1e-16):
+        start = inner.follow(tolerance)
+        try:
+            state = newton.solve(t, start, warm=True, most=15 if tolerance > 1e-16 else 200)
+        except NotFound as error:
+            _add(spent, error.stats)
+            if tolerance == 1e-16:
+                raise
+        else:
+            break
+    _add(spent, {"nsteps": inner.nlu, "njev": inner.nlu, "nlu": inner.nlu})
+    return state
+
+
+def _by_stiffening(newton, t, x, spent):
+    """Equilibrium from those of softer nets, in which no line snaps taut; slack parts turn far under tiny loads."""
+    system, data = newton.system, newton.system.net.line_data
+    own, load = data[:, AXIAL_STIFFNESS].copy(), np.abs(system.outer_force(t)).max()
+    softer = SOFTEST * newton.axial / load if load > 0.0 else 1.0
+    try:
+        while softer > 1.0:
+            data[:, AXIAL_STIFFNESS] = own / softer
+            state = Newton(system, newton.progress).solve(t, x)
+            _add(spent, state.stats)
+            x, softer = state.x, softer / 10.0
+    finally:
+        data[:, AXIAL_STIFFNESS] = own
+    return newton.solve(t, x, warm=True)
+
+
+def _by_patience(newton, t, x):
+    """Equilibrium of the smooth law by many small steps; where none is found, the message says how slack lines push."""
+    try:
+        return newton.solve(t, x, most=PATIENCE)
+    except NotFound as error:
+        data = newton.system.net.line_data
+        push = f"{(data[:, AXIAL_STIFFNESS] * data[:, G0]).max():.3g} N"
+        text = f'{error}, or law = "tension-only": slack lines push with up to {push}'
+        raise NotFound(text, error.stats) from None

@@ -1,0 +1,47 @@
+"""How far to go along a step where forces have no potential: as long as it makes the next step shorter.
+
+Loads that turn with the net have no energy to search along. A step p = J⁻¹r, J the tangent with its prestress, is taken
+as long as |J⁻¹r(x + ap)| < |p|, the natural monotonicity test [1]_, a residual in units of displacement that neither
+the scale of forces nor that of stiffnesses changes.
+
+References
+----------
+.. [1] P. Deuflhard, "Newton Methods for Nonlinear Problems", Springer 2011, section 2.1, doi:10.1007/978-3-642-23899-4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class ResidualSearch:
+    """Searches along the steps of one iteration; see `refweb.statics.energy_search.EnergySearch`.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    factor : refweb.system.factorization.Lu
+        That of the tangent that each step comes from.
+    t : float
+        Load step.
+    """
+
+    def __init__(self, system, factor, t):
+        self._system, self._factor, self._t = system, factor, t
+
+    def along(self, p, x, r, shift, stats):
+        """As `EnergySearch.along`, with the first a = 1, 1/2, ... that makes the next step shorter."""
+        system, a, size = self._system, 1.0, np.linalg.norm(p)
+        start, y = x.ravel()[system.free], x.copy()
+        for _ in range(40):
+            y.ravel()[system.free] = start + a * p
+            ahead = self._factor.solve(system.force(self._t, y).ravel()[system.free])
+            stats["nfev"] += 1
+            length, along = np.linalg.norm(ahead), ahead @ p
+            if length < size or (length < 2.0 * size and along > 0.9 * length * size):
+                break
+            a *= 0.5
+        if a < 1.0:
+            return y, 4.0 * shift
+        return y, 0.1 * shift if along > 0.0 or length < 0.25 * size else shift

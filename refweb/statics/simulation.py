@@ -1,0 +1,140 @@
+"""The load steps of a static scene, one after another: results, history row, remarks and frames of each.
+
+`Simulation` has the interface of `refweb.dynamics.simulation`, and the runner follows either.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SolverError
+from ..net.tension_laws import LINEAR, SMOOTH
+from ..registry import STATICS, load
+from ..results.observables import Result
+from ..results.solution import SOLVER
+from ..results.state import State, floor_remark, strength_remark
+
+
+class Simulation:
+    """Follows the load steps of a static scene.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        What is solved.
+    system : refweb.system.system.System
+        That of the scene.
+    solution : refweb.Solution
+        Its ``steps``, ``state``, ``solver``, ``utilisation`` and ``frames`` grow as load steps are solved.
+
+    Attributes
+    ----------
+    columns : list of str
+        Names of what stands in a history row.
+    rows : list of list of float
+        The history so far.
+    """
+
+    def __init__(self, scene, system, solution):
+        self.scene, self.system, self.solution = scene, system, solution
+        self.rows, self._made = [], {}
+        self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
+        self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
+        self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
+
+    @property
+    def done(self):
+        """How far it came."""
+        return f"{len(self.rows)} load steps"
+
+    def follow(self, folder, tell):
+        """Solve; write rows and frames to ``folder``, where there is one, as they come."""
+        scene, solution, steps = self.scene, self.solution, self.scene.solve.load_steps
+        solve, smoothing = load(STATICS[scene.solve.method]), self._smoothing()
+        solution.solver = {**SOLVER, "method": scene.solve.method, **self._totals}
+        try:
+            for found in solve(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
+                row = self._take(found, smoothing)
+                self.rows.append(row)
+                if folder is not None:
+                    folder.row(row)
+                if (len(self.rows) - 1) % scene.output.frames == 0:
+                    self._frame(folder)
+        finally:
+            if self.rows and (not solution.frames or solution.frames[-1][0] < len(self.rows) - 1):
+                self._frame(folder)
+
+    def remarks(self):
+        """Each kind of remark once, as it was last made, with its load steps unless it was made at all of them."""
+        for made in self._made.values():
+            steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
+            yield made[-1][1] + (f" (load step {steps})" if len(made) < len(self.rows) else "")
+
+    def _smoothing(self):
+        """What finds the error of smoothing, None where there is none to be found."""
+        scene = self.scene
+        if self.system.net.law.number != SMOOTH or scene.solve.method != "newton" or scene.accuracy.error == "none":
+            return None
+        from .smoothing_error import Smoothing
+
+        return Smoothing(scene)
+
+    def _take(self, found, smoothing):
+        """Write down an equilibrium; its history row."""
+        scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        results = self._results(found, state, smoothing)
+        row = [found.step, *(result.value for result in results.values()), *state.energies.values()]
+        if not np.isfinite(row).all():
+            bad = self.columns[np.isfinite(row).argmin()]
+            raise SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
+        stats = {key: found.stats.get(key) for key in SOLVER} | {
+            "method": scene.solve.method,
+            "duality_gap": found.duality_bound.gap if found.duality_bound else None,
+            "slack_nodes": len(state.slack_nodes),
+        }
+        self._totals = {key: total + stats[key] for key, total in self._totals.items()}
+        solution.steps.append({"step": found.step, "results": results, "solver": stats})
+        solution.solver = {**stats, **self._totals}
+        solution.state = state
+        if (used := state.utilisation) is not None:
+            solution.utilisation = float(used.max()), int(used.argmax())
+        for kind, text in _remarks(state, stats, solution.utilisation):
+            self._made.setdefault(kind, []).append((found.step, text))
+        return row
+
+    def _results(self, found, state, smoothing):
+        """The observables of an equilibrium by name, with their errors."""
+        observables = self.scene.observables
+        values = [o.value(state) for o in observables]
+        errors = [o.error(state, found) for o in observables]
+        smoothed = [None] * len(values)
+        if smoothing is not None:
+            smoothed = smoothing.errors(found, [value.value for value in values])
+        return {
+            o.name: Result(value.value, error, o.unit, found.step, value.where, moved)
+            for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)
+        }
+
+    def _frame(self, folder):
+        self.solution.frames.append((len(self.rows) - 1, self.solution.state))
+        if folder is not None:
+            folder.frame(*self.solution.frames[-1])
+
+
+def _remarks(state, stats, utilisation):
+    """What a reader of a state has to know: pairs of a kind and a text."""
+    net = state.system.net
+    for text in floor_remark(net, float(state.stress.max())):
+        yield "floor", text
+    if stats["smallest_pivot"] == -1:
+        law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
+        reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
+        reason += 'law = "tension-only" has no such states'
+        if state.system.turns:
+            reason = "the web would leave this state by itself; start from a web that is deflected"
+        yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
+    if stats["slack_nodes"]:
+        some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
+        yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
+    for text in strength_remark(utilisation):
+        yield "strength", text

@@ -1,0 +1,50 @@
+"""Errors of elements: the same scene with every line in more of them.
+
+A scene is solved with every line in two and in four times as many elements: where the first difference is q times the
+second, what is left after the first is q/(q − 1) times that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..settings import Accuracy
+
+FINER = (2, 4)
+"""Number of elements per line that are compared with, over that of the scene."""
+SLOWEST, FASTEST = 1.5, 16.0
+"""Bounds on q: slower is no convergence that could be relied on, and faster is chance."""
+
+
+def discretisation_errors(scene, results, solve):
+    """Results with the error of elements; those that do not converge have all that was seen as their error.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        As it was solved.
+    results : list of dict of str to refweb.results.observables.Result
+        Of each load step, or of the motion.
+    solve : callable
+        Gives such a list of another scene.
+    """
+    found = [results]
+    for times in FINER:
+        cable = replace(scene.cable, subdivide=times * scene.cable.subdivide)
+        found.append(solve(scene.replace(cable=cable, accuracy=Accuracy(error="none"))))
+    return [
+        {
+            name: result._replace(discretisation=_left(*(step[name].value for step in steps)))
+            for name, result in here.items()
+        }
+        for here, *steps in zip(results, *found, strict=True)
+    ]
+
+
+def _left(coarse, fine, finest):
+    """Error of the first of three values."""
+    first, second = abs(coarse - fine), abs(fine - finest)
+    if second * SLOWEST > first:
+        return 2.0 * max(first, second, abs(coarse - finest))
+    ratio = min(first / second, FASTEST) if second > 0.0 else FASTEST
+    return first * ratio / (ratio - 1.0)
