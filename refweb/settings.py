@@ -105,7 +105,7 @@ class Dynamic(Table):
     max_order : int, optional
         Highest order: 2 by default, of Adams methods 12.
     linear_solver : {"auto", "block", "sparse", "dense", "fixed-point"}
-        How linear systems are solved, see `refweb.dynamics.integrators.cvode`.
+        How linear systems are solved, see `refweb.dynamics.integrators.sundials`.
     mass : {"lumped", "consistent"}
         Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
     start : {"web", "equilibrium"} or path

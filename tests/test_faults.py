@@ -23,8 +23,7 @@ import tomli_w
 
 import refweb
 from refweb.__main__ import main
-from refweb.dynamics.integrators import central_difference
-from refweb.dynamics.integrators import step_observer as implicit
+from refweb.dynamics.integrators import central_difference, step_observer
 
 WEB = refweb.Window(mesh="hexagon", rows=4, columns=3, side=0.2)
 CABLE = refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
@@ -84,17 +83,17 @@ def stop_behind(monkeypatch, end, error=KeyboardInterrupt):
     """Make runs in the main thread stop with an error behind a time; returns what takes that back."""
 
     def stopping(own):
-        def rows(self, run, ends):
+        def advance(self, run, ends):
             if run.time > end and threading.current_thread() is threading.main_thread():
                 raise error
             return own(self, run, ends)
 
-        return rows
+        return advance
 
     with_stop = monkeypatch.context()
     patch = with_stop.__enter__()
-    for solver in (central_difference.CentralDifference, implicit.Implicit):
-        patch.setattr(solver, "rows", stopping(solver.rows))
+    for solver in (central_difference.CentralDifference, step_observer.StepObserver):
+        patch.setattr(solver, "advance", stopping(solver.advance))
     return lambda: with_stop.__exit__(None, None, None)
 
 

@@ -35,12 +35,12 @@ STATICS = {"statics", "statics.equilibrium"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
 DYNAMICS = {"dynamics", "dynamics.simulation", "results.probes", "dynamics.integrators"}
 DYNAMICS |= {"dynamics.integrators.explicit_loop"}
-SUNDIALS = TANGENT | {"dynamics.integrators.step_observer", "dynamics.integrators.cvode"}
+SUNDIALS = TANGENT | {"dynamics.integrators.step_observer", "dynamics.integrators.sundials"}
 METHOD = {
     "newton": NEWTON | {"statics.simulation"},
     "relaxation": STATICS | {"statics.simulation", "statics.dynamic_relaxation"},
     "central-difference": DYNAMICS | {"dynamics.integrators.central_difference"},
-    "cvode": DYNAMICS | SUNDIALS,
+    "cvode": DYNAMICS | SUNDIALS | {"dynamics.integrators.cvode"},
     "ida": DYNAMICS | SUNDIALS | {"dynamics.integrators.ida"},
 }
 TABLES_OF_TIME = {"effects.time_tables"}

@@ -30,30 +30,25 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError, SolverError
-from .cvode import DENSE, LINEAR_SOLVERS, _Symmetric, _Unsymmetric
-from .step_observer import Implicit, _Stopped, scales
+from .step_observer import Stopped, scales
+from .sundials import Sundials, Symmetric
 
 UNTESTED = 1e30
 """Absolute tolerance of multipliers, which takes them out of the error test."""
 
 
-class Ida(Implicit):
+class Ida(Sundials):
     """IDA on one system.
 
     Parameters
     ----------
-    system, probes, watch, events, rtol, atol_position, atol_velocity
-        See `refweb.dynamics.integrators.step_observer.Implicit`.
+    system, probes, sums, events, rtol, atol_position, atol_velocity
+        See `refweb.dynamics.integrators.step_observer.StepObserver`.
     max_order : int
         Highest order of the BDF, 1 to 5; those above 2 are unstable near the frequencies of a net.
     linear_solver : {"auto", "block", "sparse", "dense"}
-        How linear systems are solved, see `refweb.dynamics.integrators.cvode.LINEAR_SOLVERS`; "auto" chooses by size.
-        Links need "sparse" or "dense".
-
-    Attributes
-    ----------
-    choice : str
-        Which linear solver is used and why.
+        How linear systems are solved, see `refweb.dynamics.integrators.sundials.LINEAR_SOLVERS`; "auto" chooses by
+        size. Links need "sparse" or "dense".
 
     Raises
     ------
@@ -62,6 +57,7 @@ class Ida(Implicit):
     """
 
     method = "ida"
+    takes_massless = takes_links = True
 
     def __init__(self, system, *observed, max_order=2, linear_solver="auto", **tolerances):
         super().__init__(system, *observed, **tolerances)
@@ -77,17 +73,10 @@ class Ida(Implicit):
         if system.constraints:
             self._links = system.links
         self._count = len(self._links) if self._links else 0
-        self.linear_solver, self.choice = self._chosen(linear_solver)
-        self._product, self._exact, self._adrift = None, False, (0.0, None)
-
-    def _chosen(self, name):
-        if name == "block" and self._links:
+        if self._links and linear_solver == "block":
             raise InputError('[solve] linear_solver = "block" must be "sparse" or "dense" with [[link]]')
-        if name != "auto":
-            return name, f"{name}, as asked for: {LINEAR_SOLVERS[name]}"
-        name = "dense" if self.unknowns <= DENSE else "sparse" if self._links else "block"
-        size = f"{self.unknowns} unknowns, {'at most' if name == 'dense' else 'more than'} {DENSE}"
-        return name, f"{name}, for {size}{', and links' if self._links else ''}: {LINEAR_SOLVERS[name]}"
+        self._choose(linear_solver, *(("sparse", ", and links") if self._links else ("block",)))
+        self._adrift = 0.0, None
 
     # The residual
 
@@ -102,35 +91,29 @@ class Ida(Implicit):
         v[self._heavy] = self._parts(y)[1]
         return v
 
-    def _state(self, t, y, yp):
-        """All rows at a state of the unknowns."""
-        system = self.system
-        x, v = self._reference.copy(), np.zeros((system.rows, 3))
-        x.ravel()[system.free], v.ravel()[system.free] = self._parts(y)[0], self._velocity(y, yp)
-        system.drive(t, x, v)
-        return x, v
+    def _rows(self, t, y, yp):
+        """Displacement and velocity of all rows at a state of the unknowns."""
+        return self.state(t, self._parts(y)[0], self._velocity(y, yp))
 
     def _residual(self, t, y, yp, r):
-        self.stats["nfev"] += 1
-        x, v = self._state(t, y, yp)
         n, heavy, bare = self.unknowns, self._heavy, self._bare
-        force = self.system.force(t, x, v)
-        self._seen = t, force
+        x, v = self._rows(t, y, yp)
+        force = self.force_at(t, x, v)
         rate, (_, own, multipliers, corrections) = self._parts(yp)[0], self._parts(y)
         if self._links:
             pairs = self._links.pairs
-            force = force - pairs.pull(x, multipliers)
+            force = force - pairs.pull(x, multipliers).ravel()[self.system.free]
             rate = rate + pairs.pull(x, corrections).ravel()[self.system.free]
             r[n + len(heavy) :] = np.concatenate([pairs.excess(x), pairs.speed(x, v)])
         slope = np.zeros(n)
         slope[heavy] = self._parts(yp)[1]
-        balance = self._M @ slope - force.ravel()[self.system.free]
+        balance = self._M @ slope - force
         r[heavy], r[bare], r[n : n + len(heavy)] = rate[heavy] - own, balance[bare], balance[heavy]
 
     def _tangent(self, t, y, yp):
         """Values of K, and of C or None, at a state."""
         self.stats["njev"] += 1
-        x, v = self._state(t, y, yp)
+        x, v = self._rows(t, y, yp)
         self._at_state = t, x, v
         K = self.system.stiffness(t, x, v)
         if self._massless:
@@ -144,39 +127,29 @@ class Ida(Implicit):
         system = self.system
         K, C = self._tangent(t, y, yp)
         self._K, self._C = system.pattern.matrix(K), None if C is None else system.pattern.matrix(C)
-        self._factored, self._true = c, self._adrift[1] is None
+        self._factored = c
         rest = self._M.data if C is None else self._M.data + C / c
-        self.stats["nlu"] += 1
-        if not system.symmetric:
-            self._factor = _Unsymmetric(system.pattern, rest + K / c**2)
-            return
-        if self._true:
-            self._factor.update(rest + K / c**2)
-            self._true = not self._factor.negative_pivots()
-        if not self._true:
-            self.stats["nlu"] += 1
+
+        def definite():
             values = rest + system.stiffness(*self._at_state, definite=True) / c**2
             values[system.pattern.diagonal[self._bare]] += np.abs(K).max() / c**2
-            self._factor.update(values)
+            return values
+
+        self._factorize(rest + K / c**2, definite, self._adrift[1] is None)
 
     def _precondition(self, t, y, yp, res, r, z, c, delta):
-        n, heavy, bare = self.unknowns, self._heavy, self._bare
-        self._exact = c == self._factored and self._true
-        if self._product is not None and self._exact:
-            z[:] = self._product  # r is J times it, and this inverts just that
-            self._product = None
+        if self._inverts(z, c == self._factored and self._true):
             return
-        self._product, c = None, self._factored
+        n, heavy, bare, c = self.unknowns, self._heavy, self._bare, self._factored
         first, second = r[:n].copy(), np.empty(n)
         first[bare], second[bare], second[heavy] = 0.0, r[bare], r[n:]
         velocity = self._factor.apply((second - self._K @ first / c) / c)
         z[:n], z[n:] = (first + velocity) / c, velocity[heavy]
 
     def _jacobian_times(self, t, y, yp, res, u, Ju, c):
+        if self._multiplied(u):
+            return
         n, heavy, bare = self.unknowns, self._heavy, self._bare
-        self._product = u.copy()
-        if self._exact:
-            return  # what it would be, the preconditioner takes away again
         velocity, slope = c * u[:n], np.zeros(n)
         velocity[heavy], slope[heavy] = u[n:], c * u[n:]
         balance = self._M @ slope + self._K @ u[:n]
@@ -186,8 +159,8 @@ class Ida(Implicit):
 
     # The whole Jacobian
 
-    def _places(self):
-        """Rows and columns of what `_values` holds; where a place stands several times the values add up."""
+    def _whole_pattern(self):
+        """Rows and columns of what `_jacobian` writes."""
         n, heavy, pattern = self.unknowns, self._heavy, self.system.pattern
         column = np.repeat(np.arange(n), np.diff(pattern.indptr))
         at = np.arange(n)  # row of M v' − f, and column of v; without mass that of x, whose rate v is
@@ -198,41 +171,24 @@ class Ida(Implicit):
             parts += self._links.places(heavy, at[heavy], n + len(heavy))
         return (np.concatenate(side) for side in zip(*parts, strict=True))
 
-    def _values(self, t, y, yp, c):
+    def _jacobian(self, t, y, yp, res, c, J):
         K, C = self._tangent(t, y, yp)
-        self.stats["nlu"] += 1
         slope = c * self._M.data
         if C is not None:
             slope += np.where(self._slid, c, 1.0) * C
         parts = [np.full(len(self._heavy), c), np.full(len(self._heavy), -1.0), K, slope]
         if self._links:
             parts += self._links.values(*self._at_state[1:], self._parts(y)[2])
-        return np.concatenate(parts)
+        self._write(J, np.concatenate(parts))
 
-    def _options(self):
+    def _linear_options(self):
         from sksundae.ida import IDAJacTimes, IDAPrecond
 
-        if self.linear_solver == "block":
-            self._factor = _Symmetric(self.system.pattern)
-            precond, times = IDAPrecond(self._set_up, self._precondition), IDAJacTimes(None, self._jacobian_times)
-            return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)
-        (rows, columns), size = self._places(), self.unknowns + len(self._heavy) + 2 * self._count
-        if self.linear_solver == "dense":
-            place, shape = rows * size + columns, (size, size)
-            options = dict(linsolver="dense")
-        else:
-            from scipy.sparse import csc_matrix
-
-            keys, place = np.unique(columns * size + rows, return_inverse=True)
-            shape = keys.shape
-            indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
-            pattern = csc_matrix((np.ones(shape), (keys % size).astype(np.int32), indptr), shape=(size, size))
-            options = dict(linsolver="sparse", sparsity=pattern)
-
-        def jacobian(t, y, yp, res, c, J):
-            J[:] = np.bincount(place, self._values(t, y, yp, c), J.size).reshape(shape)
-
-        return dict(**options, jacfn=jacobian)
+        if self.linear_solver != "block":
+            return self._whole(*self._whole_pattern(), self.unknowns + len(self._heavy) + 2 * self._count)
+        self._symmetric = Symmetric(self.system.pattern)
+        precond, times = IDAPrecond(self._set_up, self._precondition), IDAJacTimes(None, self._jacobian_times)
+        return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)
 
     # Consistent initial conditions
 
@@ -266,37 +222,34 @@ class Ida(Implicit):
         run.constraint_drift = self._drift = drift
         return run
 
-    def _begin(self, t, x, v):
+    def _made(self, **options):
         from sksundae.ida import IDA
 
-        n, heavy, count = self.unknowns, self._heavy, self._count
-        rows = self._state(t, np.concatenate([x, v[heavy]]), np.concatenate([v, v[heavy]]))
+        n, heavy, links = self.unknowns, len(self._heavy), 2 * self._count
+        return IDA(
+            self._residual,
+            atol=np.repeat([self.atol_position, self.atol_velocity, UNTESTED], [n, heavy, links]),
+            algebraic_idx=np.concatenate([self._bare, n + heavy + np.arange(links)]).astype(int).tolist(),
+            **options,
+        )
+
+    def _initial(self, t, x, v):
+        heavy, rest = self._heavy, np.zeros(self._count)
+        rows = self._rows(t, np.concatenate([x, v[heavy]]), np.concatenate([v, v[heavy]]))
         force = self.system.force(t, *rows)
+        slope = multipliers = np.zeros(0)
         if self._links:
             slope, multipliers = self._links.start(*rows, force)
-        else:
-            slope, multipliers = np.zeros(0), np.zeros(0)
-            if len(heavy):
-                slope = self.system.moved_by(force).ravel()[self.system.free[heavy]]
-        algebraic = np.concatenate([self._bare, n + len(heavy) + np.arange(2 * count)])
-        self._solver = IDA(
-            self._residual,
-            max_order=self.max_order,
-            rtol=self.rtol,
-            atol=np.repeat([self.atol_position, self.atol_velocity, UNTESTED], [n, len(heavy), 2 * count]),
-            algebraic_idx=algebraic.astype(int).tolist(),
-            max_num_steps=10_000_000,
-            **self._options(),
-        )
-        y = np.concatenate([x, v[heavy], multipliers, np.zeros(count)])
-        self._check(self._solver.init_step(t, y, np.concatenate([v, slope, np.zeros(2 * count)])))
+        elif len(heavy):
+            slope = self.system.moved_by(force).ravel()[self.system.free[heavy]]
+        return np.concatenate([x, v[heavy], multipliers, rest]), np.concatenate([v, slope, rest, rest])
 
     # A solver's steps
 
-    def _advance(self, stop, end):
+    def _one_step(self, stop, end):
         try:
-            found = self._check(self._solver.step(end, "onestep", float(stop) if np.isfinite(stop) else None))
-        except _Stopped:
+            found = self._found(end, "onestep", float(stop) if np.isfinite(stop) else None)
+        except Stopped:
             self._refuse_adrift()
             raise
         if self._massless or self._links:
@@ -305,7 +258,7 @@ class Ida(Implicit):
 
     def _inspect(self, t, y, yp):
         """Look at the end of a step: whether nodes without mass have a position, and how far links are off."""
-        x, v = self._state(t, y, yp)
+        x, v = self._rows(t, y, yp)
         if self._links:
             self._drift[:] = np.maximum(self._drift, self._links.drift(x, v))
         if self._massless:
@@ -329,15 +282,12 @@ class Ida(Implicit):
         drift = {"constraint_drift": run.constraint_drift.tolist()} if self._links else {}
         return {**super().spent(run), **drift}
 
-    def _hold(self, x, v):
+    def hold(self, x, v):
+        """Move a state to the nearest one with the lengths of the links."""
         if self._links:
             self._links.hold(x, v)
 
-    def _interpolated(self, t):
-        found = self._check(self._solver.step(t, "normal", None))
+    def interpolated(self, t):
+        """Unknown displacements and velocities at a time within the last step."""
+        found = self._found(t)
         return self._parts(found.y)[0], self._velocity(found.y, found.yp)
-
-    def _check(self, result):
-        if result.status < 0:
-            raise _Stopped(result.message)
-        return result

@@ -9,11 +9,6 @@ by Simpson's rule. A flag of success is not believed: the book of energies is ch
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import io
-import os
-import re
-import warnings
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -104,8 +99,10 @@ class Course:
         return float(self.worst / self.largest) if self.largest > 0.0 else 0.0
 
 
-class Implicit:
-    """A solver of SUNDIALS on one system.
+class StepObserver:
+    """A method of somebody's own steps on one system, with history rows, books, peaks and events around the steps.
+
+    A subclass brings `begin`, `step` and `interpolated`.
 
     Parameters
     ----------
@@ -120,9 +117,15 @@ class Implicit:
     """
 
     method = ""
+    takes_massless = takes_links = False
+    """Whether nodes without mass have a place in the equations, and rigid links."""
 
     def __init__(self, system, probes=(), watch=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
         self.system, self.rtol = system, rtol
+        if not self.takes_massless:
+            refuse_massless(system, self.method)
+        if system.constraints and not self.takes_links:
+            raise InputError(f'[[link]] needs method = "ida": {self.method} does not hold lengths')
         self.unknowns = len(system.free)
         if not self.unknowns:
             raise InputError(
@@ -159,25 +162,51 @@ class Implicit:
         self._outreach = np.array([body.radius + np.linalg.norm(body.core) for body in bodies])
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
-    # What a solver brings
+    # What a method brings
 
-    def _begin(self, t, x, v):
-        """Initialise the solver."""
+    def begin(self, t, x, v):
+        """Begin to move from a time, and displacement and velocity of the unknowns there; of order 1 if need be."""
         raise NotImplementedError
 
-    def _advance(self, stop, end):
+    def step(self, stop, end):
         """Take one step, not beyond ``stop``, on the way to ``end``; return the time reached."""
         raise NotImplementedError
 
-    def _interpolated(self, t):
-        """Unknown displacements and velocities at a time within the last step."""
+    def interpolated(self, t):
+        """Displacement and velocity of the unknowns at a time within the last step."""
         raise NotImplementedError
+
+    def hold(self, x, v):
+        """Move a state of all rows to the nearest one that the equations allow."""
+
+    # What it may call
+
+    def state(self, t, x, v):
+        """Displacement [m] and velocity [m/s] of all rows, shape (rows, 3), for those of the unknowns."""
+        system = self.system
+        all_x, all_v = self._reference.copy(), np.zeros((system.rows, 3))
+        all_x.ravel()[system.free], all_v.ravel()[system.free] = x, v
+        system.drive(t, all_x, all_v)
+        return all_x, all_v
+
+    def force(self, t, x, v):
+        """Force on each unknown [N] for displacement and velocity of the unknowns."""
+        return self.force_at(t, *self.state(t, x, v))
+
+    def force_at(self, t, x, v):
+        """Force on each unknown [N] at a state of all rows."""
+        self.stats["nfev"] += 1
+        rows = self.system.force(t, x, v)
+        force = rows.ravel()[self.system.free]
+        if self._wrong is None and not np.isfinite(force.sum()):
+            self._wrong = t, rows
+        return force
 
     # What it makes of them
 
     def spent(self, run):
-        """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""
-        return {**self.stats, "linear_solver": self.choice}
+        """What a run has spent, for ``run.json``."""
+        return dict(self.stats)
 
     def start(self, x=None, v=None):
         """The `Course` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
@@ -226,11 +255,8 @@ class Implicit:
         system = self.system
         self._reference = np.where(self._held, run.x, 0.0)  # motion is written over it
         run.rates = self._rates(*self._sample_of(run.time, run.x, run.v))
-        with self._reported(run), _quiet():
-            self._begin(run.time, run.x.ravel()[system.free], run.v.ravel()[system.free])
-        self._unready = self.linear_solver == "sparse"
-        if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
+        with self._told(run):
+            self.begin(run.time, run.x.ravel()[system.free], run.v.ravel()[system.free])
 
     def advance(self, run, ends):
         """Advance a run to each time of ``ends`` in turn.
@@ -275,15 +301,10 @@ class Implicit:
             stop = run.time + 1e-12 * end
         self._wrong = None
         ahead = max(end, run.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
-        with self._reported(run):
-            reached = self._advance(stop, ahead)
-            if reached == run.reached:  # SUNDIALS first returns the end of the step that it was last asked inside of
-                reached = self._advance(stop, ahead)
+        with self._told(run):
+            reached = self.step(stop, ahead)
             if not reached > run.reached:
-                raise _Stopped("no step is long enough to change the time")
-        if self._unready:
-            self._unready = False
-            ctypes.pythonapi.Py_DecRef(ctypes.py_object(self._solver))
+                raise Stopped("no step is long enough to change the time")
         run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
         run.short = run.short + 1 if run.step * MOST < end - run.time else 0
         if run.short > PATIENCE:
@@ -303,15 +324,9 @@ class Implicit:
 
     def _at(self, t):
         """Displacement and velocity of all rows at a time within the last step."""
-        system = self.system
-        x, v = self._reference.copy(), np.zeros((system.rows, 3))
-        x.ravel()[system.free], v.ravel()[system.free] = self._interpolated(t)
-        system.drive(t, x, v)
-        self._hold(x, v)
+        x, v = self.state(t, *self.interpolated(t))
+        self.hold(x, v)
         return x, v
-
-    def _hold(self, x, v):
-        """Move a state to the nearest one that the equations allow."""
 
     def _cover(self, run, end, halvings=HALVINGS):
         """Look at the run in the middle between its time and ``end``, and at the end; leave it there."""
@@ -356,7 +371,7 @@ class Implicit:
             step[driven] = v[driven] - before[driven]
             after = before + system.kick(step)
             after[driven] = v[driven]
-            self._hold(x, after)
+            self.hold(x, after)
             last, samples[1] = self._sample_of(t, x, before), self._sample_of(t, x, after)
             jump = self._kinetic(after) - self._kinetic(before), self._momentum(after) - self._momentum(before)
         return run.rates, self._rates(*samples[0]), self._rates(*last), self._rates(*samples[1]), jump
@@ -502,48 +517,26 @@ class Implicit:
         return f"use a smaller rtol than {self.rtol:g}"
 
     @contextlib.contextmanager
-    def _reported(self, run):
-        """Keep what SUNDIALS prints for the message of its failure."""
-        said = io.StringIO()
+    def _told(self, run):
+        """Tell where a method stopped, and what moves there."""
         try:
-            with contextlib.redirect_stdout(said):
-                yield
-        except _Stopped as stop:
+            yield
+        except Stopped as stop:
             if self._wrong is not None:
                 self._refuse_endless(*self._wrong)
-            reason = re.sub(r"\[\w+, Error: (-?\d+)\]", "", said.getvalue())
-            reason = " ".join(reason.split()) or str(stop)
             x, v = run.x, run.v
             force = np.where(self._held, 0.0, self.system.force(run.time, x, v))
             row = int(np.argmax(np.linalg.norm(force, axis=1)))
             raise SolverError(
                 f"{self.method} stopped at t = {run.reached:.6g} s with steps of {run.step:.3g} s: "
-                f"{reason.rstrip('.')}; "
+                f"{str(stop).rstrip('.')}; "
                 f"the largest force that moves anything is at {self.system.row_name(row)}: raise rtol = {self.rtol:g}, "
                 "or lower the stiffness that asks for such steps"
             ) from None
 
 
-class _Stopped(Exception):
-    """A solver of SUNDIALS gave up."""
-
-
-@contextlib.contextmanager
-def _quiet():
-    """Make a solver that writes no warnings to the terminal: what counts is in the message of its failure."""
-    names = ("SUNLOGGER_WARNING_FILENAME", "SUNLOGGER_ERROR_FILENAME")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, os.devnull))
-    try:
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", message="Custom sparse Jacobian approximation will be ignored")
-            yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+class Stopped(Exception):
+    """A method takes no further step; what it says is the reason."""
 
 
 def scales(system):

@@ -19,8 +19,7 @@ from scipy.sparse.linalg import splu
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics import simulation as dynamics
-from refweb.dynamics.integrators import cvode
-from refweb.dynamics.integrators import step_observer as implicit
+from refweb.dynamics.integrators import step_observer, sundials
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
@@ -155,13 +154,13 @@ def rows_of(system, unknowns):
 class Noted(Cvode):
     """Notes time, displacement and velocity at the end of each step."""
 
-    def _begin(self, t, x, v):
-        super()._begin(t, x, v)
+    def begin(self, t, x, v):
+        super().begin(t, x, v)
         self.steps = [(t, x, v)]
 
-    def _advance(self, stop, end):
-        t = super()._advance(stop, end)
-        self.steps.append((t, *self._interpolated(t)))
+    def step(self, stop, end):
+        t = super().step(stop, end)
+        self.steps.append((t, *self.interpolated(t)))
         return t
 
 
@@ -214,7 +213,7 @@ def at_a_state(system, linear_solver, t=0.0):
     solver.start()
     rng, n = np.random.default_rng(1), len(system.free)
     y = np.concatenate([1e-3 * rng.standard_normal(n), rng.standard_normal(n)])
-    x, v = solver._state(t, y)
+    x, v = solver.state(t, y[:n], y[n:])
     K, mass = system.pattern.matrix(system.stiffness(t, x, v)), system.pattern.matrix(system.mass()).toarray()
     C = system.damping(t, x, v)
     C = np.zeros((n, n)) if C is None else system.pattern.matrix(C).toarray()
@@ -257,11 +256,11 @@ def test_every_linear_solver_inverts_the_same_matrix(order, consistent, lossy):
             expected = J @ r
         elif name == "dense":
             found = np.empty((2 * n, 2 * n))
-            solver._dense_jacobian(0.0, y, None, found)
+            solver._jacobian(0.0, y, None, found)
             expected = J
         else:
-            pattern = solver._whole_pattern()
-            solver._sparse_jacobian(0.0, y, None, pattern.data)
+            pattern = solver._linear_options()["sparsity"]
+            solver._jacobian(0.0, y, None, pattern.data)
             found, expected = pattern.toarray(), J
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
@@ -285,7 +284,7 @@ def test_the_jacobian_is_that_of_the_right_side(consistent):
 
 def test_what_is_chosen():
     """Small nets are dense; large ones factorize only where steps are long, which costs nothing in accuracy."""
-    assert small(size=3).free.size <= cvode.DENSE < small(size=8).free.size
+    assert small(size=3).free.size <= sundials.DENSE < small(size=8).free.size
     solver = Cvode(small(size=3))
     assert solver.linear_solver == "dense" and solver.choice.startswith("dense, for 12 unknowns, at most")
     system = small(size=8)
@@ -489,7 +488,7 @@ def test_an_open_book_is_repeated_with_a_tenth_of_the_tolerance(tmp_path, monkey
     drifts = drift_at(1e-4), drift_at(1e-5)
     assert drifts[1] < 0.7 * drifts[0]
     expected = refweb.run(scene(ball(), rtol=1e-5))
-    monkeypatch.setattr(implicit, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
+    monkeypatch.setattr(step_observer, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
     kept, written = refweb.run(scene(ball(), rtol=1e-4)), refweb.run(scene(ball(), rtol=1e-4), out=tmp_path / "out")
     for solution in (kept, written):
         assert solution.results == expected.results and solution.solver == expected.solver
@@ -649,7 +648,7 @@ def test_interrupted_in_a_callback(here, tmp_path, monkeypatch, capsys, linear_s
     assert len(list((tmp_path / "out" / "frames").glob("web_*.vtu"))) == (len(history) + 1) // 2
 
 
-CALLBACKS = [("dense", "_dense_jacobian"), ("sparse", "_sparse_jacobian"), ("block", "_set_up")]
+CALLBACKS = [("dense", "_jacobian"), ("sparse", "_jacobian"), ("block", "_set_up")]
 CALLBACKS += [("block", "_precondition"), ("block", "_jacobian_times"), *((name, "_right_side") for name in SOLVERS)]
 
 
@@ -736,8 +735,11 @@ def test_a_run_that_would_not_end(monkeypatch):
         ran(small(size=3), [END], thrown(small(size=3)))
 
 
-@pytest.mark.parametrize("linear_solver", SOLVERS)
-def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, linear_solver):
+NAMED = [*((Cvode, name) for name in SOLVERS), *((Ida, name) for name in ("block", "sparse", "dense"))]
+
+
+@pytest.mark.parametrize("method, linear_solver", NAMED)
+def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, method, linear_solver):
     """Where the forces on a node have no value from some time on, no step is taken over it."""
     own, system = System.forces, small(size=3)
     (node, *_), from_now = np.flatnonzero(~system.supported.all(axis=1))[::-1], 0.3 * END
@@ -748,7 +750,7 @@ def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, linear_solver)
         return force, out
 
     monkeypatch.setattr(System, "forces", forces)
-    solver = Cvode(system, linear_solver=linear_solver)
+    solver = method(system, linear_solver=linear_solver)
     run = solver.start(v=thrown(system))
     with pytest.raises(refweb.SolverError) as caught:
         solver.advance(run, [END])

@@ -131,7 +131,7 @@ def test_jacobian_is_the_slope_of_the_residual(links):
         return r
 
     J = np.empty((size, size))
-    solver._options()["jacfn"](0.0, y, yp, None, c, J)
+    solver._jacobian(0.0, y, yp, None, c, J)
     steps = np.array([1e-2, 5e-3, 2.5e-3])
     rest = [np.linalg.norm(residual(y + h * d, yp + h * c * d) - residual(y, yp) - h * (J @ d)) for h in steps]
     assert abs(np.polyfit(np.log(steps), np.log(rest), 1)[0] - 2.0) < 0.1

@@ -1,0 +1,207 @@
+"""What CVODE and IDA share: a solver of SUNDIALS that takes the steps, and the linear systems in them.
+
+`LINEAR_SOLVERS` says how these are solved. By "block" displacements are eliminated by hand, and what is left, a matrix
+of half the size or less, is factorized as the preconditioner of GMRES. Where that inverts the Jacobian exactly, one
+iteration does, and nothing is multiplied: what is to be inverted is the Jacobian times a vector that is known.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import io
+import os
+import re
+import warnings
+
+import numpy as np
+
+from ...system.factorization import Factor
+from .step_observer import StepObserver, Stopped
+
+LINEAR_SOLVERS = {
+    "block": "GMRES with the true Jacobian, preconditioned by the block elimination",
+    "sparse": "SuperLU_MT on the whole Jacobian, values in its fixed pattern",
+    "dense": "LU of the whole Jacobian",
+    "fixed-point": "none: corrector iterations only, for steps that an explicit method could take",
+}
+DENSE = 80
+"""Unknown displacements up to which a dense factorization is the fastest."""
+
+
+class Sundials(StepObserver):
+    """A solver of SUNDIALS on one system.
+
+    A subclass brings ``_made(**options)``, the solver of sksundae at the tolerances, ``_initial(t, x, v)``, what its
+    ``init_step`` takes, and ``_linear_options()``, the linear solver.
+
+    Parameters
+    ----------
+    system, probes, sums, events, rtol, atol_position, atol_velocity
+        See `refweb.dynamics.integrators.step_observer.StepObserver`.
+
+    Attributes
+    ----------
+    linear_solver, choice : str
+        Which linear solver is used, and why.
+    """
+
+    linear_solver = choice = ""
+
+    def __init__(self, system, *observed, **tolerances):
+        super().__init__(system, *observed, **tolerances)
+        self._product, self._exact, self._true = None, False, False
+
+    def spent(self, course):
+        """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""
+        return {**super().spent(course), "linear_solver": self.choice}
+
+    # The linear solver
+
+    def _choose(self, name, large, why=""):
+        """Take the linear solver that is asked for; of "auto" a dense one for few unknowns, else ``large``."""
+        if name != "auto":
+            self.linear_solver, self.choice = name, f"{name}, as asked for: {LINEAR_SOLVERS[name]}"
+            return
+        few = self.unknowns <= DENSE
+        name = "dense" if few else large
+        size = f"{self.unknowns} unknowns, {'at most' if few else 'more than'} {DENSE}"
+        self.linear_solver, self.choice = name, f"{name}, for {size}{why}: {LINEAR_SOLVERS[name]}"
+
+    def _whole(self, rows, columns, size):
+        """Options for a Jacobian whose values stand at these rows and columns, where several of a place add up."""
+        if self.linear_solver == "dense":
+            self._places = rows * size + columns
+            return dict(linsolver="dense", jacfn=self._jacobian)
+        from scipy.sparse import csc_matrix
+
+        keys, self._places = np.unique(columns * size + rows, return_inverse=True)
+        indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
+        pattern = csc_matrix((np.ones(keys.shape), (keys % size).astype(np.int32), indptr), shape=(size, size))
+        return dict(linsolver="sparse", sparsity=pattern, jacfn=self._jacobian)
+
+    def _write(self, J, values):
+        """Write the values of `_whole` to a dense matrix, or to the values of a sparse one."""
+        self.stats["nlu"] += 1
+        J[:] = np.bincount(self._places, values, J.size).reshape(J.shape)
+
+    def _factorize(self, values, definite, able=True):
+        """Factorize a matrix of the system's pattern for a preconditioner.
+
+        Where it is not definite, or not even ``able`` to be that, what ``definite()`` gives takes its place, and
+        `_true` is false.
+        """
+        system, self._true = self.system, able
+        self.stats["nlu"] += 1
+        if not system.symmetric:
+            self._factor = Unsymmetric(system.pattern, values)
+            return
+        self._factor = self._symmetric
+        if able:
+            self._factor.update(values)
+            self._true = not self._factor.negative_pivots()
+        if not self._true:
+            self.stats["nlu"] += 1
+            self._factor.update(definite())
+
+    def _inverts(self, z, exact):
+        """Write to z what is known to be the solution, if anything is; ``exact`` is whether J is what is factorized."""
+        self._exact, product, self._product = exact, self._product, None
+        if product is None or not exact:
+            return False
+        z[:] = product  # what is to be solved for is J times it
+        return True
+
+    def _multiplied(self, u):
+        """Note what J is multiplied with; whether its product may be left out, since the preconditioner inverts it."""
+        self._product = u.copy()
+        return self._exact
+
+    # Steps
+
+    def begin(self, t, x, v):
+        """Make the solver at a state of the unknowns."""
+        options = dict(max_order=self.max_order, rtol=self.rtol, max_num_steps=10_000_000, **self._linear_options())
+        with _heard(), _quiet():
+            self._solver = self._made(**options)
+            _checked(self._solver.init_step(t, *self._initial(t, x, v)))
+        self._reached, self._unready = t, self.linear_solver == "sparse"
+        if self._unready:  # SUNDIALS cannot free what SuperLU_MT has not factorized yet: a run may end before that
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
+
+    def step(self, stop, end):
+        """One step of the solver, not beyond ``stop``, on the way to ``end``."""
+        with _heard():
+            reached = self._one_step(stop, end)
+            if reached == self._reached:  # SUNDIALS first returns the end of the step that it was last asked inside of
+                reached = self._one_step(stop, end)
+        if self._unready:
+            self._unready = False
+            ctypes.pythonapi.Py_DecRef(ctypes.py_object(self._solver))
+        self._reached = reached
+        return reached
+
+    def _one_step(self, stop, end):
+        """Take a step; return its time."""
+        return float(self._found(end, "onestep", float(stop) if np.isfinite(stop) else None).t)
+
+    def _found(self, t, mode="normal", stop=None):
+        """What the solver finds at a time, or at the end of a step towards it."""
+        return _checked(self._solver.step(t, mode, stop))
+
+
+class Symmetric(Factor):
+    """LDLᵀ solved once and not refined, for preconditioners and for the mass matrix, whose condition is small."""
+
+    def apply(self, b):
+        """Solution of A y = b."""
+        return self._solver.solve(b)
+
+
+class Unsymmetric:
+    """LU as a preconditioner, where an effect makes the tangent unsymmetric."""
+
+    def __init__(self, pattern, values):
+        from scipy.sparse.linalg import splu
+
+        self._lu = splu(pattern.matrix(values), permc_spec="MMD_AT_PLUS_A")
+
+    def apply(self, b):
+        """Solution of A y = b."""
+        return self._lu.solve(b)
+
+
+def _checked(result):
+    if result.status < 0:
+        raise Stopped(result.message)
+    return result
+
+
+@contextlib.contextmanager
+def _heard():
+    """Keep what SUNDIALS prints, as the reason for which it stopped."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said):
+            yield
+    except Stopped as stop:
+        reason = re.sub(r"\[\w+, Error: (-?\d+)\]", "", said.getvalue())
+        raise Stopped(" ".join(reason.split()) or str(stop)) from None
+
+
+@contextlib.contextmanager
+def _quiet():
+    """Make a solver that writes no warnings to the terminal: what counts is in the message of its failure."""
+    names = ("SUNLOGGER_WARNING_FILENAME", "SUNLOGGER_ERROR_FILENAME")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, os.devnull))
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Custom sparse Jacobian approximation will be ignored")
+            yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
