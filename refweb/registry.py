@@ -58,7 +58,7 @@ class Method(NamedTuple):
 _STEPS, _TOLERANCES = ("safety", "step_size"), ("rtol", "atol_position", "atol_velocity")
 INTEGRATORS = {
     "central-difference": Method("refweb.dynamics.integrators.central_difference:CentralDifference", _STEPS),
-    "explicit": Method("refweb.dynamics.integrators.splitting:Nystrom", (*_STEPS, "order")),
+    "explicit": Method("refweb.dynamics.integrators.splitting:Splitting", (*_STEPS, "order")),
     "cvode": Method("refweb.dynamics.integrators.cvode:Cvode", (*_TOLERANCES, "family", "max_order", "linear_solver")),
     "ida": Method("refweb.dynamics.integrators.ida:Ida", (*_TOLERANCES, "max_order", "linear_solver")),
 }

@@ -83,10 +83,10 @@ def stop_behind(monkeypatch, end, error=KeyboardInterrupt):
     """Make runs in the main thread stop with an error behind a time; returns what takes that back."""
 
     def stopping(own):
-        def advance(self, run, ends):
-            if run.time > end and threading.current_thread() is threading.main_thread():
+        def advance(self, course, times):
+            if course.time > end and threading.current_thread() is threading.main_thread():
                 raise error
-            return own(self, run, ends)
+            return own(self, course, times)
 
         return advance
 
@@ -215,15 +215,15 @@ def test_a_repeated_run_goes_on_with_its_accuracy(tmp_path, monkeypatch):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     refweb.run(case, out=whole)
     assert "repeated with safety = 0.25" in told(whole)["warnings"][0]
-    own, made = central_difference.CentralDifference.rows, []
+    own, made = central_difference.CentralDifference.advance, []
 
-    def rows(self, run, ends):
-        if self.safety == 0.25 and run.time > 0.0105:
+    def advance(self, course, times):
+        if self.safety == 0.25 and course.time > 0.0105:
             raise KeyboardInterrupt
-        return own(self, run, ends)
+        return own(self, course, times)
 
     with monkeypatch.context() as patch:
-        patch.setattr(central_difference.CentralDifference, "rows", rows)
+        patch.setattr(central_difference.CentralDifference, "advance", advance)
         with pytest.raises(KeyboardInterrupt):
             refweb.run(case, out=cut)
     with monkeypatch.context() as patch:
@@ -435,15 +435,15 @@ def forbid(folder):
 @pytest.mark.parametrize("spoil", [take_away, make_a_file, forbid])
 def test_folder_that_is_spoilt_while_a_run_writes_it(tmp_path, monkeypatch, capsys, spoil):
     refweb.run(scene(), out=tmp_path / "whole")
-    own = central_difference.CentralDifference.rows
+    own = central_difference.CentralDifference.advance
 
-    def rows(self, run, ends):
-        if 0.0105 < run.time < 0.0125 and out.exists() and (out / "frames").is_dir():
+    def advance(self, course, times):
+        if 0.0105 < course.time < 0.0125 and out.exists() and (out / "frames").is_dir():
             spoil(out)
-        return own(self, run, ends)
+        return own(self, course, times)
 
     out = tmp_path / "out"
-    monkeypatch.setattr(central_difference.CentralDifference, "rows", rows)
+    monkeypatch.setattr(central_difference.CentralDifference, "advance", advance)
     assert main(["run", str(tmp_path / "whole" / "scene.toml"), "--out", str(out)]) == 1
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and "cannot be written any more" in err and "internal" not in err

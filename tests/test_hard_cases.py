@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import refweb
-from refweb.dynamics.integrators.explicit_loop import DRIFT
+from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.errors import OpenBook
 from validation.hard_cases import hard_cases
 from validation.hard_cases.balances import energy_left, momentum_left, unbalanced

@@ -34,12 +34,13 @@ TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
 DYNAMICS = {"dynamics", "dynamics.simulation", "results.probes", "dynamics.integrators"}
-DYNAMICS |= {"dynamics.integrators.explicit_loop"}
+DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
+EXPLICIT = {f"dynamics.integrators.{name}" for name in ("central_difference", "explicit_loop", "step_bound")}
 SUNDIALS = TANGENT | {"dynamics.integrators.step_observer", "dynamics.integrators.sundials"}
 METHOD = {
     "newton": NEWTON | {"statics.simulation"},
     "relaxation": STATICS | {"statics.simulation", "statics.dynamic_relaxation"},
-    "central-difference": DYNAMICS | {"dynamics.integrators.central_difference"},
+    "central-difference": DYNAMICS | EXPLICIT,
     "cvode": DYNAMICS | SUNDIALS | {"dynamics.integrators.cvode"},
     "ida": DYNAMICS | SUNDIALS | {"dynamics.integrators.ida"},
 }

@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 import refweb
-from refweb.dynamics.integrators.explicit_loop import DRIFT
+from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.registry import EFFECTS
 from refweb.scene import SHIPPED
 

@@ -69,9 +69,9 @@ def decided(scene, system):
         return _of(scene, "cvode", rtol=tolerance, family="bdf"), why
     if digits >= MANY:
         try:
-            from .integrators.splitting import Nystrom
+            from .integrators.splitting import Splitting
 
-            Nystrom(system)
+            Splitting(system)
             return _of(scene, "explicit"), f"{digits} digits, and forces that follow from displacement alone: {price}"
         except InputError:
             if digits >= MOST:

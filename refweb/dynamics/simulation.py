@@ -11,11 +11,13 @@ import numpy as np
 
 from ..errors import InputError, OpenBook
 from ..net.tension_laws import SMOOTH
+from ..registry import INTEGRATORS, load
 from ..results import probes
 from ..results.observables import LINE, NODAL, TOTAL, Observe, Result
 from ..results.solution import SOLVER
 from ..results.state import State, floor_remark, strength_remark
-from .integrators.explicit_loop import AT_ONCE, MOST, SIDE, TIME
+from .integrators.events import Event
+from .integrators.integrator import MAX_STEPS_PER_ROW, History, Sum
 
 _VECTORS = ("momentum", "support_impulse")
 
@@ -43,14 +45,15 @@ def _outer(system, rows):
 
 
 def probe_of(observable, system):
-    """An observable as a probe: (kernel, rows, data)."""
+    """An observable as a `refweb.results.probes.Probe`, without a sign."""
     net, quantity = system.net, observable.quantity
     if quantity == "slack_fraction":
-        return probes.slack_fraction, [], net.slackness[:, None]
+        return probes.Probe(probes.slack_fraction, [], net.slackness[:, None])
     if quantity in LINE:
         elements = np.arange(len(net.line)) if observable.line is None else np.flatnonzero(net.line == observable.line)
         scale = 1.0 / net.area if quantity == "stress" else np.ones(len(net.cells))
-        return probes.line, [1 if quantity == "strain" else 0, elements[0], elements[-1] + 1], scale[:, None]
+        column = 1 if quantity == "strain" else 0
+        return probes.Probe(probes.line, [column, elements[0], elements[-1] + 1], scale[:, None])
     component = probes.MAGNITUDE if observable.component is None else observable.component
     rows = observable.rows(system)
     consecutive = len(rows) == 1 or (np.diff(rows) == 1).all()
@@ -61,10 +64,10 @@ def probe_of(observable, system):
         if observable.body is not None:
             weight[:] = -1.0
             rest = _outer(system, rows)
-        return probes.reaction, numbers, np.hstack([weight, rest])
+        return probes.Probe(probes.reaction, numbers, np.hstack([weight, rest]))
     kernel = probes.velocity if quantity == "velocity" else probes.displacement
     data = net.points[rows] if quantity == "position" else np.zeros((len(rows), 3))
-    return kernel, numbers, data
+    return probes.Probe(kernel, numbers, data)
 
 
 def started(system, x=None):
@@ -99,7 +102,7 @@ def blocks(solver, run, times, stops, first=0):
 
     Yields
     ------
-    (first row, rows of the solver)
+    (first row, `refweb.dynamics.integrators.integrator.History`)
 
     Raises
     ------
@@ -122,9 +125,6 @@ def blocks(solver, run, times, stops, first=0):
 
 SPREAD = 3.0
 """± of a result over its error if the method has its order."""
-FINER = 10.0
-"""How much smaller the tolerance of the twin of an implicit run is: by less, both may take the same steps, which are
-changed by factors of up to 2."""
 
 
 def with_errors(results, twin, own, other, order=2.0):
@@ -177,15 +177,15 @@ class _Twin:
     """A run of a smaller error: beside an explicit run, whose compiled loop needs no interpreter, in a thread of its
     own; after an implicit one."""
 
-    def __init__(self, motion, accuracy, wanted):
-        self._motion, self._accuracy, self._wanted = motion, accuracy, wanted
-        self._beside = wanted and motion.explicit
+    def __init__(self, motion, wanted):
+        self._motion, self._wanted = motion, wanted
+        self._beside = wanted and motion._solver.beside
         self._stop = threading.Event()
 
     def __enter__(self):
         self._thread, self._ended, self._failure = None, None, None
         if self._beside:  # the solver is made here: a system is used by one thread at a time
-            solver = self._motion.solver(self._accuracy, twin=True)
+            solver = self._motion._solver.refined()
             solver.breathe = self._breathe
             self._thread = threading.Thread(target=self._run, args=(solver,), daemon=True)
             self._thread.start()
@@ -203,7 +203,7 @@ class _Twin:
     def _run(self, solver=None):
         motion = self._motion
         try:
-            solver = solver or motion.solver(self._accuracy, twin=True)
+            solver = solver or motion._solver.refined()
             run = solver.start(*motion.begin)
             rows = []
             for _, history in blocks(solver, run, *motion._times()):
@@ -265,15 +265,16 @@ class Motion:
         self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in self.energies]
         self.columns += [f"{name}_{axis} [N s]" for name in _VECTORS for axis in "xyz"]
-        self.explicit = scene.solve.method in ("central-difference", "explicit")
+        self._method = INTEGRATORS[scene.solve.method]
         step, row = scene.solve.step_size, min(scene.output.interval, scene.solve.duration)
-        if step is not None and row > MOST * step:
+        if step is not None and row > MAX_STEPS_PER_ROW * step:
             raise InputError(
-                f"[solve] step_size = {step:g} must be ≥ {row / MOST:g} [s]: a row takes at most {MOST:g} steps"
+                f"[solve] step_size = {step:g} must be ≥ {row / MAX_STEPS_PER_ROW:g} [s]: a row takes at most "
+                f"{MAX_STEPS_PER_ROW:g} steps"
             )
         self._own = self._hidden()
         self._events = [self._event(event) for event in scene.event]
-        self._accuracy = scene.solve.safety if self.explicit else scene.solve.rtol
+        self._accuracy = getattr(scene.solve, self._method.knob)
         self._first, self._repeated, self._missing, self._kept = self._accuracy, 0, {}, kept
         if kept is not None:
             self._accuracy, self._repeated = float(kept["accuracy"]), int(kept["repeated"])
@@ -305,84 +306,69 @@ class Motion:
         return own
 
     def _event(self, event):
-        """An event as (probe, level, rising), the probe None where it is an observable's."""
+        """An event, its slot yet to be given, and its own probe, None where it is an observable's."""
         system = self.system
         if event.kind == "contact":
             rows = [body.row for body in system.net.bodies if event.body in (None, body.name)]
-            return (probes.push, rows, _outer(system, rows)), 0.0, AT_ONCE
+            probe = probes.Probe(probes.push, rows, _outer(system, rows))
+            return Event(-1, 0.0, rising=True, stop=event.stop, at_once=True), probe
         if event.kind == "taut":
             probe = probe_of(Observe(name="_", quantity="strain", line=event.line), system)
-            return probe, float(system.net.slackness[probe[1][1]]), True
-        return None, event.value, False
+            return Event(-1, float(system.net.slackness[probe.rows[1]]), rising=True, stop=event.stop), probe
+        return Event(-1, event.value, stop=event.stop), None
 
-    def solver(self, accuracy, twin=False):
-        """The solver of the scene at a safety, or rtol; the twin's error is smaller."""
+    def solver(self, accuracy):
+        """The integrator of the scene at a safety, or rtol."""
         signs, solve = {"max": 1, "min": -1, "final": 0}, self.scene.solve
-        probed = [(*probe_of(o, self.system), signs[o.reduce]) for o in self.probed]
-        probed += [(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()]
+        probed = [probe_of(o, self.system)._replace(sign=signs[o.reduce]) for o in self.probed]
+        probed += [probes.Probe(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()]
         slots = {o.name: i for i, o in enumerate(self.probed)}
-        for event, (probe, _, _) in zip(self.scene.event, self._events, strict=True):
+        for event, (_, probe) in zip(self.scene.event, self._events, strict=True):
             if probe is not None:
                 slots[event] = len(probed)
-                probed.append((*probe, 0))
+                probed.append(probe)
         slots |= {o.name: len(probed) + i for i, o in enumerate(self.watched)}
-        table = [
-            (slots[event if probe is not None else event.observe], level, rising, event.stop)
-            for event, (probe, level, rising) in zip(self.scene.event, self._events, strict=True)
+        events = [
+            found._replace(slot=slots[event if probe is not None else event.observe])
+            for event, (found, probe) in zip(self.scene.event, self._events, strict=True)
         ]
-        watch = [(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched]
-        if self.explicit:
-            steps = dict(safety=accuracy, step_size=solve.step_size, finer=math.sqrt(2.0) if twin else 1.0)
-            if solve.method == "explicit":
-                from .integrators.splitting import Nystrom
-
-                return Nystrom(self.system, probed, watch, table, order=solve.order, **steps)
-            from .integrators.central_difference import CentralDifference
-
-            return CentralDifference(self.system, probed, watch, table, **steps)
-        keys = {"max_order": solve.max_order, "linear_solver": solve.linear_solver}
-        share = 1.0 / FINER if twin else 1.0
-        keys |= {key: share * getattr(solve, key) for key in ("atol_position", "atol_velocity") if getattr(solve, key)}
-        if solve.method == "ida":
-            from .integrators.ida import Ida
-
-            return Ida(self.system, probed, watch, table, rtol=share * accuracy, **keys)
-        from .integrators.cvode import Cvode
-
-        return Cvode(self.system, probed, watch, table, rtol=share * accuracy, family=solve.family, **keys)
+        sums = [Sum(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched]
+        keys = {key: getattr(solve, key) for key in self._method.keys if getattr(solve, key) is not None}
+        keys[self._method.knob] = accuracy
+        return load(self._method.integrator)(self.system, probed, sums, events, **keys)
 
     def table(self, history):
         """Rows of the solver as rows of ``history.csv``."""
-        return history @ self._columns
+        return history.values @ self._columns
 
     def _places(self):
         """What each column of ``history.csv`` is of the solver's columns, shape (solver columns, columns)."""
-        first = 1 + len(self.probed) + len(self._own) + sum(probe is not None for probe, *_ in self._events)
-        sums = len(self.system.families) + 3
-        count = first + sums + 6
-        columns = [np.eye(count)[0]]
+        probed = len(self.probed) + len(self._own) + sum(probe is not None for _, probe in self._events)
+        unit = History.empty(0, probed, self.system.families)
+        unit = History(unit.names, np.eye(len(unit.names)), probed)
+        columns = [unit.time]
         for o in self.scene.observables:
-            column = np.zeros(count)
             if o in self.probed:
-                column[1 + self.probed.index(o)] = 1.0
+                columns.append(unit.probes[:, self.probed.index(o)])
             else:
-                column[first : first + sums] = _weights(self.system, o.quantity)
-            columns.append(column)
-        for name in self.energies:
-            columns.append(np.zeros(count))
-            columns[-1][first : first + sums] = _weights(self.system, name)
-        return np.column_stack([*columns, np.eye(count)[:, -6:]])
+                columns.append(unit.sums @ _weights(self.system, o.quantity))
+        columns += [unit.sums @ _weights(self.system, name) for name in self.energies]
+        return np.column_stack([*columns, unit.momentum, unit.impulse])
 
     def results(self, run, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
-        results, net = {}, self.system.net
+        results, net, extremes = {}, self.system.net, run.extremes
         state = State(self.system, run.time, run.x, run.v)
+
+        def extreme(at):
+            return float(extremes.values[at]), float(extremes.times[at]), int(extremes.places[at])
+
         for i, o in enumerate(self.scene.observables):
             value, when, where = float(last[1 + i]), run.time, None
             if o in self.probed:
                 at = self.probed.index(o)
                 if o.reduce != "final":
-                    value, when, where = float(run.peaks[at]), float(run.times[at]), int(run.places[at])
+                    value, when, where = extreme(at)
                 elif o.quantity != "slack_fraction":
                     where = o.value(state).where
                 if o.quantity in LINE and o.reduce != "final":
@@ -391,8 +377,7 @@ class Motion:
                 if summed or o.body is not None:
                     where = None
             elif o in self.watched and o.reduce != "final":
-                at = len(run.peaks) - len(self.watched) + self.watched.index(o)
-                value, when = float(run.peaks[at]), float(run.times[at])
+                value, when, _ = extreme(len(extremes.values) - len(self.watched) + self.watched.index(o))
             results[o.name] = Result(value, None, o.unit, when, where)
         return results
 
@@ -421,7 +406,7 @@ class Motion:
                 break
             before, steps = missing, solution.solver["nsteps"]
             self._missing = before
-            accuracy *= self._climb(max(falling))
+            accuracy *= self._solver.next_knob(max(falling))
             self._again(accuracy, folder)
             accuracy = self._closed(accuracy, folder, tell)
             if solution.solver["nsteps"] < 1.1 * steps:  # something else limits them: nothing was changed
@@ -429,19 +414,9 @@ class Motion:
         for name, share in missing_digits(solution.reduced, scene.accuracy.digits).items():
             falls = before.get(name, np.inf) > STUCK * share
             why = "it would take more still" if falls else STAYS
-            known = f"its ± is {share:.3g} times what they allow with {self._key} = {accuracy:g}; {why}"
+            known = f"its ± is {share:.3g} times what they allow with {self._method.knob} = {accuracy:g}; {why}"
             known = known if np.isfinite(share) else "its ± is not known"
             solution.warnings.append(f"{name} has not the {scene.accuracy.digits} digits asked for: {known}")
-
-    def _climb(self, share):
-        """Factor on safety, or rtol, for errors that are ``share`` times what they may be."""
-        if self.explicit:
-            return min(max(0.8 * share ** (-1.0 / self._solver.order), 0.125), 0.5)
-        return min(max(0.5 * share**-1.5, 0.01), 0.1)
-
-    @property
-    def _key(self):
-        return "safety" if self.explicit else "rtol"
 
     def _again(self, accuracy, folder):
         """Forget what was computed, for a run of another accuracy."""
@@ -458,15 +433,15 @@ class Motion:
         scene, solution = self.scene, self.solution
         for attempt in range(self._repeated, 3):
             self._repeated = attempt
-            text = "running" if accuracy == self._first else f"running with {self._key} = {accuracy:g}"
-            with _Twin(self, accuracy, scene.accuracy.error == "twin") as twin:
+            text = "running" if accuracy == self._first else f"running with {self._method.knob} = {accuracy:g}"
+            with _Twin(self, scene.accuracy.error == "twin") as twin:
                 try:
                     results, run = self._run(self._solver, folder, functools.partial(tell, text))
                 except OpenBook as error:
                     if attempt == 2 or scene.solve.step_size is not None:
                         raise
-                    accuracy *= 0.5 if self.explicit else 0.1
-                    solution.warnings.append(f"{error}; repeated with {self._key} = {accuracy:g}")
+                    accuracy *= self._solver.retry
+                    solution.warnings.append(f"{error}; repeated with {self._method.knob} = {accuracy:g}")
                     self._again(accuracy, folder)
                     continue
                 tell("finding errors by a twin run", 1.0)
@@ -477,13 +452,10 @@ class Motion:
             which = "the run" if run.stopped else "its twin of a smaller error"
             solution.warnings.append(f"no errors are known: an event ends {which} and not the other of the two")
         elif other:
-            less = FINER ** (-2.0 / 3.0)
-            if self.explicit:
-                less = (run.nsteps / run.time / (ended.nsteps / ended.time)) ** 2 if ended.nsteps else 0.5
-            factor = 1.0 / (1.0 - less)
+            factor = 1.0 / (1.0 - self._solver.error_share(run, ended))
             own = np.array(self.rows) if folder is None else folder.rows()
             solution.reduced = with_errors(results, other, own[:, : rows.shape[1]], rows, factor)
-            for found, width, time in zip(solution.events, run.events[:, SIDE], ended.events[:, TIME], strict=True):
+            for found, width, time in zip(solution.events, run.events["width"], ended.events["time"], strict=True):
                 if found["time"] is not None and np.isfinite(time):
                     off = abs(found["time"] - float(time))
                     found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
@@ -507,8 +479,7 @@ class Motion:
         times, stops = self._times()
         run, ahead = self._set_off(solver, folder, times, stops)
         tell(ahead / len(times))
-        if self.explicit:
-            solver.breathe = lambda t: tell(t / times[-1])
+        solver.breathe = lambda t: tell(t / times[-1])
         try:
             for first, history in blocks(solver, run, times, stops, ahead):
                 table = self.table(history)
@@ -543,15 +514,15 @@ class Motion:
 
     def _note(self, run):
         """Take the state of a run over into the solution."""
-        self._peaks = dict(zip(self._own, run.peaks[len(self.probed) :], strict=False))
+        self._peaks = dict(zip(self._own, run.extremes.values[len(self.probed) :], strict=False))
         if "utilisation" in self._peaks:
-            at = int(run.places[len(self.probed) + list(self._own).index("utilisation")])
+            at = int(run.extremes.places[len(self.probed) + list(self._own).index("utilisation")])
             self.solution.utilisation = float(self._peaks["utilisation"]), int(self.system.net.line[at])
         if np.isfinite(run.x).all():
             self.solution.state = State(self.system, run.time, run.x.copy(), run.v.copy())
         self.solution.events = [
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
-            for event, time in zip(self.scene.event, run.events[:, TIME], strict=True)
+            for event, time in zip(self.scene.event, run.events["time"], strict=True)
         ]
         figures = dict(nsteps=run.nsteps, energy_drift=run.drift, **self._solver.spent(run))
         self.solution.solver = {**SOLVER, "method": self.scene.solve.method, **self._choice, **figures}

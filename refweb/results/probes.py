@@ -8,7 +8,10 @@ element it stands at to ``where[0]``.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
+import numpy as np
 from numba import types
 
 from ..kernels import MATRIX, kernel
@@ -20,6 +23,27 @@ MAGNITUDE = 3
 """Component number of a magnitude."""
 PLACE = 1
 """Value of ``where[1]`` that asks a probe for the place of its value as well."""
+
+
+class Probe(NamedTuple):
+    """One scalar of the state to look at.
+
+    Attributes
+    ----------
+    kernel : callable
+        Compiled function of the signature `PROBE`.
+    rows : sequence of int
+        The probe's own numbers, see its kernel.
+    data : ndarray of float, two-dimensional
+        More of them.
+    sign : float
+        1 for the largest value of all steps, −1 for the smallest, 0 for neither.
+    """
+
+    kernel: Callable
+    rows: list | np.ndarray
+    data: np.ndarray
+    sign: float = 0.0
 
 
 @kernel()

@@ -125,7 +125,7 @@ class Dynamics:
         from ..dynamics.simulation import probe_of, row_times
 
         self.system, self.observable, self.times = system, observable, row_times(scene)
-        self.probes = [(*probe_of(observable, system), 0)]
+        self.probes = [probe_of(observable, system)]
         self._price, self.begin = 0.0, (None, None)
         self._linear = system.rows - system.net.spins  # the others are angles
         if scene.start_folder is not None:
@@ -142,9 +142,9 @@ class Dynamics:
         name, _, detail = trial.method.partition("-")
         setting = {trial.key: trial.value}
         if name == "explicit":
-            from ..dynamics.integrators.splitting import Nystrom
+            from ..dynamics.integrators.splitting import Splitting
 
-            return Nystrom(self.system, self.probes, order=int(detail), **setting)
+            return Splitting(self.system, self.probes, order=int(detail), **setting)
         if name == "cvode":
             from ..dynamics.integrators.cvode import Cvode
 
@@ -204,7 +204,7 @@ class Dynamics:
         run, table = solver.start(*self.begin), []
         began = time.process_time()
         for _, history in blocks(solver, run, times, [len(times) - 1]):
-            table.append(history[:, 1])
+            table.append(history.probes[:, 0])
             _check(deadline)
         trial.cpu_s = time.process_time() - began
         if trial.key == "safety":

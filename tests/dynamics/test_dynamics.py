@@ -129,7 +129,7 @@ def test_momentum_and_angular_momentum_of_a_free_web(mesh):
     solver = CentralDifference(system, safety=0.1)
     v = np.cross([1.0, -2.0, 20.0], 1.05 * points) + [0.3, -0.2, 0.5]
     run = solver.start(0.05 * points, v)
-    position, lines = points + run.x, np.abs(run.saved[2]).max()
+    position, lines = points + run.x, np.abs(run.force).max()
     momentum, turning = (mass * v).sum(axis=0), np.cross(position, mass * v).sum(axis=0)
     for end in np.linspace(0.01, 0.1, 10):
         solver.advance(run, [end])
@@ -148,8 +148,8 @@ def test_free_fall():
     np.testing.assert_allclose(run.x, np.tile(0.5 * gravity * 0.1**2, (system.rows, 1)), rtol=0, atol=1e-12 * 0.05)
     np.testing.assert_allclose(run.v, np.tile(gravity * 0.1, (system.rows, 1)), rtol=0, atol=1e-12)
     kinetic = 0.5 * system.net.mass.sum() * (gravity @ gravity) * 0.1**2
-    np.testing.assert_allclose(rows[-1, 3], kinetic, rtol=1e-12)
-    np.testing.assert_allclose(rows[:, 1:4].sum(axis=1), 0.0, atol=1e-12 * kinetic)
+    np.testing.assert_allclose(rows.energies[-1, -1], kinetic, rtol=1e-12)
+    np.testing.assert_allclose(rows.energies.sum(axis=1), 0.0, atol=1e-12 * kinetic)
     assert run.drift < 1e-12
 
 
@@ -249,7 +249,7 @@ def scene(duration=0.02, interval=1e-3, frames=5, error="none", **changes):
 
 
 def everything(run):
-    return [run.state, run.saved[:3], run.peaks, run.times, run.places, run.work, run.impulse]
+    return list(run.arrays().values())
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +257,7 @@ def whole():
     """(solver, times, run, rows) of one undisturbed run."""
     solver, times = full_solver(), np.linspace(0.0, 0.02, 21)
     run = solver.start()
-    return times, run, solver.advance(run, times)
+    return times, run, solver.advance(run, times).values
 
 
 def full_solver():
@@ -272,7 +272,7 @@ def test_blocks_of_rows_do_not_matter(whole, sizes):
     times, run, rows = whole
     solver = full_solver()
     other = solver.start()
-    parts = [solver.advance(other, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
+    parts = [solver.advance(other, part).values for part in np.split(times, np.cumsum(sizes)[:-1])]
     np.testing.assert_array_equal(np.vstack(parts), rows)
     for a, b in zip(everything(run), everything(other), strict=True):
         np.testing.assert_array_equal(a, b)
@@ -288,10 +288,10 @@ def test_a_run_is_its_whole_state(whole):
     parts = []
     for end in times[9:]:
         solver.advance(first, [end])
-        parts.append(solver.advance(second, [end]))
+        parts.append(solver.advance(second, [end]).values)
         solver.advance(solver.start(), [5e-4])
     np.testing.assert_array_equal(np.vstack(parts), rows[9:])
-    np.testing.assert_array_equal(full_solver().advance(third, times[9:]), rows[9:])
+    np.testing.assert_array_equal(full_solver().advance(third, times[9:]).values, rows[9:])
     for other in (first, second, third):
         for a, b in zip(everything(run), everything(other), strict=True):
             np.testing.assert_array_equal(a, b)
@@ -501,12 +501,12 @@ def test_errors_cover_the_truth_where_rows_are_about_as_long_as_steps(interval):
 
 
 def test_a_twin_that_fails_is_said(monkeypatch):
-    def rows(self, run, ends, own=CentralDifference.rows):
+    def advance(self, course, times, own=CentralDifference.advance):
         if threading.current_thread() is not threading.main_thread():
             raise refweb.SolverError("no twin today")
-        return own(self, run, ends)
+        return own(self, course, times)
 
-    monkeypatch.setattr(CentralDifference, "rows", rows)
+    monkeypatch.setattr(CentralDifference, "advance", advance)
     solution = refweb.run(scene(error="twin"))
     assert all(result.error is None for result in solution.results.values())
     assert solution.status == "solved" and any("no twin today" in text for text in solution.warnings)
@@ -578,14 +578,14 @@ def test_interrupted(tmp_path, monkeypatch, capsys):
     """Ctrl-C after a few blocks: status 130, a folder marked so whose files open, no thread left behind."""
     calls = []
 
-    def rows(self, run, ends, own=CentralDifference.rows):
+    def advance(self, course, times, own=CentralDifference.advance):
         if threading.current_thread() is threading.main_thread():
-            calls.append(len(ends))
+            calls.append(len(times))
             if len(calls) > 8:
                 raise KeyboardInterrupt
-        return own(self, run, ends)
+        return own(self, course, times)
 
-    monkeypatch.setattr(CentralDifference, "rows", rows)
+    monkeypatch.setattr(CentralDifference, "advance", advance)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(refweb.Scene, "load", lambda source: scene(0.5, 1e-4, 3, error="twin"))
     assert main(["run", "any.toml", "--out", "out"]) == 130

@@ -343,7 +343,7 @@ def test_implicit_solvers(solver, choice, exact):
     run = method.start()
     method.advance(run, [0.005, 0.01])
     np.testing.assert_allclose(run.x.ravel()[system.free], exact[0], rtol=0, atol=1e-3 * np.abs(exact[0]).max())
-    np.testing.assert_allclose(run.book.sum(), exact[1], rtol=1e-3)
+    np.testing.assert_allclose(run.work.sum(), exact[1], rtol=1e-3)
     assert run.drift < 1e-3
 
 

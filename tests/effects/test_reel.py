@@ -14,8 +14,10 @@ import refweb
 from refweb.dynamics.initial_state import equilibrium
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.cvode import Cvode
+from refweb.dynamics.integrators.events import Event
 from refweb.dynamics.integrators.ida import Ida
 from refweb.errors import InputError
+from refweb.results import probes
 from refweb.results.state import State
 from refweb.statics import dynamic_relaxation as relaxation
 from refweb.statics import load_steps
@@ -87,7 +89,7 @@ def test_a_lift_converges_to_its_closed_form(law):
         solver = CentralDifference(system, safety=safety)
         run = solver.start(found.x)
         rows = solver.advance(run, [0.5, 1.0])
-        assert rows[-1, -8] == run.work[-1]  # the column of work
+        assert rows.work[-1] == run.work[-1]
         length, rate = lift(1.0)
         error = abs(1.0 - run.x[1, 2] - length), abs(-run.v[1, 2] - rate), abs(run.work[-1] - work)
         errors.append([run.nsteps, *error, run.drift])
@@ -108,7 +110,7 @@ def test_a_lift_by_sundials(solver):
         run = one.start(start)
         one.advance(run, np.linspace(0.0, 1.0, 11))
         length, rate = lift(1.0)
-        errors.append([abs(1.0 - run.x[1, 2] - length), abs(-run.v[1, 2] - rate), abs(run.book[-1] - work), run.drift])
+        errors.append([abs(1.0 - run.x[1, 2] - length), abs(-run.v[1, 2] - rate), abs(run.work[-1] - work), run.drift])
     coarse, fine = np.array(errors)
     assert (coarse > 10.0 * fine).all()
     amplitude = SPEED / np.sqrt(AXIAL)  # of the vibration, 6 mm
@@ -147,16 +149,16 @@ def test_slack_is_reeled_in_until_the_line_snaps_taut():
     system = hung([reel([(0.0, 1.0), (1.0, 1.0 - SPEED / natural)])], "tension-only", 0.0, natural)
     end, errors = taut + slack + 0.1, []
     place = lift(slack)[0] + speed * 0.1
-    event = [(0, 0.0, True, False)]
-    probe = [(refweb.results.probes.line, [1, 0, 1], np.ones((1, 1)), 0)]
+    event = [Event(0, 0.0, rising=True)]
+    probe = [probes.Probe(probes.line, [1, 0, 1], np.ones((1, 1)))]
     for safety in SAFETIES:
         solver = CentralDifference(system, probe, events=event, safety=safety)
         run = solver.start()
         solver.advance(run, [0.99 * taut])
         assert not run.x.any() and not run.work.any()
         solver.advance(run, [end])
-        step = run.state[2]
-        assert abs(run.events[0, -1] - taut) <= step
+        step = run.step
+        assert abs(run.events["time"][0] - taut) <= step
         errors.append([step, abs(1.0 - run.x[1, 2] - place), abs(-run.v[1, 2] - speed), run.drift])
     steps, *errors = np.array(errors).T
     # No order at the kinks, whose places in a step are as they come: each of the two errs by ½ κ h² of what is passed.
@@ -259,7 +261,7 @@ def test_a_step_is_safe_for_the_shortest_length_of_its_row():
             width = time - run.time
             solver.advance(run, [time])
             # Steps divide a row: the largest that do, but for rounding, and 0.5/0.01 at least.
-            np.testing.assert_allclose(width / run.state[2], max(np.ceil(width / largest), 50), rtol=1e-12)
+            np.testing.assert_allclose(width / run.step, max(np.ceil(width / largest), 50), rtol=1e-12)
     with pytest.raises(InputError, match="step_size = .* must be ≤"):
         CentralDifference(system, step_size=1.01 * safe)
     CentralDifference(system, step_size=0.99 * safe)
@@ -270,16 +272,16 @@ def test_a_run_is_the_same_however_it_is_cut():
     times, rows = np.linspace(0.0, 0.02, 21), []
     system = taut_net("tension-only", *BOTH)
     whole = CentralDifference(system)
-    rows.append(whole.advance(whole.start(), times))
+    rows.append(whole.advance(whole.start(), times).values)
     one, run = CentralDifference(system), None
     run = one.start()
-    rows.append(np.vstack([one.advance(run, [t]) for t in times]))
+    rows.append(np.vstack([one.advance(run, [t]).values for t in times]))
     run = one.start()
-    first = one.advance(run, times[:7])
+    first = one.advance(run, times[:7]).values
     system.prepare(0.013)
     for begin in (6, 7):  # from the time that it is at, and from the next
         other = CentralDifference(system)
-        rows.append(np.vstack([first[:begin], other.advance(copy.deepcopy(run), times[begin:])]))
+        rows.append(np.vstack([first[:begin], other.advance(copy.deepcopy(run), times[begin:]).values]))
     for found in rows[1:]:
         np.testing.assert_array_equal(found, rows[0])
 
@@ -293,7 +295,7 @@ def test_a_reel_that_waits():
         solver = CentralDifference(system)
         run = solver.start()
         solver.advance(run, [0.005, 0.01])
-        still.append(run.saved[:3].any() or run.work.any())
+        still.append(run.x.any() or run.v.any() or run.force.any() or run.work.any())
         solver.advance(run, [0.015])
     assert still == [False, False] and not run.x.any()
 

@@ -75,7 +75,7 @@ history = solver.advance(run, times)
 if toggle:
     toggle.stop()
 own = [sys.modules[name].__file__ for name in sys.modules if name.partition(".")[0] == "refweb"]
-print(json.dumps([own, run.nsteps, history[-1].tolist()]))
+print(json.dumps([own, run.nsteps, history.values[-1].tolist()]))
 """
 TOGGLE = """
 #include <valgrind/callgrind.h>

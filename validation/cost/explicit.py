@@ -170,7 +170,7 @@ def steps_of(scene, system):
         before = run.nsteps
         solver.advance(run, [end])
         counts.append(run.nsteps - before)
-        sizes.append(run.state[2])
+        sizes.append(run.step)
     return np.array(counts, dtype=np.int64), np.array(sizes), run
 
 

@@ -33,7 +33,7 @@ from collections import Counter
 import numpy as np
 
 import refweb
-from refweb.dynamics.integrators.explicit_loop import DRIFT
+from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.errors import OpenBook
 
 from ..harness.case import Case, Row, Table

@@ -12,115 +12,65 @@ book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...errors import InputError, OpenBook, SolverError
 from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
 from ...results.probes import INTEGERS, PLACE, PROBE
-from .explicit_loop import (
-    BREATH,
-    DRIFT,
-    LOOKS,
-    MOST,
-    SLOT,
-    advance,
-    begins,
-    book_energies,
-    ended_by,
-    event_table,
-    no_bound,
-    no_energy,
-    refuse_open,
-    rows_ahead,
-    set_lengths,
-    step_bound,
-)
+from .energy_book import DRIFT, book_energies, no_energy, refuse_open
+from .events import event_rows, starts_above
+from .explicit_loop import BREATH, LOOKS, advance, rows_ahead, set_lengths
+from .extremes import Extremes
+from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator
+from .step_bound import no_bound, step_bound
+
+TWIN_STEPS = math.sqrt(2.0)
+"""Steps of a twin over those of a run: with a method of order 2 it has half the error."""
+STATE = ("time", "nsteps", "step", "energy", "largest", "worst", "share")
+"""Numbers of a course that the loop writes."""
 
 
-@dataclass(eq=False)
-class Run:
-    """The whole state of an explicit run; a run resumed from it is the same run bit for bit.
+@dataclass(eq=False, kw_only=True)
+class ExplicitCourse(Course):
+    """State of an explicit run; a run that goes on from it is the same run bit for bit.
+
+    The compiled loop works in its arrays.
 
     Attributes
     ----------
-    state : ndarray
-        Time [s], steps taken, last step [s], energy at the start [J], largest energy [J], worst drift [J].
-    saved : ndarray, shape (6, rows, 3)
-        Displacement [m], velocity [m/s] and force [N], and the same at the row before.
-    peaks, times, places : ndarray, shape (probes,)
-        Extreme value of each probe, its time, and the row or element it stands at.
-    work : ndarray, shape (families + 1,)
-        Work of each family that is booked by its power and, last, of motion [J].
-    impulse : ndarray, shape (3,)
-        Impulse of the supports on the net [N s].
-    events : ndarray, shape (events, 6)
-        What each event has come to, see `refweb.dynamics.integrators.explicit_loop`.
-    recent : ndarray, shape (probes, 4)
-        Time and value of each probe when it was last looked at, twice, for methods of higher order.
+    force : ndarray, shape (rows, 3)
+        Force [N], last seen with the velocity at half a step.
+    before : ndarray, shape (3, rows, 3)
+        Displacement, velocity and force at the row before.
     """
 
-    state: np.ndarray
-    saved: np.ndarray
-    peaks: np.ndarray
-    times: np.ndarray
-    places: np.ndarray
-    work: np.ndarray
-    impulse: np.ndarray
-    events: np.ndarray
-    recent: np.ndarray
+    force: np.ndarray
+    before: np.ndarray | None = field(default=None, metadata={"saved": False})
 
-    @property
-    def stopped(self):
-        """Whether an event has ended the run."""
-        return bool(ended_by(self.events))
-
-    @property
-    def time(self):
-        """Time [s]."""
-        return float(self.state[0])
-
-    @property
-    def nsteps(self):
-        """Steps taken."""
-        return int(self.state[1])
-
-    @property
-    def x(self):
-        """Displacement [m], shape (rows, 3)."""
-        return self.saved[0]
-
-    @property
-    def v(self):
-        """Velocity [m/s], shape (rows, 3)."""
-        return self.saved[1]
-
-    @property
-    def drift(self):
-        """Largest |ΔE − work| over the largest energy [1]."""
-        return float(self.state[5] / self.state[4]) if self.state[4] > 0.0 else 0.0
+    def __post_init__(self):
+        self.before = np.stack([self.x, self.v, self.force])
 
 
-class CentralDifference:
+class CentralDifference(Integrator):
     """Central differences on one system.
 
     Parameters
     ----------
     system : refweb.system.system.System
         Of order 1, with lumped mass.
-    probes : sequence of (probe, rows, data, sign)
-        What to look at, see `refweb.results.probes`: at every row, and with sign 1 (−1) the largest (smallest) value
-        over all steps.
-    watch : sequence of (weights, sign)
-        Sums to follow in every step: weights of (energy of each family, kinetic energy, work, step size).
+    probes : sequence of refweb.results.probes.Probe
+        What to look at, in every row and, with a sign, in every step.
+    sums : sequence of refweb.dynamics.integrators.integrator.Sum
+        Energies to look at, likewise.
+    events : sequence of refweb.dynamics.integrators.events.Event
+        What to report the time of, to the step.
     safety : float
         Share of the step bound, 0 < safety ≤ 1.
     step_size : float, optional
         A fixed step instead [s], at most the bound.
-    events : sequence of (slot, level, rising, stop)
-        What to report the time of, to the step: the value of a probe, or behind those of a sum, passes a level, upwards
-        if ``rising`` is true; with ``stop`` the run ends there.
     finer : float
         Number of steps of each row over what the other arguments make of it, ≥ 1.
 
@@ -131,12 +81,13 @@ class CentralDifference:
     """
 
     method, order, stretch = "central-difference", 2, 1.0
+    knob, retry, beside = "safety", 0.5, True
     breathe = staticmethod(lambda t: None)
-    """What is called with the time some times a second, and may raise."""
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
-    def __init__(self, system, probes=(), watch=(), events=(), safety=0.5, step_size=None, finer=1.0):
+    def __init__(self, system, probes=(), sums=(), events=(), safety=0.5, step_size=None, finer=1.0):
         self.system, self.safety, self.step_size, self.finer = system, safety, step_size, finer
+        self.observed = tuple(probes), tuple(sums), tuple(events)
         net, free = system.net, ~system.supported
         if net.order > 1:
             raise InputError(
@@ -205,13 +156,14 @@ class CentralDifference:
         )
         corners = {t for d in system.line_drives for t in d.times}
         self._corners = np.array([*sorted(corners), *([np.inf] if system.line_drives else []), -np.inf])
-        signs = np.array([float(p[-1]) for p in (*probes, *watch)])
-        self._watch = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
-        self._seeing, self._events = list(probes), event_table(events)
+        signs = np.array([float(one.sign) for one in (*probes, *sums)])
+        weights = [one.weights for one in sums]
+        self._watch = np.array(weights, dtype=float).reshape(len(sums), len(families) + 3)
+        self._events = event_rows(events)
         self._probes = (
-            typed_list(PROBE, [p[0] for p in probes]),
-            typed_list(INTEGERS, [np.array(p[1], dtype=np.int64) for p in probes]),
-            typed_list(MATRIX, [np.ascontiguousarray(p[2], dtype=float) for p in probes]),
+            typed_list(PROBE, [probe.kernel for probe in probes]),
+            typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
+            typed_list(MATRIX, [np.ascontiguousarray(probe.data, dtype=float) for probe in probes]),
             signs,
             np.flatnonzero(signs[: len(probes)]),
         )
@@ -232,123 +184,140 @@ class CentralDifference:
         if self.system.line_drives:
             set_lengths(t, *self._drives[4:10], self._data[0])
 
-    def spent(self, run):
-        """What a run has spent, for ``run.json``.
+    def spent(self, course):
+        """What a course has spent, for ``run.json``.
 
         The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
         """
         follows = len(self._probes[4]) + len(self._watch) > 0  # and evaluates forces where it looks
         per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
-        return dict(nfev=per_step * run.nsteps + 1, njev=0, nlu=0)
+        return dict(nfev=per_step * course.nsteps + 1, njev=0, nlu=0)
 
     def start(self, x=None, v=None):
-        """The `Run` at t = 0, from the web's position and the scene's velocities unless x and v say otherwise."""
+        """The `ExplicitCourse` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
         system = self.system
-        saved = np.zeros((6, system.rows, 3))
-        saved[0] = 0.0 if x is None else x
-        saved[1] = system.initial_velocity() if v is None else v
-        saved[1][system.supported] = 0.0
-        system.drive(0.0, saved[0], saved[1])
+        force = np.zeros((system.rows, 3))
+        x = np.zeros_like(force) if x is None else np.array(x, dtype=float, order="C")
+        v = system.initial_velocity() if v is None else np.array(v, dtype=float, order="C")
+        v[system.supported] = 0.0
+        system.drive(0.0, x, v)
         self._set_lengths(0.0)
         for family, data, out in zip(system.families, self._data, self._outs, strict=True):
-            family.force(0.0, saved[0], saved[1], saved[2], family.cells, data, out)
-        signs, probes = self._probes[3], self._seeing
+            family.force(0.0, x, v, force, family.cells, data, out)
+        signs, probes = self._probes[3], self.observed[0]
         values, where = np.zeros(len(signs)), np.full((len(signs), 2), PLACE)
-        for i, (probe, rows, data, _) in enumerate(probes):
-            rows, data = np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float)
-            values[i] = probe(0.0, saved[0], saved[1], saved[2], self._outs[0], rows, data, where[i])
+        for i, probe in enumerate(probes):
+            rows, data = np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float)
+            values[i] = probe.kernel(0.0, x, v, force, self._outs[0], rows, data, where[i])
         total, book = np.zeros(len(system.families) + 3), np.zeros(len(system.families) + 1)
         numbers = (self._masses[0], self._cells, self._data, *self._energies, book, self._working)
-        book_energies(0.0, saved[0], saved[1], *numbers, total)
+        book_energies(0.0, x, v, *numbers, total)
         values[len(probes) :] = self._watch @ total
         stepping = len(probes) + np.flatnonzero(self._watch[:, -1])
         values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         events = self._events.copy()
         for event in events:
-            begins(event, values[int(event[SLOT])])
+            starts_above(event, values[event["slot"]])
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
-        state = np.array([0.0, 0.0, 0.0, own.sum(), np.abs(own).sum(), 0.0, np.inf])
-        none, recent = np.zeros(len(signs)), np.full((len(signs), 4), np.nan)
-        recent[:, 2], recent[:, 3] = 0.0, values
-        return Run(state, saved, values, none, where[:, 0].copy(), book, np.zeros(3), events, recent)
+        extremes = Extremes.at_start(values, where[:, 0].copy())
+        book = dict(work=book, energy=own.sum(), largest=np.abs(own).sum())
+        return ExplicitCourse(time=0.0, x=x, v=v, force=force, extremes=extremes, events=events, **book)
 
-    def save(self, run):
-        """The `Run` as arrays by name, for a checkpoint."""
-        return vars(run)
+    def save(self, course):
+        """The `ExplicitCourse` as arrays by name, for a checkpoint."""
+        return course.arrays()
 
     def load(self, arrays):
-        """The `Run` of a checkpoint."""
-        return Run(**arrays)
+        """The `ExplicitCourse` of a checkpoint."""
+        return ExplicitCourse.of_arrays(arrays)
 
-    def _peaks(self, run):
-        return (*self._probes, run.peaks, run.times, run.places, run.recent, run.work, run.impulse)
+    @property
+    def _keys(self):
+        return dict(safety=self.safety, step_size=self.step_size)
 
-    def advance(self, run, ends):
-        """Advance a run to each time of ``ends`` in turn; equal steps lead to each.
+    def refined(self, by=None):
+        """The method with ``by`` times the steps, by default `TWIN_STEPS`."""
+        finer = self.finer * (TWIN_STEPS if by is None else by)
+        return type(self)(self.system, *self.observed, **self._keys, finer=finer)
 
-        Returns
-        -------
-        ndarray, shape (rows, columns)
-            Time, value of each probe, energy of each family, kinetic energy, work, step size, momentum of all that is
-            free and impulse of the supports (3 columns each). Fewer rows than times where an event ends the run.
+    def error_share(self, course, finer):
+        """Error of a finer run over that of this one.
 
-        Raises
-        ------
-        OpenBook
-            Where the energy drift exceeds `DRIFT` and does not fall.
-        SolverError
-            At the first number that is not finite; names node, line and time.
+        By the steps really taken, at order 2: of a higher one peaks, contact and slack lines leave no more.
         """
-        ends = np.atleast_1d(np.asarray(ends, dtype=float))
-        history = np.zeros((len(ends), 1 + len(self._probes[0]) + len(self.system.families) + 9))
-        step, start, linear = self.step_size or 0.0, run.time, self.system.rows - self.system.net.spins
+        if not finer.nsteps:
+            return 0.5
+        return (course.nsteps / course.time / (finer.nsteps / finer.time)) ** 2
+
+    def next_knob(self, share):
+        """Factor on the safety for errors that are ``share`` times what they may be."""
+        return min(max(0.8 * share ** (-1.0 / self.order), 0.125), 0.5)
+
+    def _seen_in(self, course):
+        return (*self._probes, course.extremes, course.work, course.impulse)
+
+    def advance(self, course, times):
+        """Take a course to each of some times; equal steps lead to each.
+
+        See `refweb.dynamics.integrators.integrator.Integrator.advance`; a `SolverError` for a number that is not finite
+        names node, line and time.
+        """
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        history = History.empty(len(times), len(self._probes[0]), self.system.families)
+        step, start, linear = self.step_size or 0.0, course.time, self.system.rows - self.system.net.spins
         least = 1.0 if self.step_size else 0.5 / self.safety
         work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
         done, part, breath = 0, np.zeros(2, dtype=np.int64), max(BREATH // max(work, 1), 1)
         carried = self._carried()
+        state = np.array([getattr(course, name) for name in STATE], dtype=float)
         try:
             while True:
                 more = rows_ahead(
-                    ends[done:], breath, part, *carried, self.safety * self.stretch, least, step, self.finer, DRIFT,
-                    self.kicks, self.drifts, run.state, run.saved, linear, *self._masses, self._moving, *self._ends,
-                    *self._forces, self._seen, *self._energies, self._bounds, self._dampings, *self._drives,
-                    self._corners, *self._peaks(run), self._watch, run.events, history[done:],
+                    times[done:], breath, part, *carried, self.safety * self.stretch, least, step, self.finer, DRIFT,
+                    self.kicks, self.drifts, state, course.x, course.v, course.force, course.before, linear,
+                    *self._masses, self._moving, *self._ends, *self._forces, self._seen, *self._energies, self._bounds,
+                    self._dampings, *self._drives, self._corners, *self._seen_in(course), self._watch, course.events,
+                    history.values[done:],
                 )  # fmt: skip
                 if more < 0:
                     raise SolverError(
-                        f"the step at t = {run.time:.6g} s is {run.state[2]:.3g} s, more than {MOST:g} steps to the "
-                        "next row: ask for shorter rows, or lower the stiffness that asks for the step"
+                        f"the step at t = {state[0]:.6g} s is {state[2]:.3g} s, more than {MAX_STEPS_PER_ROW:g} steps "
+                        "to the next row: ask for shorter rows, or lower the stiffness that asks for the step"
                     )
                 done += more
                 if not part[0]:
                     break
-                self.breathe(run.time + part[0] * run.state[2])
+                self.breathe(state[0] + part[0] * state[2])
         except BaseException:
             if part[0]:  # back to the last row
-                run.saved[:3] = run.saved[3:]
+                course.x[:], course.v[:], course.force[:] = course.before
             raise
-        if done and run.stopped and history[done - 1, 0] == run.time:
+        finally:
+            for name, value in zip(STATE, state.tolist(), strict=True):
+                setattr(course, name, value)
+            course.nsteps = int(course.nsteps)
+        if done and course.stopped and history.time[done - 1] == course.time:
             return history[:done]
-        if done < len(ends):
-            before = ends[done - 1] if done else start
-            if not np.isfinite(history[done]).all():
-                self._name_blow_up(run, before)
-            self._name_drift(run, before)
+        if done < len(times):
+            before = times[done - 1] if done else start
+            if not np.isfinite(history.values[done]).all():
+                self._name_blow_up(course, before)
+            self._name_drift(course, before)
         return history
 
     def _carried(self):
         return np.zeros(len(self.system.families)), np.zeros((2, len(self._drives[4])))
 
-    def _name_blow_up(self, run, before):
+    def _name_blow_up(self, course, before):
         """Replay the last row step by step and name the first number that is not finite."""
-        system, h = self.system, run.state[2]
+        system, h = self.system, course.step
         net = system.net
-        x, v, f = run.saved[3:].copy()
-        count, total = round((run.time - before) / h), np.zeros(len(system.families) + 3)
+        x, v, f = course.before.copy()
+        count, total = round((course.time - before) / h), np.zeros(len(system.families) + 3)
         for step in range(1, count + 1):
             advance(
                 1, 0, *self._carried(), h, before + (step - 1) * h, self.kicks, self.drifts, x, v, f, *self._masses,
-                *self._ends, *self._forces, self._seen, *self._drives, *self._peaks(run), *self._energies,
+                *self._ends, *self._forces, self._seen, *self._drives, *self._seen_in(course), *self._energies,
                 self._watch, total, self._events[:0],
             )  # fmt: skip
             wrong = ~np.isfinite(x + v + f).all(axis=1)
@@ -358,14 +327,15 @@ class CentralDifference:
                 lines = net.line[(net.cells == row).any(axis=1)]
                 name += f", line {lines[0]}," if len(lines) else ""
                 raise SolverError(f"number not finite at {name} t = {before + step * h:.6g} s: use a smaller safety")
-        raise SolverError(f"energy not finite at t = {run.time:.6g} s: use a smaller safety")
+        raise SolverError(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
 
-    def _name_drift(self, run, before):
+    def _name_drift(self, course, before):
         """Say where energy came in: the effect and cell whose energy grew most in the last row."""
         system, most, of, cell = self.system, -np.inf, self.system.families[0], 0
         for family in system.families:
             if family.energy is not None and family.book != "work":
-                change = system.energy_of(family, run.time, run.x) - system.energy_of(family, before, run.saved[3])
+                now = system.energy_of(family, course.time, course.x)
+                change = now - system.energy_of(family, before, course.before[0])
                 if change.max(initial=-np.inf) > most:
                     most, of, cell = change.max(), family, int(change.argmax())
         if of.cells.shape[1] > 1:
@@ -373,8 +343,8 @@ class CentralDifference:
         else:
             place = self.system.row_name(of.cells[cell, 0])
         raise OpenBook(
-            f"energy drift {run.drift:.3g} of the largest energy between t = {before:.6g} and {run.time:.6g} s, limit "
-            f"{DRIFT:g}: energy came in with {of.name} at {place}; {self._remedy}"
+            f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and {course.time:.6g} s, "
+            f"limit {DRIFT:g}: energy came in with {of.name} at {place}; {self._remedy}"
         )
 
     @property
@@ -382,6 +352,6 @@ class CentralDifference:
         step = self.step_size
         return f"use a smaller step_size than {step:g}" if step else f"use a smaller safety than {self.safety:g}"
 
-    def refuse_drift(self, run):
+    def refuse_drift(self, course):
         """Refuse a whole run whose energy drift exceeds `DRIFT`; `OpenBook`."""
-        refuse_open(run, DRIFT, self._remedy)
+        refuse_open(course, DRIFT, self._remedy)

@@ -6,75 +6,19 @@ import math
 
 import numpy as np
 
-from ...errors import OpenBook
-from ...kernels import BOUND, ENERGY, kernel
+from ...kernels import kernel
 from ...net.net import LENGTH
 from ...results.probes import PLACE
+from .energy_book import CLOSING, book_energies
+from .events import crosses, ended_by
+from .extremes import quadratic_peak
+from .integrator import MAX_STEPS_PER_ROW
+from .step_bound import step_bound
 
-DRIFT = 1e-2
-"""Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
-CLOSING = 0.9
-"""Factor by which a drift above `DRIFT` has to fall from row to row, over the largest energy until then, for the run to
-go on: where a load rises from zero on a web at rest, the first rows hold a few steps' errors against next to nothing.
-"""
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
-MOST = 1e8
-"""Largest number of steps of a history row."""
 LOOKS = 4
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
-SLOT, LEVEL, SIDE, RISING, STOP, TIME = range(6)
-"""Columns of events: the probe, or behind the probes the sum, whose value passes a level; the side it is on, 1 above
-and −1 not, and once it has happened how much earlier that may have been; whether only passing upwards counts, and
-whether being above at t = 0 does (`AT_ONCE`); whether the run ends there; time of the event, infinite before."""
-AT_ONCE = 2.0
-
-
-def refuse_open(run, limit, remedy):
-    """Refuse a whole run whose energy drift exceeds a limit; `OpenBook`."""
-    if not run.drift <= limit:
-        raise OpenBook(f"energy drift {run.drift:.3g} of the largest energy of the run, limit {limit:g}: {remedy}")
-
-
-def event_table(events):
-    """Events (slot, level, rising, stop) as rows of numbers."""
-    rows = [(slot, level, 0.0, float(rising), float(stop), np.inf) for slot, level, rising, stop in events]
-    return np.array(rows, dtype=float).reshape(len(rows), 6)
-
-
-@kernel()
-def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, working, total):
-    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
-
-    ``book`` holds the work of each family and, last, that of all motion; ``working`` says of each family whether that
-    counts as work (1), or as its energy, which is lost (−1), or neither (0).
-    """
-    count = len(energies)
-    total[count], total[count + 1] = 0.0, book[count]
-    for i in range(count):
-        energies[i](t, x, cells[i], data[i], energy_outs[i])
-        total[i] = energy_outs[i].sum()
-        if working[i] > 0:
-            total[count + 1] += book[i]
-        elif working[i] < 0:
-            total[i] = -book[i]
-    for r in range(x.shape[0]):
-        total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
-
-
-@kernel()
-def passes(event, value):
-    """Whether an event happens with this value; notes the side it is on."""
-    side = 1.0 if value > event[LEVEL] else -1.0
-    before, event[SIDE] = event[SIDE], side
-    return side != before and (side > 0.0 or event[RISING] == 0.0)
-
-
-@kernel()
-def begins(event, value):
-    """Note the side of an event at t = 0; where it happens by being there, as a contact does, it has happened."""
-    if passes(event, value) and event[RISING] == AT_ONCE:
-        event[TIME], event[SIDE] = 0.0, 0.0
 
 
 @kernel()
@@ -105,29 +49,12 @@ def interpolate(s, h, old, x, v, inverse, f, here, speed):
 
 
 @kernel()
-def culminate(i, now, value, sign, recent, peaks, times):
-    """Take the top of the parabola through the last three values of a probe, where it has one between them.
-
-    ``recent`` holds time and value of the two before.
-    """
-    before, low, at, high = recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3]
-    if sign * high > sign * low and sign * high > sign * value:  # never of what is not a number yet
-        rise, fall = (high - low) / (at - before), (value - high) / (now - at)
-        curve = (fall - rise) / (now - before)
-        slope = rise + curve * (at - before)
-        top = high - 0.25 * slope * slope / curve
-        if sign * top > sign * peaks[i]:
-            peaks[i], times[i] = top, at - 0.5 * slope / curve
-    recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3] = at, high, now, value
-
-
-@kernel()
 def advance(
     count, first_step, power, pull,
     h, t, kicks, drifts, x, v, f, mass, inverse, held, driven, working, powers, still, viscous,
     kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines,
     line_drives, line_cells, line_data, reeled_cells, by_length,
-    probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent, book, impulse,
+    probes, probe_rows, probe_data, signs, followed, extremes, book, impulse,
     energies, energy_outs, watch, total, events,
 ):  # fmt: skip
     """``count`` steps of size h, behind the first ``first_step`` of a row from time t.
@@ -146,6 +73,7 @@ def advance(
 
     Returns the steps taken: fewer than asked for where an event ends the run.
     """
+    peaks, times, places = extremes.values, extremes.times, extremes.places
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where = x.shape[0], np.zeros(2, dtype=np.int64)
     first, first_cells, first_data, lines = kernels[0], cells[0], data[0], outs[0]
@@ -262,7 +190,7 @@ def advance(
                     where[1] = PLACE
                     probes[i](here, inner[0], inner[1], inner[2], inner_lines, probe_rows[i], probe_data[i], where)
                     peaks[i], times[i], places[i], where[1] = value, here, where[0], 0
-                culminate(i, here, value, signs[i], recent, peaks, times)
+                quadratic_peak(extremes, i, here, value, signs[i])
             if watch.shape[0]:
                 book_energies(
                     here, inner[0], inner[1], mass, cells, data, energies, energy_outs, book, working, total
@@ -271,7 +199,7 @@ def advance(
                     value, i = np.dot(watch[j], total), len(probes) + j
                     if signs[i] * value > signs[i] * peaks[i]:
                         peaks[i], times[i] = value, here
-                    culminate(i, here, value, signs[i], recent, peaks, times)
+                    quadratic_peak(extremes, i, here, value, signs[i])
         for i in followed:
             value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
             if signs[i] * value > signs[i] * peaks[i]:
@@ -279,7 +207,7 @@ def advance(
                 probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
                 peaks[i], times[i], places[i], where[1] = value, now, where[0], 0
             if more:
-                culminate(i, now, value, signs[i], recent, peaks, times)
+                quadratic_peak(extremes, i, now, value, signs[i])
         if watch.shape[0]:
             book_energies(now, x, v, mass, cells, data, energies, energy_outs, book, working, total)
             for j in range(watch.shape[0]):
@@ -287,79 +215,47 @@ def advance(
                 if signs[i] * value > signs[i] * peaks[i]:
                     peaks[i], times[i] = value, now
                 if more:
-                    culminate(i, now, value, signs[i], recent, peaks, times)
+                    quadratic_peak(extremes, i, now, value, signs[i])
         ended = False
         for e in range(events.shape[0]):
             event = events[e]
-            if event[TIME] == math.inf:
-                i = int(event[SLOT])
+            if event.time == math.inf:
+                i = event.slot
                 if i < len(probes):
                     value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
                 else:
                     value = np.dot(watch[i - len(probes)], total)
-                if passes(event, value):
-                    event[TIME], event[SIDE] = now, h
-                    ended = ended or event[STOP] > 0.0
+                if crosses(event, value):
+                    event.time, event.width = now, h
+                    ended = ended or event.stop > 0
         if ended:
             return step
     return count
 
 
 @kernel()
-def step_bound(reach, speed, x, mass, free, rates, bounds, viscous, dampings, cells, data):
-    """Largest stable step [s], 2/ω (√(1 + ζ²) − ζ); infinite where nothing vibrates."""
-    rates[:] = 0.0
-    for i in range(len(bounds)):
-        bounds[i](reach, speed, x, mass, rates, cells[i], data[i])
-    if not viscous.size:
-        rate = 0.0
-        for r in free:
-            rate = max(rate, rates[r] / mass[r])
-        return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
-    losses, step = np.zeros(rates.size), math.inf
-    for n in range(viscous.size):
-        dampings[n](reach, speed, x, mass, losses, cells[viscous[n]], data[viscous[n]])
-    for r in free:
-        rate, loss = rates[r] / mass[r], losses[r] / mass[r]
-        if rate + loss > 0.0:  # (√(γ² + 4κ) − γ)/κ of κ = ω², γ = 2ζω
-            step = min(step, 4.0 / (math.sqrt(loss * loss + 4.0 * rate) + loss))
-    return step
-
-
-@kernel()
-def ended_by(events):
-    """Whether an event has ended the run."""
-    for e in range(events.shape[0]):
-        if events[e, STOP] > 0.0 and events[e, TIME] < math.inf:
-            return True
-    return False
-
-
-@kernel()
 def rows_ahead(
     ends, breath, part, power, pull, safety, least, step_size, finer, limit, kicks, drifts,
-    state, saved, linear, mass, inverse, free, held, driven, working, powers, still, viscous,
+    state, x, v, f, back, linear, mass, inverse, free, held, driven, working, powers, still, viscous,
     kernels, cells, data, outs, energies, energy_outs, bounds, dampings, drives,
     drive_cells, drive_data, drive_outs, lengths, reeled, reeled_lines, line_drives, line_cells, line_data,
-    reeled_cells, by_length, corners, probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent,
-    book, impulse, watch, events, history,
+    reeled_cells, by_length, corners, probes, probe_rows, probe_data, signs, followed, extremes, book, impulse,
+    watch, events, history,
 ):  # fmt: skip
     """Advance to each time of ``ends`` and write a row of ``history`` there.
 
     ``state`` is (time, steps, step size, energy at the start, largest energy, worst drift, drift at the last row over
     the largest energy). Returns the rows that are done: fewer than asked for where a number is not finite, or the drift
-    is above ``limit`` and does not fall (`CLOSING`); then ``saved`` holds x, v and f at the row before; −1 where a row
-    takes more than `MOST` steps. A row takes ``least`` steps at least, so that a smaller ``safety`` makes them shorter
-    there as well where rows are. Where an event ends the run, that row is the last, and its time that of the event.
-    After ``breath`` steps it returns as well, so that an interruption is felt; ``part`` then holds the steps taken of a
-    row and the steps of it, and is (0, ...) between rows.
+    is above ``limit`` and does not fall (`CLOSING`); then ``back`` holds x, v and f at the row before; −1 where a row
+    takes more than `MAX_STEPS_PER_ROW` steps. A row takes ``least`` steps at least, so that a smaller ``safety`` makes
+    them shorter there as well where rows are. Where an event ends the run, that row is the last, and its time that of
+    the event. After ``breath`` steps it returns as well, so that an interruption is felt; ``part`` then holds the steps
+    taken of a row and the steps of it, and is (0, ...) between rows.
 
     ``corners`` are the times at which a factor of natural lengths has a corner, increasing, then ∞ for the end of a row
     if there are such factors, then −∞ for its start. The step of a row is safe at all of them: in between a length is a
     product of positive linear functions of time, and stiffness, which goes with its inverse, is largest at an end.
     """
-    x, v, f = saved[0], saved[1], saved[2]
-    back = saved[3:]
     where, rates = np.zeros(2, dtype=np.int64), np.empty(x.shape[0])
     total, stopped, left = np.zeros(len(energies) + 3), events.shape[0] > 0 and ended_by(events), breath
     for n in range(ends.size):
@@ -392,7 +288,7 @@ def rows_ahead(
                         )  # fmt: skip
                         limit_now = min(limit_now, bound)
                 steps = interval / (safety * limit_now)
-            if steps > MOST:
+            if steps > MAX_STEPS_PER_ROW:
                 state[2] = interval / steps
                 return -1
             count = max(int(math.ceil(max(steps, least) * (1.0 - 1e-9))), 1)
@@ -407,7 +303,7 @@ def rows_ahead(
                 count, begun, power, pull, h, state[0], kicks, drifts, x, v, f, mass, inverse, held, driven, working,
                 powers, still, viscous, kernels, cells, data, outs, drives, drive_cells, drive_data, drive_outs, acting,
                 reeled, reeled_lines, line_drives, line_cells, line_data, reeled_cells, by_length,
-                probes, probe_rows, probe_data, signs, followed, peaks, times, places, recent, book, impulse,
+                probes, probe_rows, probe_data, signs, followed, extremes, book, impulse,
                 energies, energy_outs, watch, total, events,
             )  # fmt: skip
             stopped = events.shape[0] > 0 and ended_by(events)
@@ -450,13 +346,3 @@ def rows_ahead(
         if stopped:
             return n + 1
     return ends.size
-
-
-@kernel(ENERGY)
-def no_energy(t, x, cells, data, out):
-    out[:] = 0.0
-
-
-@kernel(BOUND)
-def no_bound(reach, speed, x, mass, rates, cells, data):
-    pass

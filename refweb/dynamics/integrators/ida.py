@@ -61,7 +61,8 @@ class Ida(Sundials):
 
     def __init__(self, system, *observed, max_order=2, linear_solver="auto", **tolerances):
         super().__init__(system, *observed, **tolerances)
-        self.max_order = max_order
+        self._keys = dict(max_order=max_order, linear_solver=linear_solver)
+        self.max_order = self.order = max_order
         mass = np.repeat(system.net.mass, 3)[system.free]
         self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
         self._M = system.pattern.matrix(system.mass())

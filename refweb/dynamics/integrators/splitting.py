@@ -72,12 +72,12 @@ def stability(kicks, drifts):
     raise ArithmeticError("no bound of stability below 8")
 
 
-class Nystrom(CentralDifference):
+class Splitting(CentralDifference):
     """Runge–Kutta–Nyström splittings on one system.
 
     Parameters
     ----------
-    system, probes, watch, events, safety, step_size, finer
+    system, probes, sums, events, safety, step_size, finer
         See `refweb.dynamics.integrators.central_difference.CentralDifference`; ``safety`` is a share of a bound of its
         own.
     order : {4, 6}
@@ -105,3 +105,7 @@ class Nystrom(CentralDifference):
         self.order, (self.kicks, self.drifts) = order, splitting(order)
         self.stretch = 0.5 * stability(self.kicks, self.drifts)
         super().__init__(system, *observed, **steps)
+
+    @property
+    def _keys(self):
+        return {**super()._keys, "order": self.order}

@@ -9,97 +9,54 @@ by Simpson's rule. A flag of success is not believed: the book of energies is ch
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ...errors import InputError, OpenBook, SolverError
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
 from ...results.probes import PLACE
-from .explicit_loop import (
-    CLOSING,
-    DRIFT,
-    LEVEL,
-    MOST,
-    SIDE,
-    SLOT,
-    STOP,
-    TIME,
-    begins,
-    book_energies,
-    culminate,
-    ended_by,
-    event_table,
-    no_energy,
-    passes,
-    refuse_open,
-)
+from .energy_book import CLOSING, DRIFT, book_energies, no_energy, refuse_open
+from .events import crosses, event_rows, starts_above
+from .extremes import Extremes, quadratic_peak
+from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator
 
 TRAVEL = 0.2
 """Largest share of a body's thickness that anything may move in a step, so that nothing passes through; where bodies
 are further away, half of that distance."""
 PATIENCE = 1000
-"""Number of steps in turn of which a row would take more than `MOST`; at a start they are short, and grow."""
+"""Number of steps in turn of which a row would take more than `MAX_STEPS_PER_ROW`; at a start they are short."""
 UNEVEN = 1e-3
 """Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
 HALVINGS = 8
 """Number of times that a piece is halved where it does."""
 
 
-@dataclass(eq=False)
-class Course:
-    """State of an implicit run.
+TWIN_TOLERANCES = 10.0
+"""Tolerances of a run over those of its twin: by less, both may take the same steps, which are changed by factors of
+up to 2."""
+
+
+@dataclass(eq=False, kw_only=True)
+class ImplicitCourse(Course):
+    """State of an implicit run, at the time that has been looked at; the solver's last step may end later.
 
     Attributes
     ----------
-    time : float
-        Time that has been looked at [s]; the solver's last step may end later.
-    x, v : ndarray, shape (rows, 3)
-        Displacement [m] and velocity [m/s] at that time.
-    peaks, times, places : ndarray, shape (probes,)
-        Extreme value of each probe, its time, and the row or element it stands at.
-    book : ndarray, shape (families + 1,)
-        Work of each family that is booked by its power and, last, of motion [J].
-    impulse : ndarray, shape (3,)
-        Impulse of the supports on the net [N s].
-    events : ndarray, shape (events, 6)
-        What each event has come to, see `refweb.dynamics.integrators.explicit_loop`.
-    recent : ndarray, shape (probes, 4)
-        Time and value of each probe when it was last looked at, twice: tops of parabolas count as peaks.
+    reached : float
+        End of the solver's last step [s].
+    short : int
+        Number of steps in turn that are too short to come to the next row.
+    rates : tuple
+        Powers, forces of the supports, natural lengths and what pulls on them, at ``time``.
     """
 
-    time: float
-    x: np.ndarray
-    v: np.ndarray
-    peaks: np.ndarray
-    times: np.ndarray
-    places: np.ndarray
-    events: np.ndarray
-    book: np.ndarray
-    impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
     reached: float = 0.0
-    step: float = 0.0
-    nsteps: int = 0
     short: int = 0
-    energy: float = 0.0
-    largest: float = 0.0
-    worst: float = 0.0
-    share: float = np.inf
-    rates: tuple = ()
-    recent: np.ndarray = field(default_factory=lambda: np.zeros((0, 4)))
-
-    @property
-    def stopped(self):
-        """Whether an event has ended the run."""
-        return bool(ended_by(self.events))
-
-    @property
-    def drift(self):
-        """Largest |ΔE − work| over the largest energy [1]."""
-        return float(self.worst / self.largest) if self.largest > 0.0 else 0.0
+    rates: tuple = field(default=(), metadata={"saved": False})
 
 
-class StepObserver:
+class StepObserver(Integrator):
     """A method of somebody's own steps on one system, with history rows, books, peaks and events around the steps.
 
     A subclass brings `begin`, `step` and `interpolated`.
@@ -108,20 +65,25 @@ class StepObserver:
     ----------
     system : refweb.system.system.System
         Of any order, with either mass.
-    probes, watch, events : sequence
-        What to look at, see `refweb.dynamics.integrators.central_difference.CentralDifference`.
+    probes, sums, events : sequence
+        What to look at, see `refweb.dynamics.integrators.integrator`.
     rtol : float
         Relative tolerance of displacements and velocities.
     atol_position, atol_velocity : float, optional
         Absolute tolerances [m], [m/s]; by default `scales` times rtol.
     """
 
-    method = ""
+    method, order = "", 2
+    knob, retry, beside = "rtol", 0.1, False
+    breathe = staticmethod(lambda t: None)
     takes_massless = takes_links = False
     """Whether nodes without mass have a place in the equations, and rigid links."""
 
-    def __init__(self, system, probes=(), watch=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
+    def __init__(self, system, probes=(), sums=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
         self.system, self.rtol = system, rtol
+        self.observed = tuple(probes), tuple(sums), tuple(events)
+        self._tolerances = dict(rtol=rtol, atol_position=atol_position, atol_velocity=atol_velocity)
+        self._keys = {}
         if not self.takes_massless:
             refuse_massless(system, self.method)
         if system.constraints and not self.takes_links:
@@ -137,14 +99,13 @@ class StepObserver:
         self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
         self.stats = dict(nfev=0, njev=0, nlu=0)
         families = system.families
-        self._probes, self._watch = list(probes), list(watch)
-        self._signs = np.array([float(p[-1]) for p in (*probes, *watch)])
+        self._signs = np.array([float(one.sign) for one in (*probes, *sums)])
         self._arrays = [
-            (probe, np.array(rows, dtype=np.int64), np.ascontiguousarray(data, dtype=float))
-            for probe, rows, data, _ in self._probes
+            (probe.kernel, np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float))
+            for probe in probes
         ]
-        self._events = event_table(events)
-        self._weights = np.array([w[0] for w in watch], dtype=float).reshape(len(watch), len(families) + 3)
+        self._events = event_rows(events)
+        self._weights = np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(families) + 3)
         self._book = (
             typed_list(INDICES, [f.cells for f in families]),
             typed_list(MATRIX, [f.data for f in families]),
@@ -215,22 +176,22 @@ class StepObserver:
         v = system.initial_velocity() if v is None else v.copy()
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        signs, count = self._signs, len(self._probes)
-        none, book = np.zeros(len(signs)), np.zeros(len(system.families) + 1)
-        run = Course(0.0, x, v, none, none.copy(), np.full(len(signs), -1), self._events.copy(), book)
+        signs, count = self._signs, len(self._arrays)
+        extremes = Extremes.at_start(np.zeros(len(signs)), np.full(len(signs), -1))
+        book = np.zeros(len(system.families) + 1)
+        run = ImplicitCourse(time=0.0, x=x, v=v, extremes=extremes, events=self._events.copy(), work=book)
         force, out = self.system.balance(0.0, x, v)
         where = np.full(2, PLACE)
         for i, (probe, rows, data) in enumerate(self._arrays):
-            run.peaks[i] = probe(0.0, x, v, force, out[0], rows, data, where)
-            run.places[i] = where[0]
+            extremes.values[i] = probe(0.0, x, v, force, out[0], rows, data, where)
+            extremes.places[i] = where[0]
         total = self._energies(run)
-        run.peaks[count:] = self._weights @ total
+        extremes.values[count:] = self._weights @ total
         for event in run.events:
-            begins(event, run.peaks[int(event[SLOT])])
+            starts_above(event, extremes.values[event["slot"]])
         stepping = count + np.flatnonzero(self._weights[:, -1])
-        run.peaks[stepping] = -np.inf * signs[stepping]  # no step has been taken
-        run.recent = np.full((len(signs), 4), np.nan)
-        run.recent[:, 2], run.recent[:, 3] = 0.0, run.peaks
+        extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        extremes.recent[:, 3] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.energy, run.largest = own.sum(), np.abs(own).sum()
         self._enter(run)
@@ -238,17 +199,30 @@ class StepObserver:
 
     def save(self, run):
         """The `Course` as arrays by name, for a checkpoint; a solver's past steps are not among them."""
-        kept = {f.name: np.asarray(getattr(run, f.name)) for f in fields(run) if f.name != "rates"}
-        return {**kept, "spent": np.array(list(self.stats.values()))}
+        return {**run.arrays(), "spent": np.array(list(self.stats.values()))}
 
     def load(self, arrays):
         """The `Course` of a checkpoint, from which the solver begins with short steps of order 1, as at t = 0."""
         arrays = dict(arrays)
         self.stats.update(zip(self.stats, arrays.pop("spent").tolist(), strict=True))
-        run = Course(**{name: array if array.ndim else array.item() for name, array in arrays.items()})
+        run = ImplicitCourse.of_arrays(arrays)
         run.reached = run.time
         self._enter(run)
         return run
+
+    def refined(self, by=None):
+        """The method with tolerances that are ``by`` times as small, by default `TWIN_TOLERANCES`."""
+        share = 1.0 / (TWIN_TOLERANCES if by is None else by)
+        tolerances = {key: share * value for key, value in self._tolerances.items() if value}
+        return type(self)(self.system, *self.observed, **self._keys, **tolerances)
+
+    def error_share(self, course, finer):
+        """Error of a finer run over that of this one: it goes with the tolerance to the power 2/3 at order 2."""
+        return TWIN_TOLERANCES ** (-2.0 / 3.0)
+
+    def next_knob(self, share):
+        """Factor on rtol for errors that are ``share`` times what they may be."""
+        return min(max(0.5 * share**-1.5, 0.01), 0.1)
 
     def _enter(self, run):
         """Initialise the solver at the state of a run."""
@@ -258,31 +232,17 @@ class StepObserver:
         with self._told(run):
             self.begin(run.time, run.x.ravel()[system.free], run.v.ravel()[system.free])
 
-    def advance(self, run, ends):
-        """Advance a run to each time of ``ends`` in turn.
-
-        Returns
-        -------
-        ndarray, shape (rows, columns)
-            Fewer rows than times where an event ends the run; as
-            `refweb.dynamics.integrators.central_difference.CentralDifference.advance`.
-
-        Raises
-        ------
-        OpenBook
-            Where the energy drift exceeds `refweb.dynamics.integrators.explicit_loop.DRIFT` and does not fall.
-        SolverError
-            Where the solver gives up, or a number is not finite.
-        """
-        ends = np.atleast_1d(np.asarray(ends, dtype=float))
-        history = np.zeros((len(ends), 1 + len(self._probes) + len(self.system.families) + 9))
-        for n, end in enumerate(ends):
+    def advance(self, run, times):
+        """Take a course to each of some times, see `refweb.dynamics.integrators.integrator.Integrator.advance`."""
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        history = History.empty(len(times), len(self._arrays), self.system.families)
+        for n, end in enumerate(times):
             before = run.time
             while run.time < end and not run.stopped:
                 if run.reached <= run.time:
                     self._take_step(run, end)
                 self._cover(run, min(run.reached, end))
-            self._fill(history[n], run, before)
+            self._fill(history.values[n], run, before)
             if run.stopped:
                 return history[: n + 1]
         return history
@@ -306,11 +266,11 @@ class StepObserver:
             if not reached > run.reached:
                 raise Stopped("no step is long enough to change the time")
         run.step, run.reached, run.nsteps = reached - run.reached, reached, run.nsteps + 1
-        run.short = run.short + 1 if run.step * MOST < end - run.time else 0
+        run.short = run.short + 1 if run.step * MAX_STEPS_PER_ROW < end - run.time else 0
         if run.short > PATIENCE:
             raise SolverError(
-                f"the steps at t = {run.time:.6g} s are {run.step:.3g} s, more than {MOST:g} to the next row: raise "
-                f"rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
+                f"the steps at t = {run.time:.6g} s are {run.step:.3g} s, more than {MAX_STEPS_PER_ROW:g} to the next "
+                f"row: raise rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
             )
 
     def _gap(self, x):
@@ -342,16 +302,16 @@ class StepObserver:
             if stop < end:
                 samples = [self._sample(t) for t in (0.5 * (run.time + stop), stop)]
                 rates = self._piece(run, samples)
-        end, count = float(samples[1][0]), len(self._probes)
+        end, count = float(samples[1][0]), len(self._arrays)
         for sample in samples:
             self._peaks(run, *sample[:5])
             if len(self._weights):
                 total = self._energies(self._there(run, rates, end, *sample[:3]))
                 for j, value in enumerate(self._weights @ total, count):
-                    if self._signs[j] * value > self._signs[j] * run.peaks[j]:
-                        run.peaks[j], run.times[j] = value, sample[0]
-                    culminate(j, sample[0], value, self._signs[j], run.recent, run.peaks, run.times)
-        run.book, run.impulse = self._booked(run, rates, end, end)
+                    if self._signs[j] * value > self._signs[j] * run.extremes.values[j]:
+                        run.extremes.values[j], run.extremes.times[j] = value, sample[0]
+                    quadratic_peak(run.extremes, j, sample[0], value, self._signs[j])
+        run.work, run.impulse = self._booked(run, rates, end, end)
         run.rates = rates[3]
         run.time, run.x, run.v = end, *samples[1][1:3]
         if rates[4] and self.system.net.spread is not None:  # what is free jumps as well
@@ -389,7 +349,7 @@ class StepObserver:
         a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
         start, middle, last = rates[:3]
         power, reaction, _, pull = (a * p + b * q + c * r for p, q, r in zip(start, middle, last, strict=True))
-        book, impulse = run.book + width * power, run.impulse + width * reaction
+        book, impulse = run.work + width * power, run.impulse + width * reaction
         book[-1] += pull @ (last[2] - start[2])
         if rates[4] and t == end:
             book[-1], impulse = book[-1] + rates[4][0], impulse + rates[4][1]
@@ -397,7 +357,7 @@ class StepObserver:
 
     def _there(self, run, rates, end, t, x, v):
         """The run at a state within a piece."""
-        return replace(run, time=t, x=x, v=v, book=self._booked(run, rates, end, t)[0])
+        return replace(run, time=t, x=x, v=v, work=self._booked(run, rates, end, t)[0])
 
     def _sample(self, t):
         return self._sample_of(t, *self._at(t))
@@ -422,16 +382,16 @@ class StepObserver:
         stop, before, piece = np.inf, run.time, (run, rates, samples[1][0])
         for sample in samples:
             for event in run.events:
-                if event[TIME] < np.inf:
+                if event["time"] < np.inf:
                     continue
-                was = event[SIDE]
-                if passes(event, self._value(event, piece, *sample[:5])):
-                    event[TIME], event[SIDE] = self._moment(event, piece, was, before, sample[0]), 0.0
-                    if event[STOP]:
-                        stop = min(stop, event[TIME])
+                was = event["side"]
+                if crosses(event, self._value(event, piece, *sample[:5])):
+                    event["time"] = self._moment(event, piece, was, before, sample[0])
+                    if event["stop"]:
+                        stop = min(stop, event["time"])
             before = sample[0]
-        late = (run.events[:, TIME] > stop) & (run.events[:, TIME] < np.inf)
-        run.events[late, TIME] = np.inf
+        times = run.events["time"]
+        times[(times > stop) & (times < np.inf)] = np.inf
         return stop
 
     def _moment(self, event, piece, was, low, high):
@@ -440,29 +400,30 @@ class StepObserver:
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 return high
-            if (1.0 if self._value(event, piece, *self._sample(middle)[:5]) > event[LEVEL] else -1.0) == was:
+            if (1.0 if self._value(event, piece, *self._sample(middle)[:5]) > event["level"] else -1.0) == was:
                 low = middle
             else:
                 high = middle
 
     def _value(self, event, piece, t, x, v, force, lines):
-        slot = int(event[SLOT])
-        if slot < len(self._probes):
+        slot = event["slot"]
+        if slot < len(self._arrays):
             probe, rows, data = self._arrays[slot]
             return probe(t, x, v, force, lines, rows, data, np.zeros(2, dtype=np.int64))
         total = self._energies(self._there(*piece, t, x, v))
-        return self._weights[slot - len(self._probes)] @ total
+        return self._weights[slot - len(self._arrays)] @ total
 
     def _peaks(self, run, t, x, v, force, lines):
+        extremes = run.extremes
         where = np.zeros(2, dtype=np.int64)
-        for i in np.flatnonzero(self._signs[: len(self._probes)]):
+        for i in np.flatnonzero(self._signs[: len(self._arrays)]):
             probe, rows, data = self._arrays[i]
             value = probe(t, x, v, force, lines, rows, data, where)
-            if self._signs[i] * value > self._signs[i] * run.peaks[i]:
+            if self._signs[i] * value > self._signs[i] * extremes.values[i]:
                 where[1] = PLACE
                 probe(t, x, v, force, lines, rows, data, where)
-                run.peaks[i], run.times[i], run.places[i], where[1] = value, t, where[0], 0
-            culminate(i, t, value, self._signs[i], run.recent, run.peaks, run.times)
+                extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
+            quadratic_peak(extremes, i, t, value, self._signs[i])
 
     def _rates(self, t, x, v, force, lines, power):
         """Powers [W], force of the supports [N], natural lengths [m] and what pulls on them [N]."""
@@ -483,7 +444,7 @@ class StepObserver:
         """Energy of each family, kinetic energy, work [J] and step size [s]."""
         system, total = self.system, np.zeros(len(self.system.families) + 3)
         system.prepare(run.time)
-        numbers = (system.net.mass, *self._book, run.book, self._working)
+        numbers = (system.net.mass, *self._book, run.work, self._working)
         book_energies(run.time, run.x, run.v, *numbers, total)
         total[-3] = self._kinetic(run.v)
         total[-1] = run.step

@@ -400,7 +400,7 @@ def test_work_of_motion_is_force_times_way():
     found = []
     for rtol in (1e-4, 1e-6, 1e-8):
         run = ran(system, [0.03], rtol=rtol, family="adams")[1]
-        found.append(abs(run.book[-1] - energy))
+        found.append(abs(run.work[-1] - energy))
     assert energy > 1.0 and found[2] < found[1] < found[0] and found[2] < 1e-6 * energy
 
 
@@ -434,7 +434,7 @@ def test_consistent_mass_passes_a_motion_on():
             solver = Cvode(system, rtol=rtol, family="adams") if method == "cvode" else Ida(system, rtol=rtol)
             run = solver.start()
             solver.advance(run, np.linspace(0.0, 0.003, 11))
-            found.append([abs(run.v[1, 0] - speed), abs(run.book[-1] - work)])
+            found.append([abs(run.v[1, 0] - speed), abs(run.work[-1] - work)])
         assert (np.diff(found, axis=0) < 0.0).all()
         assert (found[-1] < np.array([1e-5 * abs(speed), 1e-5 * energy])).all(), (method, found, speed, work)
 
@@ -576,14 +576,14 @@ def test_rows_change_nothing():
     times = np.linspace(0.0, 0.02, 21)
     solver = motion.solver(1e-6)
     run = solver.start()
-    rows = solver.advance(run, times)
+    rows = solver.advance(run, times).values
     for sizes in ([1] * 21, [1, 2, 7, 11]):
         other = motion.solver(1e-6)
         again = other.start()
-        parts = [other.advance(again, part) for part in np.split(times, np.cumsum(sizes)[:-1])]
+        parts = [other.advance(again, part).values for part in np.split(times, np.cumsum(sizes)[:-1])]
         np.testing.assert_array_equal(np.vstack(parts), rows)
         assert (again.nsteps, again.drift) == (run.nsteps, run.drift)
-        np.testing.assert_array_equal(again.peaks, run.peaks)
+        np.testing.assert_array_equal(again.extremes.values, run.extremes.values)
     coarse = motion.solver(1e-6)
     end = coarse.start()
     coarse.advance(end, [0.0, times[1], 0.02])

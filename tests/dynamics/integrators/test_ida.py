@@ -55,7 +55,7 @@ def ran(solver, duration, rows=11):
 
 def deflection(node, sign=1):
     """Probe of the displacement of a node along z."""
-    return probes.displacement, [2, node, node + 1], np.zeros((1, 3)), sign
+    return probes.Probe(probes.displacement, [2, node, node + 1], np.zeros((1, 3)), sign)
 
 
 # The same motion
@@ -172,7 +172,7 @@ def test_cross_goes_as_far_as_its_energy():
     for name in SOLVERS:
         solver = Ida(system, [deflection(0)], rtol=1e-7, linear_solver=name)
         run, _ = ran(solver, 0.2)
-        np.testing.assert_allclose(run.peaks[0], furthest, rtol=1e-5)
+        np.testing.assert_allclose(run.extremes.values[0], furthest, rtol=1e-5)
         np.testing.assert_allclose(run.x[1::2, 2], 0.5 * run.x[0, 2], rtol=1e-7)
         np.testing.assert_allclose(run.v[1::2, 2], 0.5 * run.v[0, 2], atol=1e-5)
         assert run.drift < 1e-4
@@ -196,7 +196,7 @@ def test_window_goes_as_far_as_its_energy():
     furthest = brentq(lambda w: strained(w) - strained(0.0) - 0.5 * 0.1, 0.0, 0.1, xtol=1e-12)
     system = window(thrown((0.0, 0.0, 1.0)), density=0.0, prestrain=1e-2)
     run, _ = ran(Ida(system, [deflection(middle)], rtol=1e-7), 0.03)
-    np.testing.assert_allclose(run.peaks[0], furthest, rtol=1e-5)
+    np.testing.assert_allclose(run.extremes.values[0], furthest, rtol=1e-5)
     assert np.abs(run.x[middle, :2]).max() < 1e-9 and run.drift < 1e-5
 
 
@@ -283,17 +283,18 @@ def test_pendulum(order, rtol):
     In a period errors of some 1000 steps add up to 100 times the tolerance, of position, force and momentum alike.
     """
     system, off = chain(1, True, mass=2.0), 100.0 * rtol
-    reaction = probes.reaction, [2, 0, 1], np.eye(1, 6, 0) + np.eye(1, 6, 1) + np.eye(1, 6, 2), 1
+    weights = np.eye(1, 6, 0) + np.eye(1, 6, 1) + np.eye(1, 6, 2)
+    reaction = probes.Probe(probes.reaction, [2, 0, 1], weights, 1)
     solver = Ida(system, [reaction], rtol=rtol, max_order=order)
     period = 4.0 * ellipk(0.5) / np.sqrt(GRAVITY)
     run = solver.start()
     rows = solver.advance(run, period * np.array([0.0, 0.25, 0.5, 0.75, 1.0]))
-    np.testing.assert_allclose(rows[:, 1] / (3.0 * 2.0 * GRAVITY), [0.0, 1.0, 0.0, 1.0, 0.0], atol=off)
+    np.testing.assert_allclose(rows.probes[:, 0] / (3.0 * 2.0 * GRAVITY), [0.0, 1.0, 0.0, 1.0, 0.0], atol=off)
     np.testing.assert_allclose(run.x[1], 0.0, atol=off)
-    np.testing.assert_allclose(run.peaks[0], 3.0 * 2.0 * GRAVITY, rtol=off)
+    np.testing.assert_allclose(run.extremes.values[0], 3.0 * 2.0 * GRAVITY, rtol=off)
     # What gravity and the support have given is the momentum; the rows hold both.
-    given = rows[:, :1] * [0.0, 0.0, -2.0 * GRAVITY]
-    np.testing.assert_allclose(rows[:, -6:-3] - rows[:, -3:], given, atol=off * np.abs(given).max())
+    given = rows.time[:, None] * [0.0, 0.0, -2.0 * GRAVITY]
+    np.testing.assert_allclose(rows.momentum - rows.impulse, given, atol=off * np.abs(given).max())
     assert run.drift < off and (run.constraint_drift < off).all()
 
 

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
-from refweb.dynamics.integrators.splitting import Nystrom, splitting, stability
+from refweb.dynamics.integrators.splitting import Splitting, splitting, stability
 from refweb.errors import InputError
 
 ORDERS = [4, 6]
@@ -42,7 +42,7 @@ def exact(system, end):
 
 
 def ran(system, end, **steps):
-    solver = Nystrom(system, **steps)
+    solver = Splitting(system, **steps)
     run = solver.start()
     return solver, run, solver.advance(run, [end])
 
@@ -90,7 +90,7 @@ def test_coefficients(order):
 @pytest.mark.parametrize("order", ORDERS)
 def test_bound_of_stability(order):
     """A mass on a linear spring stays bounded below it; longer steps are refused."""
-    solver = Nystrom(window(), order=order)
+    solver = Splitting(window(), order=order)
     limit = stability(solver.kicks, solver.drifts)
     assert solver.stretch == pytest.approx(0.5 * limit)
     for share in (0.3, 0.6, 0.9, 0.99):
@@ -103,7 +103,7 @@ def test_bound_of_stability(order):
             largest = max(largest, abs(q))
         assert largest < 10.0  # near a resonance the ellipse that it moves on is long
     with pytest.raises(InputError, match="step_size = .* must be ≤"):
-        Nystrom(window(), order=order, step_size=1.01 * solver.stretch * solver.bound())
+        Splitting(window(), order=order, step_size=1.01 * solver.stretch * solver.bound())
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -151,7 +151,7 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_is_refused(name):
     with pytest.raises(InputError, match='method = "explicit" takes no.*use "central-difference" or "cvode"'):
-        Nystrom(window([REFUSED[name]]))
+        Splitting(window([REFUSED[name]]))
 
 
 def test_keys():

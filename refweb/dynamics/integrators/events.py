@@ -1,0 +1,84 @@
+"""Events: moments at which the value of a probe, or of a sum, passes a level."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels import kernel
+
+EVENT = np.dtype(
+    [
+        ("slot", np.int64),
+        ("level", float),
+        ("rising", np.int64),
+        ("at_once", np.int64),
+        ("stop", np.int64),
+        ("side", float),
+        ("time", float),
+        ("width", float),
+    ]
+)
+"""An event in the loop: slot, level and flags as in `Event`; the side of the level that its value is on, 1 above, −1
+not and 0 before any is known; the time at which it has happened [s], infinite before; and how much earlier that may
+have been [s]."""
+
+
+class Event(NamedTuple):
+    """An event to report the time of.
+
+    Attributes
+    ----------
+    slot : int
+        Number of the probe or, behind the probes, of the sum.
+    level : float
+        The level that its value passes.
+    rising : bool
+        Whether only passing upwards counts.
+    stop : bool
+        Whether the run ends there.
+    at_once : bool
+        Whether being above at t = 0 counts, as a contact does.
+    """
+
+    slot: int
+    level: float
+    rising: bool = False
+    stop: bool = False
+    at_once: bool = False
+
+
+def event_rows(events):
+    """Events as an array of `EVENT`, none of which has happened."""
+    rows = np.zeros(len(events), dtype=EVENT)
+    for row, event in zip(rows, events, strict=True):
+        for name, value in event._asdict().items():
+            row[name] = value
+    rows["time"] = np.inf
+    return rows
+
+
+@kernel()
+def crosses(event, value):
+    """Whether an event happens with this value; notes the side it is on."""
+    side = 1.0 if value > event.level else -1.0
+    before, event.side = event.side, side
+    return side != before and (side > 0.0 or event.rising == 0)
+
+
+@kernel()
+def starts_above(event, value):
+    """Note the side of an event at t = 0; where it happens by being there, it has happened."""
+    if crosses(event, value) and event.at_once:
+        event.time = 0.0
+
+
+@kernel()
+def ended_by(events):
+    """Whether an event has ended the run."""
+    for e in range(events.shape[0]):
+        if events[e].stop and events[e].time < math.inf:
+            return True
+    return False

@@ -1,0 +1,298 @@
+"""What an integrator is: one system taken through time, looked at by probes, with its books of energy and momentum.
+
+A method is a class that has what `Integrator` lists; `refweb.registry.INTEGRATORS` gives it its name in scenes. It is
+made of a system and of what is to be looked at:
+
+* `refweb.results.probes.Probe`, one scalar of the state each, in the rows and, with a sign, as extreme of all steps;
+* `Sum`, the same of energies, work and step size;
+* `refweb.dynamics.integrators.events.Event`, a moment at which one of these passes a level.
+
+``start`` makes a `Course`, the whole state of a run; ``advance`` takes it on and returns a `History` of rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from .events import ended_by
+from .extremes import Extremes
+
+MAX_STEPS_PER_ROW = 1e8
+"""Largest number of steps that a history row may take."""
+AXES = "xyz"
+
+
+class Sum(NamedTuple):
+    """A weighted sum of what the book of energies holds, to look at in every step.
+
+    Attributes
+    ----------
+    weights : ndarray, shape (families + 3,)
+        Of the energy of each family, kinetic energy, work and step size: the columns of `History.sums`.
+    sign : float
+        1 for the largest value of all steps, −1 for the smallest, 0 for neither.
+    """
+
+    weights: np.ndarray
+    sign: float = 0.0
+
+
+@dataclass(eq=False, kw_only=True)
+class Course:
+    """Where a run is: all that it takes to go on from there.
+
+    Attributes
+    ----------
+    time : float
+        Time [s].
+    x, v : ndarray, shape (rows, 3)
+        Displacement [m] and velocity [m/s].
+    extremes : refweb.dynamics.integrators.extremes.Extremes
+        Extreme value of each probe and, behind them, of each sum.
+    events : ndarray of `refweb.dynamics.integrators.events.EVENT`, shape (events,)
+        What each event has come to.
+    work : ndarray, shape (families + 1,)
+        Work of each family that is booked by its power and, last, of motion [J].
+    impulse : ndarray, shape (3,)
+        Impulse of the supports on the net [N s].
+    nsteps : int
+        Steps taken.
+    step : float
+        Size of the last one [s].
+    energy : float
+        Energy at the start [J].
+    largest : float
+        Largest energy of the rows, families and motion without regard to sign [J].
+    worst : float
+        Largest |ΔE − work| of the rows [J].
+    share : float
+        |ΔE − work| at the last row over ``largest`` there [1], infinite before the first.
+    """
+
+    time: float
+    x: np.ndarray
+    v: np.ndarray
+    extremes: Extremes
+    events: np.ndarray
+    work: np.ndarray
+    impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    nsteps: int = 0
+    step: float = 0.0
+    energy: float = 0.0
+    largest: float = 0.0
+    worst: float = 0.0
+    share: float = np.inf
+
+    @property
+    def stopped(self):
+        """Whether an event has ended the run."""
+        return bool(ended_by(self.events))
+
+    @property
+    def drift(self):
+        """Largest |ΔE − work| over the largest energy [1]."""
+        return float(self.worst / self.largest) if self.largest > 0.0 else 0.0
+
+    def arrays(self):
+        """All of it as arrays by name, for a checkpoint; a field whose metadata says ``saved=False`` is left out."""
+        kept = {f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("saved", True)}
+        kept |= {f"extremes_{name}": array for name, array in kept.pop("extremes")._asdict().items()}
+        return {name: np.asarray(value) for name, value in kept.items()}
+
+    @classmethod
+    def of_arrays(cls, arrays):
+        """The course of a checkpoint."""
+        given = {name: array if array.ndim else array.item() for name, array in arrays.items()}
+        extremes = Extremes(*(given.pop(f"extremes_{name}") for name in Extremes._fields))
+        return cls(extremes=extremes, **given)
+
+
+@dataclass(frozen=True)
+class History:
+    """Rows of a run.
+
+    Attributes
+    ----------
+    names : tuple of str
+        What each column is.
+    values : ndarray, shape (rows, columns)
+        The rows.
+    probed : int
+        Number of probes.
+    """
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    probed: int
+
+    @classmethod
+    def empty(cls, rows, probed, families):
+        """Rows of zeros for a number of probes and the families of a system."""
+        names = ["time", *(f"probe {i}" for i in range(probed)), *(family.name for family in families)]
+        names += ["kinetic_energy", "work", "step_size"]
+        names += [f"{vector}_{axis}" for vector in ("momentum", "support_impulse") for axis in AXES]
+        return cls(tuple(names), np.zeros((rows, len(names))), probed)
+
+    def __len__(self):
+        return len(self.values)
+
+    def __getitem__(self, rows):
+        """Some of the rows, by a slice."""
+        return History(self.names, self.values[rows], self.probed)
+
+    @property
+    def time(self):
+        """Time of each row [s]."""
+        return self.values[:, 0]
+
+    @property
+    def probes(self):
+        """Value of each probe, shape (rows, probes)."""
+        return self.values[:, 1 : 1 + self.probed]
+
+    @property
+    def sums(self):
+        """What a `Sum` weighs: energy of each family, kinetic energy [J], work [J], step size [s]."""
+        return self.values[:, 1 + self.probed : -2 * len(AXES)]
+
+    @property
+    def energies(self):
+        """Energy of each family and, last, kinetic energy [J], shape (rows, families + 1)."""
+        return self.sums[:, :-2]
+
+    @property
+    def work(self):
+        """Work of all that acts from outside [J]."""
+        return self.sums[:, -2]
+
+    @property
+    def step_size(self):
+        """Size of the last step before each row [s]."""
+        return self.sums[:, -1]
+
+    @property
+    def momentum(self):
+        """Momentum of all that is free [N s], shape (rows, 3)."""
+        return self.values[:, -2 * len(AXES) : -len(AXES)]
+
+    @property
+    def impulse(self):
+        """Impulse of the supports on the net [N s], shape (rows, 3)."""
+        return self.values[:, -len(AXES) :]
+
+
+class Integrator(Protocol):
+    """A method of dynamics on one system.
+
+    It is made by ``Class(system, probes=(), sums=(), events=(), **keys)``, where ``keys`` are those of ``[solve]`` that
+    its line of `refweb.registry.INTEGRATORS` names; a system, or a key, that it does not take is an
+    `refweb.errors.InputError`.
+
+    Attributes
+    ----------
+    method : str
+        Its name in ``[solve]``.
+    order : int
+        Order of the error of a smooth motion in the step.
+    knob : {"safety", "rtol"}
+        The key that trades accuracy for time: a smaller one is a smaller error.
+    retry : float
+        Factor on the knob for another run where the book of energies stays open, below 1.
+    beside : bool
+        Whether ``advance`` runs compiled and releases the interpreter, so that a twin may run in a thread beside it.
+    breathe : callable
+        Called with the time [s] some times a second of ``advance``; it may raise, and then the run is as it was at the
+        row before.
+    """
+
+    method: str
+    order: int
+    knob: Literal["safety", "rtol"]
+    retry: float
+    beside: bool
+    breathe: Callable[[float], None]
+
+    def start(self, x: np.ndarray | None = None, v: np.ndarray | None = None) -> Course:
+        """The course at t = 0.
+
+        Parameters
+        ----------
+        x : ndarray, shape (rows, 3), optional
+            Displacement [m], by default none: the web's position. It is copied.
+        v : ndarray, shape (rows, 3), optional
+            Velocity [m/s], by default those of the scene. It is copied.
+
+        Returns
+        -------
+        Course
+            With the supports where motion has them, the values of probes and sums there as extremes, the events that
+            have happened by being there, and the energy at the start.
+        """
+
+    def advance(self, course: Course, times: Sequence[float]) -> History:
+        """Take a course to each of some times in turn.
+
+        Parameters
+        ----------
+        course : Course
+            Where it is; it is taken along.
+        times : sequence of float
+            Times of the rows [s], increasing, the first not before the course's own.
+
+        Returns
+        -------
+        History
+            A row at each time; fewer where an event ends the run, the last then at the time of that.
+
+        Raises
+        ------
+        OpenBook
+            Where the energy drift exceeds `refweb.dynamics.integrators.energy_book.DRIFT` and does not fall.
+        SolverError
+            Where no step is to be had, or a number is not finite.
+        """
+
+    def refuse_drift(self, course: Course) -> None:
+        """Refuse a course that is complete, where its energy drift exceeds what a result may have; `OpenBook`."""
+
+    def spent(self, course: Course) -> dict:
+        """What a course has spent, for ``run.json``.
+
+        Returns
+        -------
+        dict
+            ``nfev``, ``njev`` and ``nlu``, evaluations of forces and of tangents and factorizations, and whatever else
+            there is to say.
+        """
+
+    def save(self, course: Course) -> dict[str, np.ndarray]:
+        """A course as arrays by name, for a checkpoint."""
+
+    def load(self, arrays: dict[str, np.ndarray]) -> Course:
+        """The course of a checkpoint, for an integrator made of the same arguments."""
+
+    def refined(self, by: float | None = None) -> Integrator:
+        """The method on the same system, with the same probes, sums and events and a smaller error.
+
+        Parameters
+        ----------
+        by : float, optional
+            How many times as fine steps or tolerances are; by default as a twin has them, whose difference says what
+            the error is.
+        """
+
+    def error_share(self, course: Course, finer: Course) -> float:
+        """Error of a finer run over that of this one, by the order of the method [1].
+
+        Parameters
+        ----------
+        course, finer : Course
+            A run at its end, and that of ``refined()``.
+        """
+
+    def next_knob(self, share: float) -> float:
+        """Factor on the knob that brings down errors which are ``share`` times what they may be."""
