@@ -11,14 +11,14 @@ from rich.panel import Panel
 from rich.table import Table as Grid
 from rich.text import Text
 
+from .registry import EFFECTS, INTEGRATORS, name_of
 from .results.provenance import web_of
 from .results.units import prefixed
-from .scene import table_of
 
 _SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
 
 
-def shown(value, error, unit):
+def readable(value, error, unit):
     """A value with its error in a readable unit: ``31.4848 mm``, ``2.997291 ± 0.0000017 N``."""
     factor, prefix = 1.0, ""
     if unit in _SCALED and value:
@@ -57,7 +57,7 @@ def before(scene, system):
     law = cable.law
     if law == "smooth":
         law += f", ε0 = {cable.slackness:g}, η = {cable.smoothing:g}"
-    present = [table_of(effect) for effect in scene.effects]
+    present = [name_of(EFFECTS, effect) for effect in scene.effects]
     count = {name: present.count(name) for name in present}
     counted = [f"{name} × {times}" if times > 1 else name for name, times in count.items()]
     groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
@@ -71,10 +71,8 @@ def before(scene, system):
         how += "load steps " + ", ".join(f"{s:g}" for s in solve.load_steps[:8])
         how += ", ..." if len(solve.load_steps) > 8 else ""
     else:
-        if solve.rtol is not None:
-            step = f"rtol {solve.rtol:g}"
-        else:
-            step = f"safety {solve.safety:g}" if solve.step_size is None else f"step {solve.step_size:g} s"
+        knob = INTEGRATORS[solve.method].knob
+        step = f"{knob} {getattr(solve, knob):g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     _box(
@@ -100,7 +98,7 @@ def _results(steps):
         row = [f"{step['step']:g}"] if len(steps) > 1 else []
         for name in names:
             result = step["results"][name]
-            row.append(Text(shown(result["value"], result["error"], result["unit"])))
+            row.append(Text(readable(result["value"], result["error"], result["unit"])))
         grid.add_row(*row)
     return grid
 
@@ -109,7 +107,7 @@ def _reduced(results):
     grid = Grid.grid(padding=(0, 2))
     for name, result in results.items():
         where = "" if result["where"] is None else f"at {result['where']}"
-        value = shown(result["value"], result["error"], result["unit"])
+        value = readable(result["value"], result["error"], result["unit"])
         grid.add_row(Text(name), Text(value), Text(f"t = {result['time']:.6g} s"), Text(where))
     return grid
 
@@ -138,13 +136,15 @@ def stored(summary, more=()):
         for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
             found = {n: r for n, r in summary["results"].items() if r.get(key) is not None}
             if found:
-                parts = (f"{name} by {shown(r[key], None, r['unit'])}" for name, r in found.items())
+                parts = (f"{name} by {readable(r[key], None, r['unit'])}" for name, r in found.items())
                 rows.append(("", f"{text} {', '.join(parts)}"))
     if horizon := summary.get("horizon"):
         rows.append(("horizon", _determined(horizon)))
         for name, r in horizon.get("ensemble", {}).items():
             unit = summary["results"][name]["unit"]
-            rows.append(("", f"{name} {shown(r['mean'], r['deviation'], unit)} over the ensemble, standard deviation"))
+            rows.append(
+                ("", f"{name} {readable(r['mean'], r['deviation'], unit)} over the ensemble, standard deviation")
+            )
     rows += more
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
@@ -192,7 +192,7 @@ def _modes(step):
     results, squared = list(step["results"].values()), step["squared"]
     for k, result in enumerate(results):
         value, error = abs(result["value"]), result["error"]
-        text = shown(value, error, "Hz" if squared[k] >= 0.0 else "i Hz")
+        text = readable(value, error, "Hz" if squared[k] >= 0.0 else "i Hz")
         axes = " ".join(axis for axis, share in zip("xyz", step["shares"][k], strict=True) if share >= 0.1)
         remarks = [f"unstable, grows e-fold in {0.15915 / value:.3g} s"] if squared[k] < 0.0 < value else []
         remarks += ["zero within ±"] if error >= value else []

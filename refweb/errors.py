@@ -1,5 +1,9 @@
 """What refweb refuses, and what solvers raise."""
 
+import contextlib
+
+from .messages import one_line
+
 
 class InputError(ValueError):
     """Input that refweb refuses; the message is one line with the value, the limit and the remedy."""
@@ -8,15 +12,23 @@ class InputError(ValueError):
         super().__init__(one_line(message))
 
 
-def one_line(text):
-    """A text without line breaks and control characters."""
-    text = " ".join(str(text).split())
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
 class SolverError(RuntimeError):
     """A solver that found no answer; the message says what, where and when."""
 
 
 class OpenBook(SolverError):
     """The energy of a run drifted away from the work done on it."""
+
+
+@contextlib.contextmanager
+def refused_at(place):
+    """Begin what is refused inside with its place, such as ``[web]`` or ``net.toml:``."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{place} {error}") from None
+
+
+def in_file(name):
+    """Begin what is refused inside with the name of the scene file; ``name`` is empty where there is none."""
+    return refused_at(f"{name}:" if name else "")

@@ -1,7 +1,8 @@
 """Tables of names: what a scene or the command line may call for, and where it lives.
 
-A line is a name and the ``"module:name"`` that brings it, imported when it is called for and not before. What is in a
-table is known to scene files, checks, messages and help; nothing else has to be told.
+A line is a name and the ``"module:name"`` that brings it, or the ``"module"`` that it is; it is imported when it is
+called for and not before. What is in a table is known to scene files, checks, messages and help; nothing else has to be
+told.
 """
 
 from __future__ import annotations
@@ -36,8 +37,6 @@ EFFECTS = {
     "temperature": "refweb.effects.temperature:Temperature",
 }
 """Effects by the name of their table."""
-LISTS = ("load", "motion", "point_mass", "velocity", "body", "link", "pressure", "thrust", "reel")
-"""Effects whose table may stand several times, ``[[load]]``."""
 
 
 class Method(NamedTuple):
@@ -68,9 +67,55 @@ STATICS = {
     "relaxation": "refweb.statics.dynamic_relaxation:solve",
 }
 """Methods of statics: functions of a system, load steps and progress that yield an equilibrium at each."""
+COMMANDS = {
+    "run": "refweb.commands.run",
+    "resume": "refweb.commands.resume",
+    "check": "refweb.commands.check",
+    "info": "refweb.commands.info",
+    "picture": "refweb.commands.picture",
+    "modes": "refweb.commands.modes",
+    "cost": "refweb.commands.cost",
+}
+"""Verbs of the command line, in the order of its help."""
+EXPORTS = (
+    "refweb.runner:run",
+    "refweb.runner:resume",
+    "refweb.studies.modes:modes",
+    "refweb.studies.modes:Modes",
+    "refweb.studies.work_precision:cost",
+    "refweb.studies.work_precision:Cost",
+    "refweb.scene:Scene",
+    "refweb.settings:Static",
+    "refweb.settings:Dynamic",
+    "refweb.settings:Supports",
+    "refweb.settings:Output",
+    "refweb.settings:Accuracy",
+    "refweb.settings:Event",
+    "refweb.results.observables:Observe",
+    "refweb.results.solution:Solution",
+    "refweb.net.cable:Cable",
+    "refweb.net.cable:Group",
+    "refweb.net.tension_laws:Law",
+    "refweb.net.web:Web",
+    "refweb.errors:InputError",
+    "refweb.errors:SolverError",
+)
+"""What ``refweb.NAME`` may be besides webs and effects."""
+
+
+def exports():
+    """Where each name of the package lives: classes of webs and effects, and `EXPORTS`."""
+    return {reference.split(":")[1]: reference for reference in (*EXPORTS, *WEBS.values(), *EFFECTS.values())}
 
 
 def load(reference):
-    """What a ``"module:name"`` stands for."""
-    module, name = reference.split(":")
-    return getattr(importlib.import_module(module), name)
+    """What a ``"module:name"`` or a ``"module"`` stands for."""
+    module, _, name = reference.partition(":")
+    found = importlib.import_module(module)
+    return getattr(found, name) if name else found
+
+
+def name_of(table, value):
+    """Name under which the class of a value stands in a table, None where it is not in it."""
+    own = f"{type(value).__module__}:{type(value).__qualname__}"
+    return next((name for name, reference in table.items() if reference == own), None)

@@ -7,12 +7,13 @@ import time
 
 import numpy as np
 
-from .errors import InputError, SolverError
+from .errors import InputError, in_file
+from .messages import short
 from .results.folder import Folder, check_folder, read_summary
 from .results.provenance import versions, web_of
+from .results.run_status import Clock, recorded
 from .results.solution import Solution, as_history
-from .scene import Scene, in_file
-from .tables import short
+from .scene import Scene
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):
@@ -84,7 +85,7 @@ def resume(folder, progress=None, announce=None):
     if summary.get("status") == "solved":
         raise InputError(f"{name} holds a solved run: there is nothing to go on with")
     scene = Scene.load(folder / "scene.toml")
-    if summary.get("kind") in ("modes", "cost") or scene.solve.kind == "static":
+    if "kind" in summary or scene.solve.kind == "static":
         raise InputError(f"{name} holds no dynamic run, and nothing else has checkpoints: use refweb run --force")
     check_folder(folder, force=True)
     kept = checkpoint(folder, name) if (folder / "checkpoint.npz").exists() else None
@@ -95,7 +96,7 @@ def resume(folder, progress=None, announce=None):
 
 def _solve(scene, out, progress, announce, kept=None, summary=None):
     """Solve a scene; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on."""
-    started = time.process_time(), time.perf_counter()
+    clock = Clock()
     system = scene.build()
     if announce is not None:
         announce(scene, system)
@@ -110,30 +111,21 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
     folder = Folder(out, scene, solution.columns, solution.summary(), row=row) if out is not None else None
     tell = progress or (lambda text, share: None)
     try:
-        follower.follow(folder, tell)
-        if scene.accuracy.refine:
-            tell("finding the errors of elements", 1.0)
-            _refine(scene, solution)
-        if scene.accuracy.horizon:
-            from .studies.predictability import horizon
+        with recorded(solution, clock, lambda: follower.done):
+            follower.follow(folder, tell)
+            if scene.accuracy.refine:
+                tell("finding the errors of elements", 1.0)
+                _refine(scene, solution)
+            if scene.accuracy.horizon:
+                from .studies.predictability import horizon
 
-            solution.horizon = horizon(follower, solution.results, scene.accuracy.ensemble, tell)
-        solution.status = "solved"
-    except KeyboardInterrupt:
-        solution.status, solution.message = "interrupted", f"interrupted after {follower.done}"
-        raise
-    except SolverError as error:
-        solution.status, solution.message = "failed", str(error)
-        raise
-    except Exception as error:
-        solution.status, solution.message = "failed", f"{type(error).__name__}: {error}"
-        raise
+                solution.horizon = horizon(follower, solution.results, scene.accuracy.ensemble, tell)
     finally:
         if folder is None or scene.solve.kind == "static":
             solution.table = as_history(solution.columns, follower.rows)
         else:
             solution.path = folder.path.absolute()
-        solution.cost = _cost(system, solution, started)
+        solution.cost["by_effect"] = _shares(system, solution)
         solution.warnings += follower.remarks()
         if folder is not None:
             folder.close()
@@ -188,9 +180,8 @@ def _notices(scene, system):
         yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
 
 
-def _cost(system, solution, started):
-    """CPU and wall time, and an estimate of each effect's share: its kernel alone at the last state × its calls."""
-    cpu, wall = time.process_time() - started[0], time.perf_counter() - started[1]
+def _shares(system, solution):
+    """Estimate of each effect's share of the CPU time [s]: its kernel alone at the last state × its calls."""
     state, share = solution.state, {}
     for family in system.families if state is not None else ():
         best = np.inf
@@ -199,4 +190,4 @@ def _cost(system, solution, started):
             system.force_of(family, state.time, state.x)
             best = min(best, time.process_time() - begin)
         share[family.name] = share.get(family.name, 0.0) + best * (solution.solver["nfev"] or 0)
-    return {"cpu_s": cpu, "wall_s": wall, "by_effect": share}
+    return share

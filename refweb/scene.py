@@ -6,21 +6,19 @@ an effect is imported when its table is.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import pathlib
 import re
 import tomllib
 from dataclasses import dataclass, field, replace
 
-import numpy as np
+from .errors import InputError, in_file
+from .messages import nearest, short, shown
+from .registry import EFFECTS, WEBS, load, name_of
+from .settings import START_STATES, Accuracy, Dynamic, Event, Output, Static, Supports
+from .tables import Table, checked, choice, integer, text
 
-from .errors import InputError
-from .registry import EFFECTS, LISTS, WEBS, load
-from .settings import Accuracy, Dynamic, Event, Output, Static, Supports
-from .tables import Table, choice, integer, nearest, short, shown, text
-
-KINDS = {
+CLASSES_OF_PARTS = {
     "cable": ("Cable",),
     "supports": ("Supports", "NoneType"),
     "support": ("Supports",),
@@ -31,12 +29,9 @@ KINDS = {
     "event": ("Event",),
 }
 """Classes of the other parts of a scene."""
-STARTS = ("web", "equilibrium")
-"""What ``start`` may be besides a result folder."""
-SHIPPED = pathlib.Path(__file__).parent / "scenes"
-
-
-ROWS = 10_000_000
+SHIPPED_SCENES = pathlib.Path(__file__).parent / "scenes"
+"""Folder of the scenes shipped with refweb."""
+MAX_HISTORY_ROWS = 10_000_000
 """Largest number of history rows."""
 
 
@@ -76,7 +71,7 @@ class Scene:
     InputError
         For an empty title or one above 200 characters, a negative seed, what is no list or no effect among them; in
         statics for an interval, digits, a horizon and events; in dynamics for an interval above the duration, or one
-        that makes more than `ROWS` rows. What does not fit the web or together is refused by `build`.
+        that makes more than `MAX_HISTORY_ROWS` rows. What does not fit the web or together is refused by `build`.
     """
 
     web: object
@@ -95,15 +90,17 @@ class Scene:
     file: str = field(default="", compare=False)
 
     def __post_init__(self):
-        for key, value in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
-            object.__setattr__(self, key, value.metadata["read"](key, getattr(self, key)))
+        for key, kind in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
+            object.__setattr__(self, key, checked(key, getattr(self, key), kind))
         for key in ("effects", "support", "observe", "event"):
             if not isinstance(getattr(self, key), (list, tuple)):
                 raise InputError(f"{key} = {shown(getattr(self, key))} must be a list")
             object.__setattr__(self, key, tuple(getattr(self, key)))
         for effect in self.effects:
-            table_of(effect)
-        for key, kinds in KINDS.items():
+            if name_of(EFFECTS, effect) is None:
+                kind = type(effect).__name__
+                raise InputError(f"{kind} is no effect, {nearest(kind, EFFECTS)}")
+        for key, kinds in CLASSES_OF_PARTS.items():
             value = getattr(self, key)
             for one in value if isinstance(value, tuple) else [value]:
                 if type(one).__name__ not in kinds:
@@ -131,9 +128,9 @@ class Scene:
             return
         if interval > self.solve.duration:
             raise InputError(f"[output] interval = {interval:g} must be ≤ duration = {self.solve.duration:g} [s]")
-        if self.solve.duration / interval > ROWS:
-            count = self.solve.duration / interval
-            raise InputError(f"[output] interval = {interval:g} makes {count:.3g} history rows, at most {ROWS}")
+        if self.solve.duration / interval > MAX_HISTORY_ROWS:
+            rows = f"{self.solve.duration / interval:.3g} history rows"
+            raise InputError(f"[output] interval = {interval:g} makes {rows}, at most {MAX_HISTORY_ROWS}")
 
     @staticmethod
     def load(source):
@@ -146,7 +143,7 @@ class Scene:
         """
         if not isinstance(source, (str, os.PathLike)):
             raise InputError(f"scene = {shown(source)} must be a Scene, a scene file or the name of a shipped scene")
-        path, shipped = pathlib.Path(source), sorted(SHIPPED.glob("*.toml"))
+        path, shipped = pathlib.Path(source), sorted(SHIPPED_SCENES.glob("*.toml"))
         if not os.path.isfile(path):
             known = [p.stem for p in shipped]
             if str(path).removesuffix(".toml") not in known:
@@ -172,7 +169,7 @@ class Scene:
         for key in given:
             if key not in known:
                 raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {nearest(key, known)}")
-        choice(1).metadata["read"]("schema", given.get("schema", 1))
+        checked("schema", given.get("schema", 1), choice(1))
         parts = {key: given[key] for key in ("title", "seed") if key in given}
         parts |= {"folder": folder, "file": file}
         for key in ("web", "cable", "solve"):
@@ -190,7 +187,7 @@ class Scene:
         for key in given:
             if key in EFFECTS:
                 table = load(EFFECTS[key])
-                effects += _each(key, table, given[key]) if key in LISTS else [table.read(f"[{key}]", given[key])]
+                effects += _each(key, table, given[key]) if table.several else [table.read(f"[{key}]", given[key])]
         return Scene(**parts, effects=tuple(effects))
 
     def to_dict(self):
@@ -206,8 +203,8 @@ class Scene:
         if self.support:
             given["support"] = [_axes(s.to_dict()) for s in self.support]
         for effect in self.effects:
-            key = table_of(effect)
-            if key in LISTS:
+            key = name_of(EFFECTS, effect)
+            if effect.several:
                 given.setdefault(key, []).append(effect.to_dict())
             else:
                 given[key] = effect.to_dict()
@@ -233,7 +230,7 @@ class Scene:
     def start_folder(self):
         """The result folder that a dynamic scene starts from, None where it starts from none."""
         start = getattr(self.solve, "start", "web")
-        return None if start in STARTS else (self.folder or pathlib.Path()).joinpath(start).resolve()
+        return None if start in START_STATES else (self.folder or pathlib.Path()).joinpath(start).resolve()
 
     def replace(self, **changes):
         """A scene that differs in some fields."""
@@ -247,128 +244,27 @@ class Scene:
         InputError
             For whatever does not fit together; the message names file and table.
         """
+        from .build import build
+
         with in_file(self.file):
-            return self._build()
-
-    def _build(self):
-        from .effects.elasticity import Elasticity
-        from .net import net as lines
-        from .system.system import System
-
-        web = self.web
-        if isinstance(web, Table):
-            try:
-                web = _in("[web]", web.web, self.folder)
-            except OSError as error:
-                path = shown(getattr(web, "path", ""))
-                raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
-        self._check_memory(len(web.lines))
-        static, consistent = self.solve.kind == "static", self.solve.mass == "consistent"
-        net = _in("", lines.build, web, self.cable, quasi_static=static, consistent=consistent)
-        supported = np.zeros((len(net.points), 3), dtype=bool)
-        if self.supports is None:
-            supported[web.rim] = True
-        where = [("[supports]", self.supports)] if self.supports is not None else []
-        where += [(f"[[support]] {i + 1}", s) for i, s in enumerate(self.support)]
-        for name, table in where:
-            found = _in(name, net.find, table.nodes, "nodes")
-            supported[np.ix_(found, table.components)] = True
-        acting, count = [Elasticity()], {}
-        tables = list(dict.fromkeys(["body", *map(table_of, self.effects)]))  # others act on bodies
-        for effect in sorted(self.effects, key=lambda effect: tables.index(table_of(effect))):
-            key = table_of(effect)
-            count[key] = count.get(key, 0) + 1
-            acting.append(_Named(f"[[{key}]] {count[key]}" if key in LISTS else f"[{key}]", effect))
-            if key not in LISTS and count[key] > 1:
-                raise InputError(f"[{key}] stands {count[key]} times: a scene has one")
-        system = System(net, acting, supported)
-        _distinct_motions(system)
-        if system.constraints:
-            self._check_links()
-        if self.start_folder is not None and self.accuracy.refine:
-            raise InputError(
-                f"[accuracy] refine = true must be false with [solve] start = {shown(self.solve.start)}: its state is "
-                "that of these elements, and finer ones have other nodes"
+            return build(
+                web=self.web,
+                cable=self.cable,
+                effects=self.effects,
+                supports=self.supports,
+                support=self.support,
+                solve=self.solve,
+                output=self.output,
+                accuracy=self.accuracy,
+                observables=self.observables,
+                events=self.event,
+                folder=self.folder,
             )
-        system.initial_velocity()
-        own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
-        columns = dict.fromkeys(own, "a column of its own")
-        for i, observable in enumerate(self.observables):
-            _in(f"[[observe]] {i + 1}", observable.on, system)
-            if (stands := columns.get(observable.name)) is not None:
-                name = shown(observable.name)
-                raise InputError(f"[[observe]] {i + 1} name = {name} is {stands} of history.csv: names are unique")
-            columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
-        for i, event in enumerate(self.event):
-            _in(f"[[event]] {i + 1}", self._check_event, event, i, system)
-        return system
-
-    def _check_memory(self, lines):
-        from . import memory
-
-        solve, elements = self.solve, lines * self.cable.subdivide
-        steps = len(solve.load_steps) if solve.kind == "static" else 0
-        bodies = sum(table_of(effect) == "body" for effect in self.effects)
-        explicit = solve.method in ("central-difference", "explicit")
-        size = memory.needed(elements, self.cable.order, explicit, bodies, steps // self.output.frames)
-        more = f", {bodies} bodies" * (bodies > 0) + f" and {steps} load steps" * (steps > 1)
-        name = f"[web] {lines} lines with [cable] subdivide = {self.cable.subdivide}, order = {self.cable.order}"
-        memory.check(size, f"{name}{more}")
-
-    def _check_links(self):
-        if self.solve.method not in ("ida", "auto"):
-            here = f'kind = "{self.solve.kind}" and method = "{self.solve.method}"'
-            raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = "ida", not {here}')
-        if self.solve.start == "equilibrium":
-            raise InputError('[solve] start = "equilibrium" knows no [[link]]: it must be "web" or a result folder')
-
-    def _check_event(self, event, number, system):
-        if event.name in (names := [e.name for e in self.event])[:number]:
-            raise InputError(f"name = {shown(event.name)} is that of [[event]] {names.index(event.name) + 1}")
-        if event.kind == "contact":
-            if not any(family.name == "contact" for family in system.families):
-                raise InputError('kind = "contact" needs a [contact] in the scene')
-            bodies = [body.name for body in system.net.bodies]
-            if event.body is not None and event.body not in bodies:
-                raise InputError(f"body = {shown(event.body)} is no body, {nearest(event.body, bodies)}")
-        if event.kind == "taut" and event.line >= len(system.net.web.lines):
-            raise InputError(f"line = {event.line} must be 0 … {len(system.net.web.lines) - 1}")
-        if event.kind == "threshold" and event.observe not in (names := [o.name for o in self.observables]):
-            raise InputError(f"observe = {shown(event.observe)} is no observable, {nearest(event.observe, names)}")
-
-
-class _Named:
-    """An effect whose refusals name its table."""
-
-    def __init__(self, where, effect):
-        self.where, self.effect = where, effect
-
-    def __getattr__(self, name):
-        method = getattr(self.effect, name)
-        return lambda *arguments: _in(self.where, method, *arguments)
-
-
-def table_of(effect):
-    """Name of the table of an effect."""
-    own = f"{type(effect).__module__}:{type(effect).__qualname__}"
-    for key, reference in EFFECTS.items():
-        if reference == own:
-            return key
-    raise InputError(f"{type(effect).__name__} is no effect, {nearest(type(effect).__name__, EFFECTS)}")
 
 
 def slug(title):
     """A title as the name of a folder, of at most 80 characters."""
     return re.sub(r"[\W_]+", "-", title.lower()).strip("-")[:80].strip("-") or "result"
-
-
-@contextlib.contextmanager
-def in_file(file):
-    """Begin refusals with the name of the scene file."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{file}: {error}" if file else str(error)) from None
 
 
 def _as_given(key, value):
@@ -383,13 +279,6 @@ def _as_given(key, value):
 
 def _resolve(table):
     return load(table) if isinstance(table, str) else table
-
-
-def _in(where, call, *arguments, **named):
-    try:
-        return call(*arguments, **named)
-    except InputError as error:
-        raise InputError(f"{where} {error}".strip()) from None
 
 
 def _each(key, table, given):
@@ -413,10 +302,3 @@ def _by_kind(key, given, kinds):
 
 def _axes(table):
     return {**table, "components": ["xyz"[c] for c in table["components"]]}
-
-
-def _distinct_motions(system):
-    driven = np.concatenate([d.cells[:, 0] for d in system.drives]) if system.drives else np.zeros(0, dtype=int)
-    numbers, times = np.unique(driven, return_counts=True)
-    if (times > 1).any():
-        raise InputError(f"[[motion]] node = {numbers[times > 1][0]} is moved by two tables: merge them")

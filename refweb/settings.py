@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .errors import InputError
+from .messages import shown
 from .registry import INTEGRATORS, STATICS
 from .tables import (
     Table,
@@ -17,9 +18,11 @@ from .tables import (
     nodes,
     numbers_list,
     real,
-    shown,
     text,
 )
+
+START_STATES = ("web", "equilibrium")
+"""What ``start`` may be besides a result folder."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +67,7 @@ class Static(Table):
     """
 
     kind: str = choice("static", default="static")
-    method: str = choice(*STATICS, default="newton")
+    method: str = choice(STATICS, default="newton")
     load_steps: tuple = numbers_list((1.0,))
     mass: str = choice("lumped", "consistent", default="lumped")
 
@@ -72,10 +75,6 @@ class Static(Table):
         """Refuse more load steps than 100 000."""
         if len(self.load_steps) > 100_000:
             raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
-
-
-KEYS_OF_METHOD = {**{name: method.keys for name, method in INTEGRATORS.items()}, "auto": ()}
-"""Keys of `Dynamic` that have a meaning with one method or another."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +119,7 @@ class Dynamic(Table):
     """
 
     kind: str = choice("dynamic", default="dynamic")
-    method: str = choice("central-difference", "explicit", "cvode", "ida", "auto", default="central-difference")
+    method: str = choice(INTEGRATORS, "auto", default="central-difference")
     duration: float = real(above=0, unit="s")
     safety: float | None = real(None, above=0, at_most=1)
     step_size: float | None = real(None, above=0, unit="s")
@@ -136,9 +135,10 @@ class Dynamic(Table):
 
     def check(self):
         """Refuse keys of another method, and fill in the defaults of this one."""
-        for key in {key for keys in KEYS_OF_METHOD.values() for key in keys}:
-            if getattr(self, key) is not None and key not in KEYS_OF_METHOD[self.method]:
-                methods = " or ".join(f'"{name}"' for name, keys in KEYS_OF_METHOD.items() if key in keys)
+        own = () if self.method == "auto" else INTEGRATORS[self.method].keys
+        for key in dict.fromkeys(key for method in INTEGRATORS.values() for key in method.keys):
+            if getattr(self, key) is not None and key not in own:
+                methods = " or ".join(f'"{name}"' for name, method in INTEGRATORS.items() if key in method.keys)
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning with method = "{self.method}", only with {methods}')
         if self.order == 5:
@@ -146,7 +146,7 @@ class Dynamic(Table):
         defaults = {"safety": 0.5, "order": 6, "rtol": 1e-6, "family": "bdf", "linear_solver": "auto"}
         defaults["max_order"] = 12 if self.family == "adams" else 2
         for key, value in defaults.items():
-            if getattr(self, key) is None and key in KEYS_OF_METHOD[self.method]:
+            if getattr(self, key) is None and key in own:
                 object.__setattr__(self, key, value)
         if self.family != "adams" and (self.max_order or 0) > 5:
             raise InputError(f"max_order = {self.max_order} must be ≤ 5 for BDF")
@@ -218,7 +218,7 @@ class Output(Table):
     ------
     InputError
         For an interval that is not > 0 and frames < 1; from `Scene`, for an interval in statics, one above the duration
-        or one that makes more than `refweb.scene.ROWS` rows.
+        or one that makes more than `refweb.scene.MAX_HISTORY_ROWS` rows.
     """
 
     interval: float | None = real(None, above=0, unit="s")

@@ -8,53 +8,18 @@ line that names the value, the limit and, for a misspelt name, the nearest valid
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 import numbers
 from dataclasses import MISSING
 
-from .errors import InputError, one_line
+from .errors import InputError, refused_at
+from .messages import closest, nearest, short, shown
 
 LARGEST = 1e100
 """Largest value of a number with a unit: products of three stay finite."""
 SMALLEST = 1e-100
 """Smallest value of a number that must not be negative, unless it is 0."""
 _WHOLE = 2**63 - 1
-
-
-def nearest(name, known):
-    """The part of a message that helps with an unknown name: the nearest valid one, else all of them."""
-    known = [str(k) for k in known]
-    close = _close(name, known)
-    if close:
-        return f'did you mean "{close}"?'
-    listed = ", ".join(known)
-    return "known: " + (listed if len(listed) <= 150 else listed[:150].rpartition(", ")[0] + ", ...")
-
-
-def _close(name, known):
-    """The valid name nearest to one, None if none is near."""
-    plain = {k.casefold(): k for k in reversed(known)}
-    found = difflib.get_close_matches(str(name).casefold(), plain, n=1, cutoff=0.5)
-    return plain[found[0]] if found else None
-
-
-def short(text):
-    """A text as a message shows it: at most 60 characters on one line."""
-    text = one_line(text[:1000])
-    return text if len(text) <= 60 else text[:57] + "..."
-
-
-def shown(value):
-    """A value as a message shows it: short, on one line, texts in quotes."""
-    if isinstance(value, str):
-        return f'"{short(value)}"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    try:
-        return short(str(list(value) if isinstance(value, tuple) else value))
-    except (ValueError, RecursionError):  # a number of thousands of digits, lists in lists in lists
-        return f"a {type(value).__name__} too large to show"
 
 
 def _refuse(name, value, limit):
@@ -113,6 +78,11 @@ def field(read, default=MISSING, unit="", factory=MISSING):
     return dataclasses.field(metadata={"read": read, "unit": unit}, **given)
 
 
+def checked(name, value, kind):
+    """A value as a field reads it: ``checked("seed", 3, integer(at_least=0))``."""
+    return kind.metadata["read"](name, value)
+
+
 def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit=""):
     """A finite real number within bounds."""
 
@@ -132,15 +102,16 @@ def integer(default=MISSING, *, at_least=None, at_most=None):
 
 
 def choice(*names, default=MISSING):
-    """One of a few names (or numbers)."""
+    """One of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
 
     def read(name, value):
-        for known in names:
+        valid = [one for given in names for one in (given if isinstance(given, dict) else [given])]
+        for known in valid:
             if type(value) is type(known) and value == known:
                 return known
-        close = _close(value, [n for n in names if isinstance(n, str)]) if isinstance(value, str) else None
+        close = closest(value, [n for n in valid if isinstance(n, str)]) if isinstance(value, str) else None
         hint = f' — did you mean "{close}"?' if close else ""
-        _refuse(name, value, ("one of " if len(names) > 1 else "") + ", ".join(map(shown, names)) + hint)
+        _refuse(name, value, ("one of " if len(valid) > 1 else "") + ", ".join(map(shown, valid)) + hint)
 
     return field(read, default)
 
@@ -268,13 +239,12 @@ def component(default=MISSING):
 
 def components(default=MISSING):
     """A list of axes; read as a sorted tuple of 0, 1, 2."""
-    read_one = component().metadata["read"]
 
     def read(name, value):
         value = _list(name, value, 'a list of "x", "y", "z"')
         if not value:
             _refuse(name, value, 'a list with at least one of "x", "y", "z"')
-        return tuple(sorted({read_one(f"{name}[{i}]", x) for i, x in enumerate(value)}))
+        return tuple(sorted({checked(f"{name}[{i}]", x, component()) for i, x in enumerate(value)}))
 
     return field(read, default)
 
@@ -283,8 +253,10 @@ class Table:
     """Base of all tables: checks its fields when made, and reads itself from a dict.
 
     Subclasses are ``@dataclass(frozen=True, kw_only=True)`` with fields made by the functions above. ``check`` may
-    refuse combinations of values.
+    refuse combinations of values; ``several`` says whether a scene may have more than one, ``[[load]]``.
     """
+
+    several = False
 
     def __post_init__(self):
         for f in dataclasses.fields(self):
@@ -310,10 +282,8 @@ class Table:
             if f.default is MISSING and f.default_factory is MISSING and f.name not in given:
                 unit = f" [{f.metadata['unit']}]" if f.metadata["unit"] else ""
                 raise InputError(f"{where} {f.name} is missing: give {f.name} = ...{unit}")
-        try:
+        with refused_at(where):
             return cls(**given)
-        except InputError as error:
-            raise InputError(f"{where} {error}") from None
 
     def to_dict(self):
         """The table as plain TOML values, defaults filled in, absent values left out."""

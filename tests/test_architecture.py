@@ -17,7 +17,7 @@ from refweb.registry import EFFECTS
 from refweb.tables import Table
 
 ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of its docstring
-    ("the ground floor", "errors tables kernels memory settings registry", ""),
+    ("the ground floor", "errors messages tables kernels memory settings registry", ""),
     (
         "net",
         "*",
@@ -162,7 +162,7 @@ def test_a_package_says_what_it_knows(room):
 
 def test_the_package_imports_nothing_at_its_head():
     head = [node for node in MODULES[""].body if isinstance(node, ast.Import | ast.ImportFrom)]
-    assert head == [] and uses("") == {"tables", "registry"}
+    assert head == [] and uses("") == {"messages", "registry"}
 
 
 ELASTICITY = "effects.elasticity"
@@ -186,7 +186,7 @@ def test_one_table_names_the_effects():
     found = {name: named(name) for name in INSIDE if not name.startswith("effects") and named(name)}
     assert found.pop("registry") == OWNERS - {"effects.elasticity"}
     assert found.keys() <= {
-        "scene",
+        "build",
         "results.state",
         "statics.interior_point",
         "statics.duality_bound",

@@ -17,15 +17,15 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
-from refweb.registry import EFFECTS, LISTS, WEBS
-from refweb.scene import SHIPPED
+from refweb.registry import EFFECTS, WEBS, load
+from refweb.scene import SHIPPED_SCENES
 
 ROOT = pathlib.Path(refweb.__file__).parent
 MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in ROOT.rglob("*.py")}
 
 # Modules
 
-EVERY = {"errors", "tables", "kernels", "memory", "settings", "registry", "scene", "runner"}
+EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
 EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.shapes", "net.rigid_body"}
 EVERY |= {"effects", "effects.base", "effects.elasticity", "system", "system.system"}
 EVERY |= {f"results.{name}" for name in ("state", "observables", "solution", "folder", "provenance")} | {"results"}
@@ -114,14 +114,14 @@ def called(given):
 
 def brief(name, **solve):
     """The tables of a shipped scene, changed; in dynamics of two rows."""
-    given = tomllib.loads((SHIPPED / f"{name}.toml").read_text(encoding="utf-8"))
+    given = tomllib.loads((SHIPPED_SCENES / f"{name}.toml").read_text(encoding="utf-8"))
     if given["solve"]["kind"] == "dynamic":
         solve = {"duration": 2.0 * given["output"]["interval"], **solve}
     given["solve"] |= solve
     return given
 
 
-SCENES = {path.stem: brief(path.stem) for path in sorted(SHIPPED.glob("*.toml"))}
+SCENES = {path.stem: brief(path.stem) for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
 SCENES["by cvode"] = brief("square-impact", method="cvode")
 SCENES["by ida"] = brief("square-impact", method="ida")
 SCENES["by relaxation"] = brief("catenary", method="relaxation")
@@ -191,7 +191,7 @@ KERNELS |= {name: {} for name in ("point_mass", "velocity", "body")}
 def scene_of(*effects):
     given = dict(PLAIN)
     for name in effects:
-        given[name] = [TABLES[name]] if name in LISTS else TABLES[name]
+        given[name] = [TABLES[name]] if load(EFFECTS[name]).several else TABLES[name]
     if "contact" in effects:
         given["body"] = [BALL]
     if "link" in effects:

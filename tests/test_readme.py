@@ -9,7 +9,7 @@ import pytest
 import refweb
 from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.registry import EFFECTS
-from refweb.scene import SHIPPED
+from refweb.scene import SHIPPED_SCENES
 
 README = (pathlib.Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -44,7 +44,7 @@ def test_scene_example():
 def test_every_effect_and_shipped_scene_is_named():
     for name in EFFECTS:
         assert f"`[{name}]`" in README or f"`[[{name}]]`" in README
-    for path in SHIPPED.glob("*.toml"):
+    for path in SHIPPED_SCENES.glob("*.toml"):
         assert f"`{path.stem}`" in README
 
 
@@ -55,7 +55,7 @@ def test_two_commands_are_one_line_each(marker, words):
 
 
 def test_impacts_run_by_name(tmp_path):
-    for path in SHIPPED.glob("*impact.toml"):
+    for path in SHIPPED_SCENES.glob("*impact.toml"):
         solution = refweb.run(path.stem)
         assert solution.status == "solved" and not solution.warnings
         assert all(result.error is not None for result in solution.results.values())

@@ -225,7 +225,7 @@ def test_defaults(tmp_path):
     }
 
 
-SHIPPED = {path.stem: path.read_text(encoding="utf-8") for path in scenes.SHIPPED.glob("*.toml")}
+SHIPPED = {path.stem: path.read_text(encoding="utf-8") for path in scenes.SHIPPED_SCENES.glob("*.toml")}
 WINDOW = {"kind": "window", "mesh": "triangle", "rows": 3, "columns": 3, "side": 0.1}
 LAYERS = {"kind": "layers", "mesh": "hexagon", "layers": 2, "cell_area": 0.1}
 CABLE = {"kind": "cable", "start": [0, 0, 0], "end": [0, 0, 1], "elements": 3, "length": 2, "sag": [0, 1, 0]}

@@ -76,6 +76,8 @@ class Body(Table):
         normal; from ``extend``, for a name that stands twice, and a free body in statics.
     """
 
+    several = True
+
     name: str = text(most=80)
     shape: str = choice(*NEEDS, default="sphere")
     radius: float | None = real(None, above=0, unit="m")

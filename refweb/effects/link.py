@@ -27,6 +27,8 @@ class Link(Table):
         list that are at one place.
     """
 
+    several = True
+
     nodes: tuple = nodes()
 
     def check(self):

@@ -50,6 +50,8 @@ class Load(Table):
         ``on``, for a node that the web does not have.
     """
 
+    several = True
+
     node: object = nodes()
     force: tuple = vector(unit="N")
     factor: tuple | None = rows(2, None, increasing=True)

@@ -37,6 +37,8 @@ class Motion(Table):
         for a node that the web does not have.
     """
 
+    several = True
+
     node: object = nodes()
     displacement: tuple = rows(4, unit="m", increasing=True)
 

@@ -26,6 +26,8 @@ class PointMass(Table):
         For a mass that is not finite or < 0; from ``extend``, for a node that the web does not have.
     """
 
+    several = True
+
     node: object = nodes()
     mass: float = real(at_least=0, unit="kg")
 

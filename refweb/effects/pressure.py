@@ -127,6 +127,8 @@ class Pressure(Table):
     Struct. 18 (1984) 1099–1114: stiffness of such loads, and when they have a potential.
     """
 
+    several = True
+
     lines: object = field(_lines)
     normal: tuple = vector()
     value: float = real(unit="N/m")

@@ -29,6 +29,8 @@ class Reel(Table):
         group that the web does not have, and "rim" where no line joins two of its nodes.
     """
 
+    several = True
+
     lines: object = nodes(what="line")
     factor: tuple = rows(2, increasing=True)
 

@@ -107,6 +107,8 @@ class Thrust(Table):
         is not one node of the web, and a line that does not end at it.
     """
 
+    several = True
+
     node: object = nodes()
     line: int = field(node_number)
     force: float = real(unit="N")

@@ -26,6 +26,8 @@ class Velocity(Table):
         have, and for one that is named and supported along a component that is not 0.
     """
 
+    several = True
+
     node: object = nodes()
     value: tuple = vector(unit="m/s")
 

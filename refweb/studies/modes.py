@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..dynamics import initial_state as starts
-from ..errors import InputError, SolverError
+from ..errors import InputError, SolverError, in_file
 from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
 from ..registry import STATICS, load
@@ -17,7 +17,7 @@ from ..results.observables import Result
 from ..results.provenance import versions, web_of
 from ..results.solution import SOLVER, Solution, as_history
 from ..results.state import State, floor_remark
-from ..scene import Scene, in_file
+from ..scene import Scene
 from ..tables import integer
 from .spectrum import STRAIN, spectrum
 

@@ -22,11 +22,11 @@ from itertools import combinations, takewhile
 
 import numpy as np
 
-from ..errors import InputError, SolverError
+from ..errors import InputError, SolverError, in_file
 from ..results.folder import as_toml, check_folder, clear, write_atomically, write_text
 from ..results.observables import DEFAULT, LINE, NODAL
 from ..results.provenance import versions, web_of
-from ..scene import Scene, in_file
+from ..scene import Scene
 from ..tables import nearest, real, shown
 from .trials import Dynamics, OverBudget, Statics, trials
 

@@ -251,7 +251,7 @@ def test_info_of_what_is_no_result(here, capsys, content, message):
     refused(capsys, message)
 
 
-SHIPPED = {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path in scene.SHIPPED.glob("*.toml")}
+SHIPPED = {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path in scene.SHIPPED_SCENES.glob("*.toml")}
 STATIC = sorted(name for name, given in SHIPPED.items() if given["solve"]["kind"] == "static")
 
 

@@ -15,7 +15,7 @@ from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
 from refweb.net import net as lines
 from refweb.net.web import Web
-from refweb.scene import SHIPPED
+from refweb.scene import SHIPPED_SCENES
 from refweb.statics import dynamic_relaxation as relaxation
 from refweb.statics import load_steps
 from refweb.system.system import System
@@ -385,7 +385,7 @@ def test_preconditioner_inverts_the_whole_jacobian():
 
 def test_shipped_scene():
     """The ball's momentum goes over into the web, which nothing holds: along the axis it is conserved."""
-    solution = refweb.run(SHIPPED / "spinning-web.toml")
+    solution = refweb.run(SHIPPED_SCENES / "spinning-web.toml")
     assert solution.status == "solved" and not solution.warnings
     assert solution.results["ball_speed"].value < 0.0  # it is thrown back
     assert 0.1 < solution.results["deflection"].value < 0.5 and solution.results["slack_fraction"].value > 0.1

@@ -283,7 +283,7 @@ def test_auto_does_not_take_friction_for_damping():
     assert solve.method == "central-difference" and "damping" not in reason
 
 
-DYNAMIC_SCENES = [path.stem for path in sorted(scenes.SHIPPED.glob("*.toml")) if "duration" in path.read_text()]
+DYNAMIC_SCENES = [path.stem for path in sorted(scenes.SHIPPED_SCENES.glob("*.toml")) if "duration" in path.read_text()]
 
 
 @pytest.mark.parametrize("name", DYNAMIC_SCENES)

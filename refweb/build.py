@@ -1,0 +1,193 @@
+"""From the parts of a scene to the `refweb.system.system.System`, and what does not fit together.
+
+Every refusal is an `InputError` whose message begins with the table it stands in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import memory
+from .effects.elasticity import Elasticity
+from .errors import InputError, refused_at
+from .messages import nearest, shown
+from .net import net as lines
+from .registry import EFFECTS, INTEGRATORS, name_of
+from .settings import START_STATES
+from .system.system import System
+from .tables import Table
+
+
+def build(web, cable, effects, supports, support, solve, output, accuracy, observables, events, folder):
+    """The system of the parts of a scene.
+
+    Parameters
+    ----------
+    web : refweb.net.web.Web or a table that makes one
+        Nodes, lines and natural lengths.
+    cable : refweb.Cable
+        Material and section.
+    effects : sequence
+        What acts.
+    supports : refweb.Supports or None
+        What is held; None for the web's own supports.
+    support : sequence of refweb.Supports
+        What is held in addition.
+    solve : refweb.Static or refweb.Dynamic
+        What to solve and how.
+    output : refweb.Output
+        What a result folder holds.
+    accuracy : refweb.Accuracy
+        How errors are found.
+    observables : sequence of refweb.Observe
+        Numbers to follow.
+    events : sequence of refweb.Event
+        Moments to find.
+    folder : pathlib.Path or None
+        Where relative paths start.
+
+    Returns
+    -------
+    refweb.system.system.System
+
+    Raises
+    ------
+    InputError
+        For whatever does not fit together.
+    """
+    web = _web(web, folder)
+    _check_memory(len(web.lines), cable, effects, solve, output)
+    net = lines.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
+    supported = _supported(net, supports, support)
+    system = System(net, [Elasticity(), *_acting(effects)], supported)
+    _check_motions(system)
+    if system.constraints:
+        _check_links(solve)
+    _check_start(solve, accuracy)
+    system.initial_velocity()
+    _check_observables(observables, system)
+    for i, event in enumerate(events):
+        with refused_at(f"[[event]] {i + 1}"):
+            _check_event(event, [earlier.name for earlier in events[:i]], observables, system)
+    return system
+
+
+def _web(web, folder):
+    """The web, made where it is a table."""
+    if not isinstance(web, Table):
+        return web
+    try:
+        with refused_at("[web]"):
+            return web.web(folder)
+    except OSError as error:
+        path = shown(getattr(web, "path", ""))
+        raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
+
+
+def _check_memory(lines, cable, effects, solve, output):
+    """Refuse what does not fit into memory, before it is made."""
+    steps = len(solve.load_steps) if solve.kind == "static" else 0
+    bodies = sum(name_of(EFFECTS, effect) == "body" for effect in effects)
+    explicit = solve.method in INTEGRATORS and INTEGRATORS[solve.method].knob == "safety"
+    size = memory.needed(lines * cable.subdivide, cable.order, explicit, bodies, steps // output.frames)
+    more = f", {bodies} bodies" * (bodies > 0) + f" and {steps} load steps" * (steps > 1)
+    name = f"[web] {lines} lines with [cable] subdivide = {cable.subdivide}, order = {cable.order}"
+    memory.check(size, f"{name}{more}")
+
+
+def _supported(net, supports, support):
+    """Components that are held, bool, shape (rows, 3)."""
+    supported = np.zeros((len(net.points), 3), dtype=bool)
+    tables = [(f"[[support]] {i + 1}", table) for i, table in enumerate(support)]
+    if supports is None:
+        supported[net.web.rim] = True
+    else:
+        tables.insert(0, ("[supports]", supports))
+    for place, table in tables:
+        with refused_at(place):
+            supported[np.ix_(net.find(table.nodes, "nodes"), table.components)] = True
+    return supported
+
+
+class _Placed:
+    """An effect whose refusals begin with its table."""
+
+    def __init__(self, place, effect):
+        self.place, self.effect = place, effect
+
+    def __getattr__(self, name):
+        method = getattr(self.effect, name)
+
+        def call(*arguments):
+            with refused_at(self.place):
+                return method(*arguments)
+
+        return call
+
+
+def _acting(effects):
+    """Effects with the names of their tables: bodies, which others act on, then table by table."""
+    names = [name_of(EFFECTS, effect) for effect in effects]
+    tables = list(dict.fromkeys(["body", *names]))
+    acting, count = [], {}
+    for name, effect in sorted(zip(names, effects, strict=True), key=lambda one: tables.index(one[0])):
+        count[name] = count.get(name, 0) + 1
+        if not effect.several and count[name] > 1:
+            raise InputError(f"[{name}] stands {count[name]} times: a scene has one")
+        acting.append(_Placed(f"[[{name}]] {count[name]}" if effect.several else f"[{name}]", effect))
+    return acting
+
+
+def _check_motions(system):
+    """Refuse two motions of one node."""
+    driven = np.concatenate([d.cells[:, 0] for d in system.drives]) if system.drives else np.zeros(0, dtype=int)
+    rows, times = np.unique(driven, return_counts=True)
+    if (times > 1).any():
+        raise InputError(f"[[motion]] node = {rows[times > 1][0]} is moved by two tables: merge them")
+
+
+def _check_links(solve):
+    """Refuse links for what cannot hold them."""
+    if solve.method not in ("ida", "auto"):
+        here = f'kind = "{solve.kind}" and method = "{solve.method}"'
+        raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = "ida", not {here}')
+    if solve.start == "equilibrium":
+        raise InputError('[solve] start = "equilibrium" knows no [[link]]: it must be "web" or a result folder')
+
+
+def _check_start(solve, accuracy):
+    """Refuse finer elements where the state to start from is that of these."""
+    if solve.kind == "dynamic" and solve.start not in START_STATES and accuracy.refine:
+        raise InputError(
+            f"[accuracy] refine = true must be false with [solve] start = {shown(solve.start)}: its state is "
+            "that of these elements, and finer ones have other nodes"
+        )
+
+
+def _check_observables(observables, system):
+    """Refuse observables that the system does not have, and columns of one name."""
+    own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
+    columns = dict.fromkeys(own, "a column of its own")
+    for i, observable in enumerate(observables):
+        with refused_at(f"[[observe]] {i + 1}"):
+            observable.on(system)
+            if (stands := columns.get(observable.name)) is not None:
+                name = shown(observable.name)
+                raise InputError(f"name = {name} is {stands} of history.csv: names are unique")
+        columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
+
+
+def _check_event(event, earlier, observables, system):
+    """Refuse an event of what the system does not have, and one with the name of an ``earlier`` one."""
+    if event.name in earlier:
+        raise InputError(f"name = {shown(event.name)} is that of [[event]] {earlier.index(event.name) + 1}")
+    if event.kind == "contact":
+        if not any(family.name == "contact" for family in system.families):
+            raise InputError('kind = "contact" needs a [contact] in the scene')
+        bodies = [body.name for body in system.net.bodies]
+        if event.body is not None and event.body not in bodies:
+            raise InputError(f"body = {shown(event.body)} is no body, {nearest(event.body, bodies)}")
+    if event.kind == "taut" and event.line >= len(system.net.web.lines):
+        raise InputError(f"line = {event.line} must be 0 … {len(system.net.web.lines) - 1}")
+    if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
+        raise InputError(f"observe = {shown(event.observe)} is no observable, {nearest(event.observe, names)}")

@@ -1,0 +1,19 @@
+"""Check a scene without solving it; writes nothing."""
+
+
+def add_arguments(parser):
+    """The scene."""
+    parser.add_argument("scene", metavar="SCENE")
+
+
+def run(arguments):
+    """Refuse what a run would refuse, else print what it would solve."""
+    from ..console import before
+    from ..results.solution import Solution
+    from ..runner import follower_of
+    from ..scene import Scene
+
+    scene = Scene.load(arguments.scene)
+    system = scene.build()
+    follower_of(scene, system, Solution(scene))
+    before(scene, system)

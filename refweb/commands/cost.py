@@ -1,0 +1,36 @@
+"""What digits cost: errors and CPU times of every method on a scene."""
+
+import pathlib
+
+from .arguments import add_force, add_scene
+
+
+def add_arguments(parser):
+    """The scene, the folder, the time it may take, and what errors are of."""
+    add_scene(parser)
+    parser.add_argument("--out", metavar="DIR", help="folder for cost.png and cost.csv (default: none is written)")
+    parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="for all of it (default: 120)")
+    parser.add_argument("--observe", metavar="NAME", help="observable that errors are of (default: the first)")
+    add_force(parser)
+
+
+def run(arguments):
+    """Print what is solved, compare the methods, print what they cost."""
+    from ..console import before, progress
+    from ..scene import Scene
+    from ..studies.work_precision import cost
+
+    scene, out = Scene.load(arguments.scene), arguments.out
+    options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
+    with progress() as tell:
+        found = cost(scene, progress=tell, announce=before, **options)
+    show(found.summary())
+    if out is not None:
+        print(f"diagram in {pathlib.Path(out) / 'cost.png'}")
+
+
+def show(summary):
+    """Print the box of a work-precision diagram from the content of its ``run.json``."""
+    from ..console import work_precision
+
+    work_precision(summary)

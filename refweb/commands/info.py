@@ -1,0 +1,56 @@
+"""What a scene or a result folder holds."""
+
+import json
+import pathlib
+
+from ..errors import InputError
+from ..registry import COMMANDS, load
+
+
+def add_arguments(parser):
+    """The scene or the folder, and how to print it."""
+    parser.add_argument("source", metavar="SCENE | DIR")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def run(arguments):
+    """Print what is there."""
+    folder = pathlib.Path(arguments.source)
+    if folder.is_dir():
+        _folder(folder, arguments.json)
+    else:
+        _scene(arguments.source, arguments.json)
+
+
+def _folder(folder, as_json):
+    try:
+        summary = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+        if as_json:
+            _print(summary)
+        else:
+            load(COMMANDS[summary.get("kind", "run")]).show(summary)
+    except FileNotFoundError:
+        raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
+    except BrokenPipeError:
+        raise
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"{folder}/run.json: cannot be read: {error}") from None
+    except (KeyError, TypeError, IndexError, AttributeError):
+        raise InputError(f"{folder}/run.json: is not what a run of refweb writes") from None
+
+
+def _scene(source, as_json):
+    from ..console import before
+    from ..results.provenance import web_of
+    from ..scene import Scene
+
+    scene = Scene.load(source)
+    system = scene.build()
+    if as_json:
+        _print({"scene": scene.to_dict(), "web": web_of(system)})
+    else:
+        before(scene, system)
+
+
+def _print(content):
+    print(json.dumps(content, indent=1, ensure_ascii=False))

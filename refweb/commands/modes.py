@@ -1,0 +1,34 @@
+"""Natural frequencies and mode shapes about the equilibrium of a scene."""
+
+import pathlib
+
+from .arguments import add_force, add_scene
+
+
+def add_arguments(parser):
+    """The scene, how many modes, and the folder."""
+    add_scene(parser)
+    parser.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
+    parser.add_argument("--out", metavar="DIR", help="result folder (default: the title and -modes)")
+    add_force(parser)
+
+
+def run(arguments):
+    """Print what vibrates, find its modes, print them."""
+    from ..console import before, progress
+    from ..scene import Scene, slug
+    from ..studies.modes import modes
+
+    scene = Scene.load(arguments.scene)
+    out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
+    with progress() as tell:
+        found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=before)
+    show(found.summary())
+    print(f"modes in {out}")
+
+
+def show(summary):
+    """Print the box of modes from the content of their ``run.json``."""
+    from ..console import modal
+
+    modal(summary)

@@ -1,0 +1,16 @@
+"""Go on with a dynamic run that was killed, interrupted or failed."""
+
+
+def add_arguments(parser):
+    """The folder of the run."""
+    parser.add_argument("folder", metavar="DIR", help="its result folder")
+
+
+def run(arguments):
+    """Go on from the last checkpoint, print the results."""
+    from .. import runner
+    from ..console import after, before, progress
+
+    with progress() as tell:
+        solution = runner.resume(arguments.folder, progress=tell, announce=before)
+    after(solution, arguments.folder)

@@ -1,0 +1,40 @@
+"""Solve a scene and write its result folder."""
+
+import pathlib
+
+from ..errors import InputError
+from .arguments import add_force, add_scene
+
+
+def add_arguments(parser):
+    """The scene, the folder, and what is found besides."""
+    add_scene(parser)
+    parser.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")
+    add_force(parser)
+    parser.add_argument("--horizon", action="store_true", help="find how long the motion is determined")
+
+
+def run(arguments):
+    """Print what is solved, solve it, print the results."""
+    from dataclasses import replace
+
+    from .. import runner
+    from ..console import after, before, progress
+    from ..scene import Scene, slug
+
+    scene = Scene.load(arguments.scene)
+    if arguments.horizon:
+        if scene.solve.kind == "static":
+            raise InputError(f"--horizon has no meaning for {arguments.scene}: it is static, leave it out")
+        scene = scene.replace(accuracy=replace(scene.accuracy, horizon=True))
+    out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
+    with progress() as tell:
+        solution = runner.run(scene, out=out, force=arguments.force, progress=tell, announce=before)
+    after(solution, out)
+
+
+def show(summary):
+    """Print the box of a finished run from the content of its ``run.json``."""
+    from ..console import stored
+
+    stored(summary)

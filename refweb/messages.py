@@ -1,0 +1,46 @@
+"""The words of messages: values as one line shows them, and the valid name nearest to one that is not."""
+
+from __future__ import annotations
+
+
+def one_line(text):
+    """A text without line breaks and control characters."""
+    text = " ".join(str(text).split())
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def short(text):
+    """A text as a message shows it: at most 60 characters on one line."""
+    text = one_line(text[:1000])
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def shown(value):
+    """A value as a message shows it: short, on one line, texts in quotes."""
+    if isinstance(value, str):
+        return f'"{short(value)}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    try:
+        return short(str(list(value) if isinstance(value, tuple) else value))
+    except (ValueError, RecursionError):  # a number of thousands of digits, lists in lists in lists
+        return f"a {type(value).__name__} too large to show"
+
+
+def closest(name, known):
+    """The valid name nearest to one, None if none is near."""
+    import difflib
+
+    plain = {k.casefold(): k for k in reversed(known)}
+    found = difflib.get_close_matches(str(name).casefold(), plain, n=1, cutoff=0.5)
+    return plain[found[0]] if found else None
+
+
+def nearest(name, known):
+    """The part of a message that helps with an unknown name: the nearest valid one, else all of them."""
+    known = [str(k) for k in known]
+    close = closest(name, known)
+    if close:
+        return f'did you mean "{close}"?'
+    listed = ", ".join(known)
+    return "known: " + (listed if len(listed) <= 150 else listed[:150].rpartition(", ")[0] + ", ...")
