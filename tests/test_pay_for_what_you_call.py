@@ -27,8 +27,8 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
 EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.shapes", "net.rigid_body"}
-EVERY |= {"effects", "effects.base", "effects.elasticity", "system", "system.system"}
-EVERY |= {f"results.{name}" for name in ("state", "observables", "solution", "folder", "provenance")} | {"results"}
+EVERY |= {"results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
+EVERY |= {f"results.{name}" for name in ("state", "observables", "solution", "folder", "provenance", "run_status")}
 """What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
 TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium"}
