@@ -37,6 +37,27 @@ EFFECTS = {
     "temperature": "refweb.effects.temperature:Temperature",
 }
 """Effects by the name of their table."""
+OBSERVABLES = {
+    "displacement": "refweb.results.observables.nodal:Displacement",
+    "position": "refweb.results.observables.nodal:Position",
+    "velocity": "refweb.results.observables.nodal:Velocity",
+    "reaction": "refweb.results.observables.reaction:Reaction",
+    "tension": "refweb.results.observables.line:Tension",
+    "stress": "refweb.results.observables.line:Stress",
+    "strain": "refweb.results.observables.line:Strain",
+    "kinetic_energy": "refweb.results.observables.book:KineticEnergy",
+    "strain_energy": "refweb.results.observables.book:StrainEnergy",
+    "potential_energy": "refweb.results.observables.book:PotentialEnergy",
+    "contact_energy": "refweb.results.observables.book:ContactEnergy",
+    "bending_energy": "refweb.results.observables.book:BendingEnergy",
+    "frame_energy": "refweb.results.observables.book:FrameEnergy",
+    "dissipated_energy": "refweb.results.observables.book:DissipatedEnergy",
+    "total_energy": "refweb.results.observables.book:TotalEnergy",
+    "work": "refweb.results.observables.book:Work",
+    "slack_fraction": "refweb.results.observables.slack_fraction:SlackFraction",
+    "step_size": "refweb.results.observables.book:StepSize",
+}
+"""Quantities of ``[[observe]]``."""
 
 
 class Method(NamedTuple):
@@ -91,7 +112,7 @@ EXPORTS = (
     "refweb.settings:Output",
     "refweb.settings:Accuracy",
     "refweb.settings:Event",
-    "refweb.results.observables:Observe",
+    "refweb.results.observables.observe:Observe",
     "refweb.results.solution:Solution",
     "refweb.net.cable:Cable",
     "refweb.net.cable:Group",

@@ -58,7 +58,7 @@ class Scene:
     accuracy : Accuracy, optional
         How errors are found.
     observe : sequence of refweb.Observe
-        Numbers to follow; `refweb.results.observables.DEFAULT` without any.
+        Numbers to follow; `refweb.results.observables.observe.default` without any.
     event : sequence of Event
         Moments to find, in dynamics.
     title : str
@@ -164,7 +164,7 @@ class Scene:
         ``file`` is the name that begins the messages of `build`.
         """
         single = {"cable": "refweb.net.cable:Cable", "supports": Supports, "output": Output, "accuracy": Accuracy}
-        several = {"support": Supports, "observe": "refweb.results.observables:Observe", "event": Event}
+        several = {"support": Supports, "observe": "refweb.results.observables.observe:Observe", "event": Event}
         known = ["schema", "title", "seed", "web", "solve", *single, *several, *EFFECTS]
         for key in given:
             if key not in known:
@@ -222,9 +222,9 @@ class Scene:
     @property
     def observables(self):
         """The observables, or the default ones."""
-        from .results.observables import DEFAULT
+        from .results.observables.observe import default
 
-        return tuple(self.observe) or DEFAULT
+        return tuple(self.observe) or default()
 
     @property
     def start_folder(self):

@@ -39,6 +39,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "*",
         "One instant, its observables, the solution and the result folder; it does not know how they were computed.",
     ),
+    (
+        "results.observables",
+        "*",
+        "The numbers a run is asked for, a file for those that are alike: their value at an instant, and their probe.",
+    ),
     ("pictures", "*", "A result folder drawn; it knows folders, and nothing of what made them."),
     ("the scene", "build scene", ""),
     ("statics", "*", "Equilibria and their bounds; it knows no time and no events."),

@@ -17,7 +17,7 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
-from refweb.registry import EFFECTS, WEBS, load
+from refweb.registry import EFFECTS, OBSERVABLES, WEBS, load
 from refweb.scene import SHIPPED_SCENES
 
 ROOT = pathlib.Path(refweb.__file__).parent
@@ -28,12 +28,13 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
 EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.shapes", "net.rigid_body"}
 EVERY |= {"results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
-EVERY |= {f"results.{name}" for name in ("state", "observables", "solution", "folder", "provenance", "run_status")}
+EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "provenance", "run_status")}
+EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
 TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
-DYNAMICS = {"dynamics", "dynamics.simulation", "results.probes", "dynamics.integrators"}
+DYNAMICS = {"dynamics", "dynamics.simulation", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
 EXPLICIT = {f"dynamics.integrators.{name}" for name in ("central_difference", "explicit_loop", "step_bound")}
 SUNDIALS = TANGENT | {"dynamics.integrators.step_observer", "dynamics.integrators.sundials"}
@@ -50,6 +51,10 @@ BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", 
 VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", "effects.contact.nearest_point", *VECTORS}, "bending": VECTORS}
 """What effects are made of besides their own file."""
+OBSERVED = {"reaction": {"results.observables.nodal"}}
+"""What observables are made of besides their own file."""
+DEFAULT = [{"quantity": quantity} for quantity in ("displacement", "stress", "tension")]
+"""What a scene observes that does not say."""
 BASE = ("numpy", "scipy.sparse", "numba", "numba.core.typing.cffi_utils", "skfem")
 """Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""
 LOADED = "print(json.dumps(sorted(sys.modules)))"
@@ -82,6 +87,8 @@ def called(given):
     modules.add(WEBS[web].split(":")[0].removeprefix("refweb."))
     for effect in given.keys() & EFFECTS.keys():
         modules |= {EFFECTS[effect].split(":")[0].removeprefix("refweb.")} | BELOW.get(effect, set())
+    for quantity in (observe["quantity"] for observe in given.get("observe", DEFAULT)):
+        modules |= {OBSERVABLES[quantity].split(":")[0].removeprefix("refweb.")} | OBSERVED.get(quantity, set())
     if "contact" in given:
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
         rubs = keys & {"damping", "friction"}

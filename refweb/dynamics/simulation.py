@@ -13,61 +13,14 @@ from ..errors import InputError, OpenBook
 from ..net.tension_laws import SMOOTH
 from ..registry import INTEGRATORS, load
 from ..results import probes
-from ..results.observables import LINE, NODAL, TOTAL, Observe, Result
-from ..results.solution import SOLVER
+from ..results.observables.book import weights
+from ..results.observables.observe import SIGN, Observe
+from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strength_remark
 from .integrators.events import Event
 from .integrators.integrator import MAX_STEPS_PER_ROW, History, Sum
 
 _VECTORS = ("momentum", "support_impulse")
-
-
-def _weights(system, quantity):
-    """Weights of (energy of each family, kinetic energy, work, step size) that make a quantity of the whole net."""
-    total, energies = quantity == "total_energy", [f.book for f in system.families]
-    stored = [book not in ("work", "dissipated_energy") for book in energies]
-    weights = [
-        (total and own) or (book != "work" and book == quantity) for own, book in zip(stored, energies, strict=True)
-    ]
-    weights += [total or quantity == "kinetic_energy", quantity == "work", quantity == "step_size"]
-    return np.array(weights, dtype=float)
-
-
-def _outer(system, rows):
-    """What bodies feel besides contact, g + B x + C v: g [N], B and C where a frame turns; shape (rows, 3 or 21)."""
-    parts, still = [system.outer_force(0.0)[rows]], np.zeros((system.rows, 3))
-    if system.turns:
-        moved = ([(still + unit, still) for unit in np.eye(3)], [(still, still + unit) for unit in np.eye(3)])
-        for states in moved:
-            slopes = [system.outer_force(0.0, x, v)[rows] - parts[0] for x, v in states]
-            parts.append(np.stack(slopes, axis=-1).reshape(len(rows), 9))
-    return np.hstack(parts)
-
-
-def probe_of(observable, system):
-    """An observable as a `refweb.results.probes.Probe`, without a sign."""
-    net, quantity = system.net, observable.quantity
-    if quantity == "slack_fraction":
-        return probes.Probe(probes.slack_fraction, [], net.slackness[:, None])
-    if quantity in LINE:
-        elements = np.arange(len(net.line)) if observable.line is None else np.flatnonzero(net.line == observable.line)
-        scale = 1.0 / net.area if quantity == "stress" else np.ones(len(net.cells))
-        column = 1 if quantity == "strain" else 0
-        return probes.Probe(probes.line, [column, elements[0], elements[-1] + 1], scale[:, None])
-    component = probes.MAGNITUDE if observable.component is None else observable.component
-    rows = observable.rows(system)
-    consecutive = len(rows) == 1 or (np.diff(rows) == 1).all()
-    numbers = [component, rows[0], rows[-1] + 1] if consecutive else [component, -1, -1, *rows]
-    if quantity == "reaction":
-        weight = np.where(system.supported[rows], 1.0, 0.0)
-        rest = np.zeros((len(rows), 3))
-        if observable.body is not None:
-            weight[:] = -1.0
-            rest = _outer(system, rows)
-        return probes.Probe(probes.reaction, numbers, np.hstack([weight, rest]))
-    kernel = probes.velocity if quantity == "velocity" else probes.displacement
-    data = net.points[rows] if quantity == "position" else np.zeros((len(rows), 3))
-    return probes.Probe(kernel, numbers, data)
 
 
 def started(system, x=None):
@@ -140,7 +93,7 @@ def with_errors(results, twin, own, other, order=2.0):
 
     Parameters
     ----------
-    results, twin : dict of str to refweb.results.observables.Result
+    results, twin : dict of str to refweb.results.solution.Result
         Of either run.
     own, other : ndarray, shape (rows, columns)
         Rows of either history: time, then the observables in their order. Those of equal times are compared: the last
@@ -255,9 +208,9 @@ class Motion:
             scene = scene.replace(solve=solve)
         self.scene, self.system, self.solution = scene, system, solution
         self.rows = []
-        self.probed = [o for o in scene.observables if o.quantity in (*NODAL, *LINE, "slack_fraction")]
+        self.probed = [o for o in scene.observables if not o.observable.booked]
         awaited = {event.observe for event in scene.event}
-        sums = [o for o in scene.observables if o.quantity in TOTAL and o.quantity != "slack_fraction"]
+        sums = [o for o in scene.observables if o.observable.booked]
         self.watched = [o for o in sums if o.reduce != "final" or o.name in awaited]
         own = dict.fromkeys(f.book for f in system.families if f.book != "work")
         work = ["work"] if "work" in [f.book for f in system.families] or system.drives or system.line_drives else []
@@ -309,18 +262,19 @@ class Motion:
         """An event, its slot yet to be given, and its own probe, None where it is an observable's."""
         system = self.system
         if event.kind == "contact":
+            from ..results.observables.reaction import push_on
+
             rows = [body.row for body in system.net.bodies if event.body in (None, body.name)]
-            probe = probes.Probe(probes.push, rows, _outer(system, rows))
+            probe = push_on(system, rows)
             return Event(-1, 0.0, rising=True, stop=event.stop, at_once=True), probe
         if event.kind == "taut":
-            probe = probe_of(Observe(name="_", quantity="strain", line=event.line), system)
+            probe = Observe(name="_", quantity="strain", line=event.line).probe(system)
             return Event(-1, float(system.net.slackness[probe.rows[1]]), rising=True, stop=event.stop), probe
         return Event(-1, event.value, stop=event.stop), None
 
     def solver(self, accuracy):
         """The integrator of the scene at a safety, or rtol."""
-        signs, solve = {"max": 1, "min": -1, "final": 0}, self.scene.solve
-        probed = [probe_of(o, self.system)._replace(sign=signs[o.reduce]) for o in self.probed]
+        solve, probed = self.scene.solve, [o.probe(self.system) for o in self.probed]
         probed += [probes.Probe(probes.line, [0, 0, len(scale)], scale[:, None], 1) for scale in self._own.values()]
         slots = {o.name: i for i, o in enumerate(self.probed)}
         for event, (_, probe) in zip(self.scene.event, self._events, strict=True):
@@ -332,7 +286,7 @@ class Motion:
             found._replace(slot=slots[event if probe is not None else event.observe])
             for event, (found, probe) in zip(self.scene.event, self._events, strict=True)
         ]
-        sums = [Sum(_weights(self.system, o.quantity), signs[o.reduce]) for o in self.watched]
+        sums = [Sum(o.observable.weights(self.system), SIGN[o.reduce]) for o in self.watched]
         keys = {key: getattr(solve, key) for key in self._method.keys if getattr(solve, key) is not None}
         keys[self._method.knob] = accuracy
         return load(self._method.integrator)(self.system, probed, sums, events, **keys)
@@ -351,13 +305,13 @@ class Motion:
             if o in self.probed:
                 columns.append(unit.probes[:, self.probed.index(o)])
             else:
-                columns.append(unit.sums @ _weights(self.system, o.quantity))
-        columns += [unit.sums @ _weights(self.system, name) for name in self.energies]
+                columns.append(unit.sums @ o.observable.weights(self.system))
+        columns += [unit.sums @ weights(self.system, name) for name in self.energies]
         return np.column_stack([*columns, unit.momentum, unit.impulse])
 
     def results(self, run, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
-        results, net, extremes = {}, self.system.net, run.extremes
+        results, extremes = {}, run.extremes
         state = State(self.system, run.time, run.x, run.v)
 
         def extreme(at):
@@ -369,13 +323,9 @@ class Motion:
                 at = self.probed.index(o)
                 if o.reduce != "final":
                     value, when, where = extreme(at)
-                elif o.quantity != "slack_fraction":
+                    where = o.observable.place(self.system, where)
+                else:
                     where = o.value(state).where
-                if o.quantity in LINE and o.reduce != "final":
-                    where = int(net.line[where])
-                summed = o.quantity == "slack_fraction" or (o.quantity == "reaction" and o.node is None)
-                if summed or o.body is not None:
-                    where = None
             elif o in self.watched and o.reduce != "final":
                 value, when, _ = extreme(len(extremes.values) - len(self.watched) + self.watched.index(o))
             results[o.name] = Result(value, None, o.unit, when, where)

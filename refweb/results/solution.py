@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,28 @@ class Names(dict):
 
     def __missing__(self, key):
         raise KeyError(f"{key!r} is not among them, {nearest(key, self)}")
+
+
+class Result(NamedTuple):
+    """A result of a run: value, its error (None where none is known), unit, time and place.
+
+    ``error`` is that of the solution of the scene as it stands. In statics ``smoothing`` is how far a smooth law's η
+    moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
+    elements; None where it was not looked for.
+    """
+
+    value: float
+    error: float | None
+    unit: str
+    time: float
+    where: int | None
+    smoothing: float | None = None
+    discretisation: float | None = None
+
+    def plain(self):
+        """As a dict, without the errors that were not looked for."""
+        extra = {key: value for key in ("smoothing", "discretisation") if (value := getattr(self, key)) is not None}
+        return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
 
 
 @dataclass(eq=False, repr=False)
@@ -81,7 +104,7 @@ class Solution:
 
     @property
     def results(self):
-        """Results by name, each a `refweb.results.observables.Result`; of the last load step."""
+        """Results by name, each a `refweb.results.solution.Result`; of the last load step."""
         return Names(self.steps[-1]["results"] if self.steps else self.reduced)
 
     @property

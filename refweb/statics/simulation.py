@@ -10,8 +10,7 @@ import numpy as np
 from ..errors import SolverError
 from ..net.tension_laws import LINEAR, SMOOTH
 from ..registry import STATICS, load
-from ..results.observables import Result
-from ..results.solution import SOLVER
+from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strength_remark
 
 

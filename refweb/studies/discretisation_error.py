@@ -23,7 +23,7 @@ def discretisation_errors(scene, results, solve):
     ----------
     scene : refweb.Scene
         As it was solved.
-    results : list of dict of str to refweb.results.observables.Result
+    results : list of dict of str to refweb.results.solution.Result
         Of each load step, or of the motion.
     solve : callable
         Gives such a list of another scene.

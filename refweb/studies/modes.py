@@ -13,9 +13,8 @@ from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
 from ..registry import STATICS, load
 from ..results.folder import Folder, check_folder
-from ..results.observables import Result
 from ..results.provenance import versions, web_of
-from ..results.solution import SOLVER, Solution, as_history
+from ..results.solution import SOLVER, Result, Solution, as_history
 from ..results.state import State, floor_remark
 from ..scene import Scene
 from ..tables import integer

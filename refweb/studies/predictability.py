@@ -22,7 +22,7 @@ def horizon(motion, results, ensemble=None, tell=None):
     ----------
     motion : refweb.dynamics.simulation.Motion
         A motion that has been run.
-    results : dict of str to refweb.results.observables.Result
+    results : dict of str to refweb.results.solution.Result
         Its results.
     ensemble : int, optional
         Number of runs that mean and spread are taken of.

@@ -122,10 +122,10 @@ class Dynamics:
     """
 
     def __init__(self, scene, system, observable):
-        from ..dynamics.simulation import probe_of, row_times
+        from ..dynamics.simulation import row_times
 
         self.system, self.observable, self.times = system, observable, row_times(scene)
-        self.probes = [probe_of(observable, system)]
+        self.probes = [observable.probe(system)._replace(sign=0.0)]
         self._price, self.begin = 0.0, (None, None)
         self._linear = system.rows - system.net.spins  # the others are angles
         if scene.start_folder is not None:

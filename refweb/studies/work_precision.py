@@ -23,8 +23,9 @@ from itertools import combinations, takewhile
 import numpy as np
 
 from ..errors import InputError, SolverError, in_file
+from ..registry import OBSERVABLES, load
 from ..results.folder import as_toml, check_folder, clear, write_atomically, write_text
-from ..results.observables import DEFAULT, LINE, NODAL
+from ..results.observables.observe import default
 from ..results.provenance import versions, web_of
 from ..scene import Scene
 from ..tables import nearest, real, shown
@@ -235,13 +236,13 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
 
 def _observable(scene, name):
     """What is compared: the observable of a name, or the first that a state alone determines."""
-    known = (*NODAL, *LINE, "slack_fraction")
     if name is None:
-        return next(o for o in (*scene.observables, *DEFAULT) if o.quantity in known)
+        return next(o for o in (*scene.observables, *default()) if not o.observable.booked)
     names = {o.name: o for o in scene.observables}
     if name not in names:
         raise InputError(f"observe = {shown(name)} is no observable of the scene, {nearest(name, names)}")
-    if names[name].quantity not in known:
+    if names[name].observable.booked:
+        known = [quantity for quantity, entry in OBSERVABLES.items() if not load(entry).booked]
         raise InputError(
             f'observe = {shown(name)} is of quantity "{names[name].quantity}", must be one of {", ".join(known)}'
         )

@@ -1,0 +1,118 @@
+"""What the book of a run holds: energies, work and the length of its steps, sums that need no probe."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError
+from .observable import Observable, Value
+
+
+def weights(system, column):
+    """Weights of (energy of each family, kinetic energy, work, step size) that make a column of the whole net."""
+    total, books = column == "total_energy", [f.book for f in system.families]
+    stored = [book not in ("work", "dissipated_energy") for book in books]
+    found = [(total and own) or (book != "work" and book == column) for own, book in zip(stored, books, strict=True)]
+    found += [total or column == "kinetic_energy", column == "work", column == "step_size"]
+    return np.array(found, dtype=float)
+
+
+class Booked(Observable):
+    """A column of the book, named as the quantity is.
+
+    Attributes
+    ----------
+    needs : str
+        Table without which no effect writes to the column, empty where there always is one.
+    """
+
+    unit = "J"
+    booked = True
+    needs = ""
+
+    def on(self, system):
+        """Refuse a column that no effect writes to."""
+        if self.needs and self.observe.quantity not in [f.book for f in system.families]:
+            raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
+
+    def of(self, state):
+        """From the energies of the state, which know nothing of motion."""
+        return Value(state.energies[self.observe.quantity], None)
+
+    def weights(self, system):
+        """What it is of (energy of each family, kinetic energy, work, step size)."""
+        return weights(system, self.observe.quantity)
+
+
+class KineticEnergy(Booked):
+    """Of all that moves."""
+
+    dynamic = True
+
+
+class StrainEnergy(Booked):
+    """Of the lines."""
+
+    def error(self, state, equilibrium):
+        """The proven bound of duality, where there is one."""
+        if equilibrium.duality_bound is None:
+            return super().error(state, equilibrium)
+        return equilibrium.duality_bound.strain_energy
+
+
+class PotentialEnergy(Booked):
+    """Of gravity."""
+
+    needs = "[gravity]"
+
+
+class ContactEnergy(Booked):
+    """Of touching bodies."""
+
+    needs = "[contact]"
+
+
+class BendingEnergy(Booked):
+    """Of bent lines."""
+
+    needs = "[bending]"
+
+
+class FrameEnergy(Booked):
+    """Of a frame that turns."""
+
+    needs = "[frame]"
+
+
+class DissipatedEnergy(Booked):
+    """What damping and friction have taken."""
+
+    dynamic = True
+    needs = "[damping], or damping or friction in [contact],"
+
+
+class TotalEnergy(Booked):
+    """All that is stored, in dynamics with that of motion."""
+
+
+class Work(Booked):
+    """Of loads, and of what moves nodes or lengths."""
+
+    needs = "[[load]], [[motion]] or another effect that does work"
+
+    def on(self, system):
+        """Refuse a scene without such effects, and in statics work that depends on the path."""
+        moved = system.drives or system.line_drives
+        if not moved:
+            super().on(system)
+        loads = [f for f in system.families if f.book == "work"]
+        if system.net.quasi_static and (moved or any(f.energy is None for f in loads)):
+            tables = "[[motion]], [[pressure]], [[thrust]] and [[reel]]"
+            raise InputError(f'quantity = "work" is not known in statics with {tables}: it depends on the path')
+
+
+class StepSize(Booked):
+    """Length of the step that led to an instant."""
+
+    unit = "s"
+    dynamic = True

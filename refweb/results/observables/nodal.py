@@ -1,0 +1,113 @@
+"""Displacement, position and velocity: of several nodes that with the largest value counts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError
+from ...messages import nearest
+from .observable import Observable, Value
+
+
+class Nodal(Observable):
+    """A vector of each row of the unknowns, of which a component or the magnitude counts.
+
+    Subclasses have ``vectors(state)``, shape (rows, 3), and a probe.
+    """
+
+    keys = ("node", "body", "component")
+
+    def on(self, system):
+        """Refuse nodes and bodies that the net does not have."""
+        self.rows(system)
+
+    def rows(self, system):
+        """Rows it is looked at, shape (k,)."""
+        net, body = system.net, self.observe.body
+        if body is not None:
+            names = [body.name for body in net.bodies]
+            if body not in names:
+                hint = nearest(body, names) if names else "the scene has no [[body]]"
+                raise InputError(f'body = "{body}" is no body, {hint}')
+            return np.array([net.bodies[names.index(body)].row])
+        return np.arange(net.nodes) if self.observe.node is None else net.find(self.observe.node)
+
+    def sizes(self, vectors):
+        """The component of vectors that is asked for, or their magnitude, shape (k,)."""
+        component = self.observe.component
+        return np.linalg.norm(vectors, axis=1) if component is None else vectors[:, component]
+
+    def of(self, state):
+        """The largest over its rows."""
+        rows = self.rows(state.system)
+        sizes = self.sizes(self.vectors(state)[rows])
+        at = int(np.argmax(sizes))
+        return Value(float(sizes[at]), self.place(state.system, int(rows[at])))
+
+    def place(self, system, at):
+        """The node; none of a body."""
+        return at if self.observe.body is None else None
+
+    def numbers(self, rows):
+        """Component and rows, as `refweb.results.probes.largest_of` takes them."""
+        from ..probes import MAGNITUDE
+
+        component = MAGNITUDE if self.observe.component is None else self.observe.component
+        consecutive = len(rows) == 1 or (np.diff(rows) == 1).all()
+        return [component, rows[0], rows[-1] + 1] if consecutive else [component, -1, -1, *rows]
+
+    def error(self, state, equilibrium):
+        """None at a node that only slack lines hold, whose position is not unique."""
+        return None if self.of(state).where in state.slack_nodes else super().error(state, equilibrium)
+
+
+class Displacement(Nodal):
+    """Displacement from the reference position."""
+
+    unit = "m"
+
+    def vectors(self, state):
+        """Displacement [m], shape (rows, 3)."""
+        return state.x
+
+    def probe(self, system):
+        """Of x alone."""
+        from ..probes import Probe, displacement
+
+        rows = self.rows(system)
+        return Probe(displacement, self.numbers(rows), np.zeros((len(rows), 3)))
+
+
+class Position(Nodal):
+    """Place in space."""
+
+    unit = "m"
+
+    def vectors(self, state):
+        """Positions [m], shape (rows, 3)."""
+        return state.position
+
+    def probe(self, system):
+        """Of x and the reference position."""
+        from ..probes import Probe, displacement
+
+        rows = self.rows(system)
+        return Probe(displacement, self.numbers(rows), system.net.points[rows])
+
+
+class Velocity(Nodal):
+    """Velocity."""
+
+    unit = "m/s"
+    dynamic = True
+
+    def vectors(self, state):
+        """Velocities [m/s], shape (rows, 3)."""
+        return state.v
+
+    def probe(self, system):
+        """Of v alone."""
+        from ..probes import Probe, velocity
+
+        rows = self.rows(system)
+        return Probe(velocity, self.numbers(rows), np.zeros((len(rows), 3)))

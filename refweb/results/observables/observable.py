@@ -1,0 +1,74 @@
+"""What an observable is: a value at an instant, and the probe that follows it through the steps of a run."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Value(NamedTuple):
+    """Value of an observable at one instant; ``where`` is the node or line it stands at."""
+
+    value: float
+    where: int | None
+
+
+class Observable:
+    """A quantity, as one ``[[observe]]`` asks for it.
+
+    Parameters
+    ----------
+    observe : refweb.Observe
+        The table: where the quantity is looked at.
+
+    Attributes
+    ----------
+    unit : str
+        Unit of its value.
+    keys : tuple of str
+        Which of ``node``, ``body``, ``component`` and ``line`` have a meaning; a quantity of the whole net has none.
+    dynamic : bool
+        Whether it has no meaning in statics.
+    booked : bool
+        Whether dynamics finds it in the energy book, as `refweb.results.observables.book.Booked`, and not by a probe.
+    """
+
+    unit = "1"
+    keys: tuple = ()
+    dynamic = False
+    booked = False
+
+    def __init__(self, observe):
+        self.observe = observe
+
+    def on(self, system):
+        """Refuse what a `refweb.system.system.System` does not have, with an `InputError`."""
+
+    def of(self, state):
+        """Its `Value` in a `refweb.results.state.State`."""
+        raise NotImplementedError
+
+    def probe(self, system):
+        """The `refweb.results.probes.Probe` that finds the same value in every step of a run."""
+        raise NotImplementedError
+
+    def place(self, system, at):
+        """Node or line of the scene, where the probe says it stands at row or element ``at``; None for the whole."""
+        return None
+
+    def error(self, state, equilibrium):
+        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None where none is known.
+
+        An estimate from the equilibrium's deviations: what the residual makes of the value, three times what rounding
+        makes of it, and the rounding of the value itself.
+        """
+        if equilibrium.deviations is None:
+            return None
+        value, changes = self.of(state).value, []
+        for deviation in equilibrium.deviations:
+            size = np.abs(deviation).max()
+            share = 1e-7 * state.system.net.natural_length.min() / size if size > 0.0 else 0.0
+            there = type(state)(state.system, state.time, state.x + share * deviation)
+            changes.append(abs(self.of(there).value - value) / share if share > 0.0 else 0.0)
+        return float(changes[0] + 3.0 * max(changes[1:]) + 2.0 * np.finfo(float).eps * abs(value))

@@ -1,0 +1,112 @@
+"""``[[observe]]``: a number that a run is asked for, with a name, and what is kept of it over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...errors import InputError
+from ...messages import nearest, shown
+from ...registry import OBSERVABLES, load
+from ...tables import Table, choice, component, field, node_number, nodes, text
+
+SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
+"""Sign of the peaks that a probe follows, by ``reduce``."""
+
+
+def _quantity(name, value):
+    if value not in tuple(OBSERVABLES):
+        raise InputError(f"{name} = {shown(value)} must be one of the quantities, {nearest(value, OBSERVABLES)}")
+    return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observe(Table):
+    """A named number, followed over time.
+
+    Parameters
+    ----------
+    name : str
+        Its name in results and history.
+    quantity : str
+        One of `refweb.registry.OBSERVABLES`.
+    node : int, str or list, optional
+        Node of a nodal quantity. Of several nodes the one with the largest value counts, for a reaction their sum;
+        without ``node`` that is over all.
+    body : str, optional
+        Body of a nodal quantity; its reaction is the contact force on it.
+    line : int, optional
+        Line of a line quantity; without it the largest over all lines.
+    component : {0, 1, 2, "x", "y", "z"}, optional
+        Axis of a nodal quantity; without it the magnitude.
+    reduce : {"max", "min", "final"}
+        Reduction over time.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, a node, body, line or axis that the quantity does not have, a node beside a body, and a
+        name with commas or quotes or above 80 characters; from ``on``, for what the net does not have, an energy whose
+        effect is not in the scene, and in statics what needs velocity, or work that depends on the path.
+    """
+
+    name: str = text(most=80)
+    quantity: str = field(_quantity)
+    node: object = nodes(None)
+    body: str | None = text(None)
+    line: int | None = field(node_number, None)
+    component: int | None = component(None)
+    reduce: str = choice("max", "min", "final", default="final")
+
+    def check(self):
+        """Refuse a node, line or component that the quantity does not have."""
+        if "," in self.name or '"' in self.name:
+            raise InputError(
+                f"name = {shown(self.name)} must be free of commas and quotes: it heads a column of history.csv"
+            )
+        for key in ("node", "body", "component", "line"):
+            if getattr(self, key) is not None and key not in self.observable.keys:
+                value = shown(getattr(self, key))
+                raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
+        if self.node is not None and self.body is not None:
+            raise InputError(f"node = {shown(self.node)} and body = {shown(self.body)} exclude each other")
+
+    @property
+    def observable(self):
+        """The quantity as it is asked for, a `refweb.results.observables.observable.Observable`."""
+        return load(OBSERVABLES[self.quantity])(self)
+
+    @property
+    def unit(self):
+        """Unit of the value."""
+        return self.observable.unit
+
+    def on(self, system):
+        """Refuse what the system does not have."""
+        if system.net.quasi_static and self.observable.dynamic:
+            raise InputError(f'quantity = "{self.quantity}" has no meaning in statics')
+        self.observable.on(system)
+
+    def value(self, state):
+        """The observable at one instant, a `refweb.results.observables.observable.Value`."""
+        return self.observable.of(state)
+
+    def error(self, state, equilibrium):
+        """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None where none is known.
+
+        A proven bound from duality where there is one that speaks of the quantity, else an estimate from the
+        equilibrium's deviations.
+        """
+        return self.observable.error(state, equilibrium)
+
+    def probe(self, system):
+        """The `refweb.results.probes.Probe` that follows it, with the sign of its peaks."""
+        return self.observable.probe(system)._replace(sign=SIGN[self.reduce])
+
+
+def default():
+    """What a scene without ``[[observe]]`` observes."""
+    return (
+        Observe(name="deflection", quantity="displacement", reduce="max"),
+        Observe(name="max_stress", quantity="stress", reduce="max"),
+        Observe(name="max_tension", quantity="tension", reduce="max"),
+    )

@@ -1,0 +1,116 @@
+"""An observable has two faces, and they are of one thing: its value in a state, and what its probe finds there.
+
+Every entry of the table is found by itself, and looked at in random states of nets with bodies, supports, a frame that
+turns, and several elements a line.
+"""
+
+import numpy as np
+import pytest
+from nets import LAWS, skew_net
+
+import refweb
+from refweb.effects.elasticity import Elasticity
+from refweb.errors import InputError
+from refweb.registry import OBSERVABLES
+from refweb.results.probes import PLACE
+from refweb.results.state import State
+from refweb.system.system import System
+
+BODIES = (
+    refweb.Body(name="ball", radius=0.3, mass=0.5, position=(0.6, 0.3, 0.2)),
+    refweb.Body(name="wall", radius=0.4, position=(0.2, 0.9, -0.1), fixed=True),
+)
+EFFECTS = (
+    refweb.Gravity(acceleration=(1.0, -2.0, 3.0)),
+    refweb.Load(node=[1, 4], force=(1.0, 2.0, -3.0)),
+    refweb.PointMass(node=[1, 4], mass=0.7),
+    refweb.Contact(stiffness=1e3, damping=0.2),
+    refweb.Bending(stiffness=0.02),
+    refweb.Damping(time=1e-3, rate=0.5),
+)
+FRAME = refweb.Frame(angular_velocity=(0.3, -0.5, 0.7))
+WHERE = {
+    "node": [{}, {"node": 3}, {"node": [1, 2, 4]}, {"node": [5, 0, 3]}],
+    "body": [{"body": "ball"}, {"body": "wall"}],
+    "line": [{}, {"line": 0}, {"line": 7}],
+    "component": [{}, *({"component": axis} for axis in "xyz")],
+}
+"""What each key of ``[[observe]]`` is given as; a quantity is looked at for every mixture of those it takes."""
+
+
+def tables(name):
+    """All that may ask for a quantity."""
+    keys = refweb.Observe(name="_", quantity=name).observable.keys
+    places = [place for key in ("node", "body", "line") if key in keys for place in WHERE[key]] or [{}]
+    axes = WHERE["component"] if "component" in keys else [{}]
+    return [refweb.Observe(name="_", quantity=name, **place, **axis) for place in places for axis in axes]
+
+
+def random_state(law, seed, pieces=2, turning=False):
+    """A net of lines taut and slack, in which a ball touches, half of its nodes' components supported."""
+    rng = np.random.default_rng(seed)
+    net = skew_net(law, pieces)
+    supported = rng.random(net.points.shape) < 0.5
+    system = System(net, [Elasticity(), *BODIES, *EFFECTS, *([FRAME] if turning else [])], supported)
+    x, v = 0.1 * rng.standard_normal((2, system.rows, 3))
+    return State(system, 0.0, x, v)
+
+
+STATES = [random_state(law, seed) for law in LAWS for seed in range(3)]
+STATES += [random_state("smooth", 3, pieces=3), random_state("tension-only", 4, turning=True)]
+PROBED = [name for name in OBSERVABLES if not refweb.Observe(name="_", quantity=name).observable.booked]
+BOOKED = [name for name in OBSERVABLES if name not in PROBED]
+
+
+def probed(observe, state):
+    """(value, place) that the probe of an observable finds in a state."""
+    system, found = state.system, observe.probe(state.system)
+    force = system.force(0.0, state.x, state.v)
+    strained = np.column_stack([state.element_tension, state.element_strain])
+    rows, data = np.array(found.rows, dtype=np.int64), np.ascontiguousarray(found.data, dtype=float)
+    where = np.array([-1, PLACE])
+    value = found.kernel(0.0, state.x, state.v, force, strained, rows, data, where)
+    return value, observe.observable.place(system, int(where[0]))
+
+
+@pytest.mark.parametrize("name", PROBED)
+def test_both_faces_agree(name):
+    for state in STATES:
+        for observe in tables(name):
+            observe.on(state.system)
+            value, (expected, where) = probed(observe, state), observe.value(state)
+            scale = np.abs(state.reaction).sum() if name == "reaction" else abs(expected)
+            np.testing.assert_allclose(value[0], expected, rtol=0, atol=1e-13 * scale, err_msg=str(observe))
+            assert value[1] == where, observe
+
+
+@pytest.mark.parametrize("name", [name for name in BOOKED if name.endswith("_energy")])
+def test_weights_make_the_energy_of_a_state_at_rest(name):
+    for state in STATES[:-1]:
+        system = state.system
+        energies = [0.0 if f.energy is None else system.energy_of(f, 0.0, state.x).sum() for f in system.families]
+        (observe,) = tables(name)
+        unknown = name in ("kinetic_energy", "dissipated_energy", "frame_energy")  # to a state of this scene
+        expected = 0.0 if unknown else observe.value(state).value
+        found = observe.observable.weights(system) @ [*energies, 0.0, 5.0, 7.0]
+        np.testing.assert_allclose(found, expected, rtol=1e-14)
+
+
+def test_weights_pick_columns():
+    system = STATES[0].system
+    for name, place in {"kinetic_energy": -3, "work": -2, "step_size": -1}.items():
+        (observe,) = tables(name)
+        weights = observe.observable.weights(system)
+        assert weights[place] == weights.sum() == 1.0
+
+
+@pytest.mark.parametrize("name", OBSERVABLES)
+def test_what_an_entry_says(name):
+    """A unit, keys that `Observe` has, one of a probe and weights; what it does not take is refused."""
+    entry = refweb.Observe(name="_", quantity=name).observable
+    assert entry.unit in ("m", "m/s", "N", "Pa", "1", "J", "s")
+    assert set(entry.keys) <= WHERE.keys() and hasattr(entry, "weights") == entry.booked
+    for key in WHERE.keys() - set(entry.keys):
+        given = WHERE[key][-1]
+        with pytest.raises(InputError, match=f'{key} = .* has no meaning for quantity = "{name}"'):
+            refweb.Observe(name="_", quantity=name, **given)
