@@ -182,7 +182,7 @@ def _check_event(event, earlier, observables, system):
     if event.name in earlier:
         raise InputError(f"name = {shown(event.name)} is that of [[event]] {earlier.index(event.name) + 1}")
     if event.kind == "contact":
-        if not any(family.name == "contact" for family in system.families):
+        if not system.contact:
             raise InputError('kind = "contact" needs a [contact] in the scene')
         bodies = [body.name for body in system.net.bodies]
         if event.body is not None and event.body not in bodies:

@@ -172,9 +172,9 @@ def follower_of(scene, system, solution, kept=None):
 
 
 def _notices(scene, system):
-    if system.net.bodies and not any(f.name == "contact" for f in system.families):
+    if system.net.bodies and not system.contact:
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
-    if scene.solve.kind == "static" and (loose := system.loose):
+    if scene.solve.kind == "static" and (loose := system.unsupported_parts):
         axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
         nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
         yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"

@@ -435,14 +435,15 @@ def line_drive(name, i, law, seed):
     x, steps, t = state(net, seed)[0], np.array([2e-3, 1e-3, 5e-4, 2.5e-4]), 0.7
     alone = System(skew_net(law), [CLASSES["Elasticity"](), effect], free)
     for time in (t, 9.0, -1.0, t):
-        lengths, others = system.lengths(time, x)[0], alone.lengths(time, x)[0]
+        lengths, others = system.natural_length(time), alone.natural_length(time)
         assert (lengths > 0.0).all()
         np.testing.assert_allclose(lengths, others * np.where(net.line == 0, 0.95, 1.0), rtol=1e-15)
     driven = np.concatenate([drive.cells[:, 0] for drive in system.line_drives])
     np.testing.assert_array_equal(np.delete(lengths, driven), np.delete(own, driven))
-    energy, (lengths, pull) = system.energy(t, x), system.lengths(t, x)
-    changes = [system.lengths(t + h, x)[0] - lengths for h in steps]
-    remainder = [abs(system.energy(t + h, x) - energy - pull @ d) for h, d in zip(steps, changes, strict=True)]
+    np.testing.assert_array_equal(system.net.natural_length, own)
+    energy, lengths, slopes = system.energy(t, x), system.natural_length(t), system.length_force(t, x)
+    changes = [system.natural_length(t + h) - lengths for h in steps]
+    remainder = [abs(system.energy(t + h, x) - energy - slopes @ d) for h, d in zip(steps, changes, strict=True)]
     assert max(remainder) <= 1e-13 * energy or abs(slope(remainder, steps) - 2) < 0.1  # slack lines have no slope
 
 

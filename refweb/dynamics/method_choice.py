@@ -52,10 +52,12 @@ def decided(scene, system):
     if len(bare):
         return _of(scene, "ida", rtol=tolerance), f"node {bare[0]} has no mass, which only ida takes"
     family = "adams" if digits >= MANY else "bdf"
-    if net.order > 1 or net.spread is not None:
+    if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
         return _of(scene, "cvode", rtol=tolerance, family=family), f"{what} is not for explicit steps"
-    system = _undamped(system, "contact")  # its bound of damping and friction is that of all lines touched at once
+    system = _undamped(
+        system, lambda family: family.contact
+    )  # its bound of damping and friction is that of all lines touched at once
     bound = _bound(system)
     steps = scene.solve.duration / (0.5 * bound)
     seconds = steps * step_price(system)
@@ -80,10 +82,10 @@ def decided(scene, system):
     return _of(scene, "central-difference"), price
 
 
-def _undamped(system, only=None):
-    """The system without the bounds of damping: of an effect, by its name, or of all."""
+def _undamped(system, chosen=lambda family: True):
+    """The system without the bounds of damping, of some families or of all."""
     calm = copy.copy(system)
-    calm.families = [replace(f, damping_bound=None) if only in (None, f.name) else f for f in system.families]
+    calm.families = [replace(f, damping_bound=None) if chosen(f) else f for f in system.families]
     return calm
 
 
@@ -116,5 +118,4 @@ def _bound(system):
 
 def _quiet(scene, system):
     """Whether no body, velocity or lack of equilibrium makes waves."""
-    touched = any(family.name == "contact" for family in system.families)
-    return scene.solve.start == "equilibrium" and not touched and not system.initial_velocity().any()
+    return scene.solve.start == "equilibrium" and not system.contact and not system.initial_velocity().any()

@@ -28,12 +28,12 @@ def started(system, x=None):
     before = np.zeros((system.rows, 3)) if x is None else x
     now = before.copy()
     system.drive(0.0, now)
-    inner = [(family.name, system.energy_of(family, 0.0, now)) for family in system.families if family.internal]
+    inner = [(family.contact, system.energy_of(family, 0.0, now)) for family in system.families if family.internal]
     moved = np.flatnonzero((now != before).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    pushed = np.concatenate([np.zeros(0), *(energy for name, energy in inner if name == "contact")])
+    pushed = np.concatenate([np.zeros(0), *(energy for contact, energy in inner if contact)])
     if pushed.max(initial=0.0) > 0.0:
         line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
         yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"

@@ -19,6 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+TENSION, STRAIN, POWER = range(3)
+"""Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Family:
@@ -46,9 +49,14 @@ class Family:
         Number of values per cell that ``force`` writes to its ``out``.
     power : int, optional
         Column of ``out`` with the power of the force [W], for a family booked as "work" or "dissipated_energy".
-    shared : bool
-        Whether ``out`` is that of the lines, tension and strain, over whose elements the cells run as well; ``force``
-        then writes the whole tension, and its own values behind.
+    lines : bool
+        Whether the cells are the elements of the net, and ``data`` the numbers of its lines, `Net.line_data`, whose
+        natural lengths may follow time. ``out`` is then one array for all such families: the whole tension and the
+        strain, in the columns `TENSION` and `STRAIN`, and the `POWER` of a force beside that of the law.
+    contact : bool
+        Whether it is contact with bodies.
+    angular_velocity : sequence of 3 float, optional
+        That of the frame [rad/s], where the forces are those of inertia in a frame that turns.
     damping : kernel, optional
         −∂f/∂v by cell; None where the force does not depend on velocity.
     damping_bound : kernel, optional
@@ -73,7 +81,9 @@ class Family:
     book: str
     observed: int = 0
     power: int | None = None
-    shared: bool = False
+    lines: bool = False
+    contact: bool = False
+    angular_velocity: tuple | None = None
     damping: Callable | None = None
     damping_bound: Callable | None = None
     internal: bool = False

@@ -18,19 +18,16 @@ taut, its force jumps, and central differences are of order 1 across it.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, REFERENCE, SLACKNESS, SMOOTHING, strain
+from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real
-from .base import Family, column
-
-TIME = REFERENCE + 4
-"""Column of τ in the numbers of the lines."""
+from .base import POWER, TENSION, Family, column
 
 
 @kernel()
@@ -62,13 +59,15 @@ def slopes(law, e, rate, time, axial, slack, smooth):
 
 
 @functools.cache
-def kernels(law, gradients, weights):
+def kernels(law, tau, gradients, weights):
     """Force, stiffness, damping and damping bound of one law and reference element.
 
     Parameters
     ----------
     law : int
         Number of the law.
+    tau : int
+        Column of τ in the numbers of the lines.
     gradients : tuple of tuple of float
         dN/dξ by quadrature point and node.
     weights : tuple of float
@@ -86,7 +85,7 @@ def kernels(law, gradients, weights):
                 v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
                 rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / data[c, LENGTH]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                pull = viscous(law, e, rate, data[c, TIME], axial, slack, smooth)
+                pull = viscous(law, e, rate, data[c, tau], axial, slack, smooth)
                 tension = pull + prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if q == 0 or tension > largest:
                     largest = tension
@@ -97,8 +96,8 @@ def kernels(law, gradients, weights):
                     f[row, 0] -= d * p0
                     f[row, 1] -= d * p1
                     f[row, 2] -= d * p2
-            out[c, 0] = largest
-            out[c, 2] = power
+            out[c, TENSION] = largest
+            out[c, POWER] = power
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -106,7 +105,7 @@ def kernels(law, gradients, weights):
         if definite:  # nothing of it is
             return
         for c in range(cells.shape[0]):
-            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, TIME]
+            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
@@ -128,7 +127,7 @@ def kernels(law, gradients, weights):
     def damping(t, x, v, blocks, cells, data, definite):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
-            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, TIME]
+            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
@@ -147,7 +146,7 @@ def kernels(law, gradients, weights):
         # The stiffness has no bound of its own: in a step that this bound allows it is below that of the law unless
         # nodes move faster than sound, but at the kink of a smoothed law, which such a step passes at once.
         for c in range(cells.shape[0]):
-            most = data[c, TIME] * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
+            most = data[c, tau] * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
             for q in range(points):
                 total = 0.0
                 for a in range(nodes):
@@ -215,17 +214,14 @@ class Damping(Table):
 
     def extend(self, net):
         """The net with τ in one more column of the numbers of its lines."""
-        if not self.time:
-            return net
-        time = np.full((len(net.cells), 1), self.time)
-        return replace(net, line_data=np.ascontiguousarray(np.hstack([net.line_data, time])))
+        return net.with_column("damping_time", self.time) if self.time else net
 
     def on(self, net):
         """The families of all lines, whose tension is that with damping, and of all nodes with mass."""
         families = []
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-            force, stiffness, damping, bound = kernels(net.law.number, *element)
+            force, stiffness, damping, bound = kernels(net.law.number, net.column("damping_time"), *element)
             families.append(
                 Family(
                     name="damping",
@@ -237,8 +233,8 @@ class Damping(Table):
                     bound=None,
                     book="dissipated_energy",
                     observed=3,
-                    power=2,
-                    shared=True,
+                    power=POWER,
+                    lines=True,
                     damping=damping,
                     damping_bound=bound,
                     internal=True,

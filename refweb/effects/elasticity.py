@@ -19,7 +19,7 @@ from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table
-from .base import Family
+from .base import STRAIN, TENSION, Family
 
 
 @functools.cache
@@ -56,8 +56,8 @@ def kernels(law, gradients, weights):
                     f[row, 0] -= d * p0
                     f[row, 1] -= d * p1
                     f[row, 2] -= d * p2
-            out[c, 0] = largest
-            out[c, 1] = stretched
+            out[c, TENSION] = largest
+            out[c, STRAIN] = stretched
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -106,7 +106,7 @@ def kernels(law, gradients, weights):
                 out[c * points + q] = strain(x, cells, data, c, q, nodes, flat)[4]
 
     @kernel(ENERGY)
-    def by_length(t, x, cells, data, out):
+    def length_force(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             total = 0.0
             for q in range(points):
@@ -116,7 +116,7 @@ def kernels(law, gradients, weights):
                 total += weights[q] * (energy_density(law, e, axial, slack, smooth) - pulled)
             out[c] = total
 
-    return force, energy, stiffness, bound, every_strain, by_length
+    return force, energy, stiffness, bound, every_strain, length_force
 
 
 def of(net):
@@ -131,7 +131,7 @@ def strains(net, x):
     return strain
 
 
-def by_length(net):
+def length_force(net):
     """The kernel (signature `refweb.kernels.ENERGY`) of ∂E/∂L of each element [N]."""
     return of(net)[5]
 
@@ -153,5 +153,6 @@ class Elasticity(Table):
             bound=bound,
             book="strain_energy",
             observed=2,
+            lines=True,
             internal=True,
         )

@@ -152,8 +152,8 @@ class Frame(Table):
         halves = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
         rows = np.concatenate([heavy, spins])
         families = self._families(pulled, (column(rows), self._numbers(halves, net.points[rows])))
-        if net.spread is not None:
-            lines = net.cells.copy(), self._numbers(net.spread, net.points[net.cells])
+        if net.consistent_minus_lumped is not None:
+            lines = net.cells, self._numbers(net.consistent_minus_lumped, net.points[net.cells])
             families += self._families(lines, lines)
         return families
 
@@ -164,7 +164,7 @@ class Frame(Table):
 
     def _families(self, pulled, turned):
         force, energy, stiffness, coriolis, damping, damping_bound = kernels(pulled[0].shape[1])
-        own = dict(name="frame", book="frame_energy", bound=None)
+        own = dict(name="frame", book="frame_energy", bound=None, angular_velocity=self.angular_velocity)
         return [
             Family(**own, cells=pulled[0], data=pulled[1], force=force, energy=energy, stiffness=stiffness),
             Family(

@@ -22,16 +22,18 @@ is pulled taut the strain jumps, and no order exceeds 1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..kernels import kernel
 
-# Columns of Net.line_data: what a kernel over lines finds in `data`.
 LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0, R0, REFERENCE = range(7)
-"""``data[:, REFERENCE : REFERENCE + 4]`` is dX/dξ, constant because lines of a web are straight, and its magnitude."""
+"""Columns of `Net.line_data`, what a kernel over lines finds in ``data``; ``data[:, REFERENCE : REFERENCE + 4]`` is
+dX/dξ, constant because lines of a web are straight, and its magnitude. Effects add others by `Net.with_column`."""
+COLUMNS = ("length", "axial_stiffness", "slackness", "smoothing", "g0", "r0", "x", "y", "z", "distance")
+"""Names of these columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,9 @@ class Net:
         The web's line that each element belongs to.
     line_data : ndarray, shape (cells, columns)
         Natural length [m], EA [N], ε0, η, their (g0, r0) of `refweb.net.tension_laws`, then dX/dξ and its magnitude
-        [m].
+        [m], then what effects add.
+    columns : tuple of str
+        Names of its columns.
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
     gradients : ndarray, shape (points, nodes per cell)
@@ -72,7 +76,7 @@ class Net:
         True where time is the load step of statics.
     cable_mass : float
         Mass of the lines alone [kg].
-    spread : ndarray, shape (cells, nodes per cell, nodes per cell), optional
+    consistent_minus_lumped : ndarray, shape (cells, nodes per cell, nodes per cell), optional
         Consistent mass less the lumped one of each element [kg], its rows of sum 0; None where mass is lumped.
     bodies : tuple of refweb.net.rigid_body.RigidBody
         Bodies, whose rows follow those of the nodes.
@@ -97,9 +101,12 @@ class Net:
     subdivide: int = 1
     quasi_static: bool = False
     cable_mass: float = 0.0
-    spread: np.ndarray | None = None
+    consistent_minus_lumped: np.ndarray | None = None
     bodies: tuple = ()
     spins: int = 0
+    columns: tuple = COLUMNS
+
+    spread = property(lambda self: self.consistent_minus_lumped)  # TRANSITION
 
     @property
     def heavy(self):
@@ -110,6 +117,18 @@ class Net:
     def order(self):
         """Order of the elements."""
         return self.cells.shape[1] - 1
+
+    def column(self, name):
+        """Number of a column of ``line_data``, for the kernels of the effect that added it."""
+        return self.columns.index(name)
+
+    def with_column(self, name, values):
+        """The net with one more column in ``line_data``; ``values`` are one number or one for each element."""
+        if name in self.columns:
+            raise ValueError(f"there is a column {name} already")
+        own = np.broadcast_to(values, len(self.cells))
+        numbers = np.ascontiguousarray(np.column_stack([self.line_data, own]), dtype=float)
+        return replace(self, line_data=numbers, columns=(*self.columns, name))
 
     @property
     def natural_length(self):
@@ -281,7 +300,7 @@ def build(web, cable, quasi_static=False, consistent=False):
     mass = np.zeros(len(points))
     for a in range(cells.shape[1]):
         np.add.at(mass, cells[:, a], share * lumped[a])
-    spread = np.einsum("q,qa,qb->ab", weights, functions, functions) - np.diag(lumped)
+    apart = np.einsum("q,qa,qb->ab", weights, functions, functions) - np.diag(lumped)
     return Net(
         web=web,
         law=cable.tension_law,
@@ -299,5 +318,5 @@ def build(web, cable, quasi_static=False, consistent=False):
         subdivide=pieces,
         quasi_static=quasi_static,
         cable_mass=float(mass.sum()),
-        spread=share[:, None, None] * spread if consistent else None,
+        consistent_minus_lumped=share[:, None, None] * apart if consistent else None,
     )

@@ -30,8 +30,8 @@ class State:
 
     @cached_property
     def _forces(self):
-        force, out = self.system.forces(self.time, self.x, self.v)
-        return force, [o.copy() for o in out]
+        force, per_cell = self.system.forces(self.time, self.x, self.v)
+        return force, per_cell.tension.copy()
 
     def _by_line(self, values):
         """Largest value over the elements of each line."""
@@ -48,8 +48,7 @@ class State:
     @cached_property
     def element_tension(self):
         """Tension of each element [N], shape (cells,)."""
-        at = next(i for i, f in enumerate(self.system.families) if f.cells is self.system.net.cells)
-        return self._forces[1][at][:, 0]
+        return self._forces[1]
 
     @cached_property
     def tension(self):
@@ -66,8 +65,7 @@ class State:
         """Strain of each element, its largest over quadrature points [1], shape (cells,)."""
         from ..effects.elasticity import strains
 
-        self.system.prepare(self.time)
-        return strains(self.system.net, self.x).max(axis=1)
+        return strains(self.system.at(self.time).net, self.x).max(axis=1)
 
     @cached_property
     def element_slack(self):

@@ -22,17 +22,15 @@ from ..errors import SolverError
 from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor
 
-FRAME = "frame"
-"""Name of the effect that turns the net."""
 LOOSE = 1e-10
 """Stiffness that holds each node of a loose part against its translation, over the largest EA/L."""
 
 
 def drifting(system):
     """Number of translations of loose parts that centrifugal forces drive away from the axis."""
-    if not system.loose:
+    if not system.unsupported_parts:
         return 0
-    moves = np.zeros((len(system.free), len(system.loose)))
+    moves = np.zeros((len(system.free), len(system.unsupported_parts)))
     for k, places in enumerate(_loose(system)):
         moves[places, k] = 1.0
     values = np.linalg.eigvalsh(moves.T @ (system.pattern.matrix(_centrifugal(system)) @ moves))
@@ -41,19 +39,18 @@ def drifting(system):
 
 def _loose(system):
     """Unknowns of each translation of a loose part."""
-    return [np.searchsorted(system.free, 3 * rows + axis) for rows, axis in system.loose]
+    return [np.searchsorted(system.free, 3 * rows + axis) for rows, axis in system.unsupported_parts]
 
 
 def _centrifugal(system):
     """Values of −Ω²C in the pattern of the system."""
-    return system.stiffness(0.0, np.zeros((system.rows, 3)), only=FRAME)
+    return system.stiffness(0.0, np.zeros((system.rows, 3)), only=system.rotating)
 
 
 def check_speed(system, t):
     """Refuse a frame that turns at the limit or above it, with that limit."""
-    net, factor = system.net, Factor(system.pattern)
+    net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
-    system.prepare(t)
     unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
     axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
     held = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
@@ -70,7 +67,7 @@ def check_speed(system, t):
     while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
-    (speed,) = {np.linalg.norm(family.data[0, :3]) for family in system.families if family.name == FRAME}
+    (speed,) = {np.linalg.norm(family.angular_velocity) for family in system.rotating}
     raise SolverError(
         f"no equilibrium: [frame] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
         "centrifugal forces outgrow any tension: lower angular_velocity or the masses, or raise modulus × area"

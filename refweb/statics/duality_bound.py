@@ -58,8 +58,7 @@ def duality_bound(system, equilibrium, factor=None):
     factor : refweb.system.factorization.Factor, optional
         Used again where there is one.
     """
-    net, x = system.net, equilibrium.x
-    system.prepare(equilibrium.step)
+    net, x = system.at(equilibrium.step).net, equilibrium.x
     bars = _Bars(net, x)
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
     force, unbalanced = _balanced(system, bars, outer, factor or Factor(system.pattern))

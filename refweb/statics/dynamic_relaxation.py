@@ -45,8 +45,7 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell):
 def _inverse_mass(system, t):
     """What forces are multiplied by [m/N], shape (rows, 3): 0 where nothing moves."""
     rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
-    system.prepare(t)
-    for family in system.families:
+    for family in system.at(t).families:
         if family.bound is not None:
             family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
     moving = ~system.supported & (rates > 0.0)[:, None]
@@ -79,20 +78,19 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
         Where there is no equilibrium, or none is found.
     """
     system = system.at_rest()
-    families, outs = system.families, system.outs()
-    cells, data = typed_list(INDICES, [f.cells for f in families]), typed_list(MATRIX, [f.data for f in families])
-    lists = (typed_list(FORCE, [f.force for f in families]), cells, data, typed_list(MATRIX, outs))
+    kernels, seen = typed_list(FORCE, [f.force for f in system.families]), typed_list(MATRIX, system.per_cell())
+    cells = typed_list(INDICES, [f.cells for f in system.families])
     x, scale = np.zeros((system.rows, 3)), 0.0
-    stalled = TOUCHING if any(family.name == "contact" for family in families) else STALLED
+    stalled = TOUCHING if system.contact else STALLED
     for t in load_steps:
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
-        inverse = _inverse_mass(system, t)
+        inverse, data = _inverse_mass(system, t), typed_list(MATRIX, [f.data for f in system.at(t).families])
         v, done, error, best, since = np.zeros_like(x), 0, np.inf, np.inf, 0
         while True:
-            f, out = system.forces(t, x)
-            tension = out[0][:, 0]
+            f, per_cell = system.forces(t, x)
+            tension = per_cell.tension
             here = max(scale, force_scale(system, t, x, tension))
             last, error = error, residual(system, f, here)
             if error <= tolerance or (error <= LIMIT and done and error > 0.5 * last):
@@ -105,7 +103,7 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
                     f'{LIMIT:g}; use method = "newton"',
                     {"nsteps": done},
                 )
-            relax(2000, t, x, v, f, inverse, *lists)
+            relax(2000, t, x, v, f, inverse, kernels, cells, data, seen)
             done += 2000
             if progress is not None:
                 progress(f"step {t:g}, residual {error:.0e}")

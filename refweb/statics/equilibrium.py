@@ -65,18 +65,18 @@ def check_supported(system, t):
     if system.constraints:
         raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
     outer = system.outer_force(t)
-    for rows, axis in system.loose:
+    for rows, axis in system.unsupported_parts:
         resultant = np.sum(outer[rows, axis])
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
             remedy = "support one of them"
-            if system.turns:
+            if system.rotating:
                 remedy += ", or move the web so that its centre of mass is on the axis of [frame]"
             raise SolverError(
                 f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
                 f"{resultant:.4g} N at step {t:g}, with no support in that direction: {remedy}"
             )
-    if system.turns:
+    if system.rotating:
         from .critical_speed import check_speed
 
         check_speed(system, t)
@@ -88,9 +88,9 @@ def force_scale(system, t, x, tension):
     At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
     under loads below 1e-7 EA.
     """
-    stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.net.natural_length
+    stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
-    outer = [f for f in system.families if f.cells is not system.net.cells]
+    outer = [f for f in system.families if not f.lines]
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
     return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 

@@ -38,8 +38,8 @@ class InteriorPoint:
 
     def __init__(self, system, t, x, anchors):
         self.system, self.x, self.anchors = system, x.copy(), anchors
-        net, points = system.net, len(system.net.weights)
-        system.prepare(t)
+        self._net, points = system.at(t).net, len(system.net.weights)
+        net = self._net
         self.bars = net.bars
         self.axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
         self.natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.line_data[:, LENGTH], points)
@@ -54,7 +54,7 @@ class InteriorPoint:
         self._blocked = False
 
     def _strain(self):
-        net = self.system.net
+        net = self._net
         return (strains(net, self.x) - net.slackness[:, None]).ravel()
 
     def _resultant(self, g, direction):

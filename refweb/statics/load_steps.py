@@ -44,8 +44,7 @@ def solve(system, load_steps, progress=None):
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
     system = system.at_rest()
-    system.prepare(load_steps[0])
-    newton, x = Newton(system, progress), np.zeros((system.rows, 3))
+    newton, x = Newton(system, progress, load_steps[0]), np.zeros((system.rows, 3))
     for k, t in enumerate(load_steps):
         state = _equilibrium(newton, t, x, warm=k > 0)
         state.deviations = newton.deviations(state)
@@ -108,17 +107,14 @@ def _by_interior_point(newton, t, x, spent):
 
 def _by_stiffening(newton, t, x, spent):
     """Equilibrium from those of softer nets, in which no line snaps taut; slack parts turn far under tiny loads."""
-    system, data = newton.system, newton.system.net.line_data
-    own, load = data[:, AXIAL_STIFFNESS].copy(), np.abs(system.outer_force(t)).max()
+    system, load = newton.system, np.abs(newton.system.outer_force(t)).max()
     softer = SOFTEST * newton.axial / load if load > 0.0 else 1.0
-    try:
-        while softer > 1.0:
-            data[:, AXIAL_STIFFNESS] = own / softer
-            state = Newton(system, newton.progress).solve(t, x)
-            _add(spent, state.stats)
-            x, softer = state.x, softer / 10.0
-    finally:
-        data[:, AXIAL_STIFFNESS] = own
+    while softer > 1.0:
+        numbers = system.net.line_data.copy()
+        numbers[:, AXIAL_STIFFNESS] /= softer
+        state = Newton(system.with_line_data(numbers), newton.progress, t).solve(t, x)
+        _add(spent, state.stats)
+        x, softer = state.x, softer / 10.0
     return newton.solve(t, x, warm=True)
 
 

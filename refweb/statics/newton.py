@@ -41,6 +41,8 @@ class Newton:
         With a net whose ``quasi_static`` is True.
     progress : callable, optional
         Called with a line of text after each iteration.
+    first : float, optional
+        Load step whose natural lengths prestress and scales are those of; by default as built.
 
     Attributes
     ----------
@@ -54,16 +56,16 @@ class Newton:
         Largest force of the equilibria so far [N].
     """
 
-    def __init__(self, system, progress=None):
+    def __init__(self, system, progress=None, first=None):
         self.system = system
         self.progress = progress or (lambda text: None)
-        net = system.net
+        net = system.net if first is None else system.at(first).net
         unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
         blocks = np.kron(unit, np.eye(3))[None] / net.natural_length[:, None, None]
         self.geometric = system.assemble_lines(blocks)
         self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
         self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
-        self.follows, self.turns, self.drifting = not system.conservative, system.turns, 0
+        self.follows, self.turns, self.drifting = not system.conservative, bool(system.rotating), 0
         self.factor = (Lu if self.follows else Factor)(system.pattern)
         if self.turns:
             from .critical_speed import drifting
@@ -71,7 +73,7 @@ class Newton:
             self.drifting = drifting(system)
         number = np.full(3 * system.rows, -1)
         number[system.free] = np.arange(len(system.free))
-        held = np.concatenate([[], *(number[3 * rows + axis] for rows, axis in system.loose)]).astype(int)
+        held = np.concatenate([[], *(number[3 * rows + axis] for rows, axis in system.unsupported_parts)]).astype(int)
         self.anchors = system.pattern.diagonal[held]
         self.scale = 0.0
 
@@ -133,9 +135,9 @@ class Newton:
 
     def _evaluated(self, t, x, stats):
         """The `Iterate` at x."""
-        force, out = self.system.forces(t, x)
+        force, per_cell = self.system.forces(t, x)
         stats["nfev"] += 1
-        return Iterate(x, force, out[0][:, 0].copy())
+        return Iterate(x, force, per_cell.tension.copy())
 
     def _scale(self, t, here):
         """What the residual at an `Iterate` is measured against [N]."""
@@ -215,7 +217,7 @@ class Newton:
         if sign is None:
             self.factor.update(self._matrix(state.step, state.x, 1e-12 * self.axial, False))
             state.stats["nlu"] += 1
-        stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+        stiffness = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(state.step)
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
         size = np.zeros(system.rows)
         np.add.at(size, net.cells, np.finfo(float).eps * (np.abs(state.tension) + stiffness * moved)[:, None])

@@ -129,7 +129,7 @@ def _remarks(state, stats, utilisation):
         law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
         reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
         reason += 'law = "tension-only" has no such states'
-        if state.system.turns:
+        if state.system.rotating:
             reason = "the web would leave this state by itself; start from a web that is deflected"
         yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
     if stats["slack_nodes"]:

@@ -247,9 +247,9 @@ def _remarks(here, state):
 
 def _notices(system):
     """What the modes leave out."""
-    if system.turns:
+    if system.rotating:
         yield "Coriolis forces are left out: ± holds how far they may move the frequency of a mode that they act on"
-    if any(family.damping is not None and family.name != "frame" for family in system.families):
+    if any(family.damping is not None and family not in system.rotating for family in system.families):
         yield "forces that depend on velocity, such as damping, are left out"
     if free := [body.name for body in system.net.bodies if not body.fixed]:
         yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

@@ -135,7 +135,7 @@ class _Pencil:
     def __init__(self, system, t, x, seed):
         self.system, self.t, self.x, self.seed = system, t, x, seed
         pattern, net = system.pattern, system.net
-        self._stiffness, self._mass = system.stiffness(t, x), system.mass()
+        self._stiffness, self._mass = system.stiffness(t, x), system.mass.values
         self.K, self.M = pattern.matrix(self._stiffness), pattern.matrix(self._mass)
         self.factor, self._inner = Factor(pattern), None
         own = self.M.diagonal()
@@ -143,7 +143,7 @@ class _Pencil:
         if not len(self.massive):
             raise SolverError("no mode: no free node has mass; give the cable a density, or nodes a [[point_mass]]")
         unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
-        axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+        axial = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
         self._strained = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
         taut = self._strained[pattern.diagonal]
         taut = np.where(taut > 0.0, taut, axial.max())
@@ -251,7 +251,7 @@ class _Pencil:
     def _turned(self, squared, shapes):
         """How far Coriolis forces may move ω²."""
         system = self.system
-        turning = next((f.data[0, :3] for f in system.families if f.name == "frame"), np.zeros(3))
+        turning = np.array(system.rotating[0].angular_velocity if system.rotating else (0.0, 0.0, 0.0))
         force = np.where(system.supported, 0.0, np.cross(turning, shapes))
         speed = np.linalg.norm(turning)
         felt = abs(force).max(axis=(1, 2)) > 1e-9 * speed * abs(shapes).max(axis=(1, 2))

@@ -224,8 +224,8 @@ class Dynamics:
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
         mass, held = np.repeat(system.net.mass, 3)[free], np.where(system.supported, x, 0.0)
-        consistent = system.net.spread is not None
-        over_mass = system.inverse_mass[1].solve if consistent else lambda f: f / mass
+        consistent = system.net.consistent_minus_lumped is not None
+        over_mass = system.mass.factor.solve if consistent else lambda f: f / mass
 
         def rows(t, y):
             x, v = held.copy(), np.zeros((system.rows, 3))
@@ -265,7 +265,7 @@ class Dynamics:
             if consistent and steps and ahead < end and solver.t > ahead * (1.0 - 1e-12):  # a corner of a motion
                 sides = (rows(t, solver.y)[1] for t in (ahead * (1.0 + 1e-12), 0.5 * (solver.t_old + ahead)))
                 jump = np.where(system.supported, np.subtract(*sides), 0.0)
-                solver.y[n:] += system.kick(jump).ravel()[free]
+                solver.y[n:] += system.mass.kick(jump).ravel()[free]
                 solver.f = rate(solver.t, solver.y)
             _check(deadline)
         trial.cpu_s, trial.values, trial.x = spent + time.process_time(), values, trial_x[: self._linear]

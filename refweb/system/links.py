@@ -41,9 +41,7 @@ class Links:
         table = np.repeat(np.arange(len(given)), [len(one.cells) for one in given]) + 1
         self._names = [f"[[link]] {i} of nodes {a} and {b}" for i, (a, b) in zip(table, cells, strict=True)]
         self._refuse(system)
-        heavy = np.repeat(system.net.mass, 3)[system.free] > 0.0
-        self._M = system.pattern.matrix(system.mass())[heavy][:, heavy].tocsc()
-        self._at = system.free[heavy]
+        self._M, self._at = system.mass.matrix, system.mass.heavy
         number = np.full(3 * system.rows, -1)
         number[self._at] = np.arange(len(self._at))
         unknown = number[3 * cells[:, :, None] + np.arange(3)]  # of (link, end, axis)

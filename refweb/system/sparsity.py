@@ -74,6 +74,12 @@ class Pattern:
             _scatter(block, slots, values)
         return values
 
+    def assemble_one(self, number, blocks):
+        """Values of the pattern from the blocks of one family, by its number."""
+        values = np.zeros(len(self.indices))
+        _scatter(np.ascontiguousarray(blocks), self.slots[number], values)
+        return values
+
     def matrix(self, values):
         """The `scipy.sparse.csc_array` of values."""
         return scipy.sparse.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))

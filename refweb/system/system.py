@@ -2,6 +2,10 @@
 
 A `System` concatenates the families of its effects once and has the interface of one of them: force, energy, stiffness.
 ``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the system.
+
+Where effects prescribe natural lengths, the numbers of the lines are a function of time, `System.line_data`: every
+force and energy asks for those of its own t, and `System.at` is the system as it stands at one time. The net is as
+built throughout. A loop of kernels, which cannot ask, keeps an array of its own and sets lengths in that.
 """
 
 from __future__ import annotations
@@ -9,13 +13,40 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import Constraint, Drive, Family, LineDrive
+from ..effects.base import TENSION, Constraint, Drive, Family, LineDrive
 from ..net.net import LENGTH
 from ..net.rigid_body import row_names
 from ..net.tension_laws import TENSION_ONLY
+
+
+class PerCell(list):
+    """What each family observes per cell, an array beside each of `System.families`.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (elements, columns)
+        That of the lines, with tension [N] and strain [1] in the columns `refweb.effects.base.TENSION` and `STRAIN`.
+    """
+
+    def __init__(self, arrays, lines):
+        super().__init__(arrays)
+        self.lines = lines
+
+    @property
+    def tension(self):
+        """Tension of each element [N], a view of ``lines``."""
+        return self.lines[:, TENSION]
+
+
+class Forces(NamedTuple):
+    """Force on every row [N], shape (rows, 3), and what families observe; the next evaluation writes over that."""
+
+    force: np.ndarray
+    per_cell: PerCell
 
 
 class System:
@@ -40,8 +71,6 @@ class System:
         One per effect that prescribes natural lengths.
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
-    length : ndarray, shape (cells,)
-        Natural length of each element as built [m], which the line drives multiply.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     """
@@ -51,7 +80,8 @@ class System:
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
         self.net, self.effects = net, effects
-        self.rows, self.length = len(net.points), net.natural_length.copy()
+        self.rows = len(net.points)
+        self.length = net.natural_length.copy()  # TRANSITION
         acting = []
         for effect in effects:
             if hasattr(effect, "on"):
@@ -70,9 +100,11 @@ class System:
 
     def _arrange(self):
         self.free = np.flatnonzero(~self.supported)
-        self._rest = np.zeros((self.rows, 3))
-        self._out = self.outs()
-        self._blocks = [np.empty((len(f.cells), 3 * f.cells.shape[1], 3 * f.cells.shape[1])) for f in self._stiff]
+        self._zero = np.zeros((self.rows, 3))
+        self._observed = self.per_cell()
+        sizes = [(len(f.cells), 3 * f.cells.shape[1]) for f in self._in_tangent]
+        self._blocks = [np.empty((count, size, size)) for count, size in sizes]
+        self._at_time = None  # the last time that lengths were asked for, and `line_data` then
 
     def at_rest(self):
         """The system as statics sees it: free bodies are held and felt by nothing, what needs velocity is left out."""
@@ -80,7 +112,7 @@ class System:
         if not waiting and all(family.at_rest for family in self.families):
             return self
         rest = copy.copy(self)
-        for kept in ("pattern", "loose", "inverse_mass"):
+        for kept in ("pattern", "unsupported_parts", "mass", "links"):
             rest.__dict__.pop(kept, None)
         rest.supported = self.supported.copy()
         rest.supported[waiting] = True
@@ -110,7 +142,13 @@ class System:
         return v
 
     @property
-    def _stiff(self):
+    def lines(self):
+        """The `Family` of the lines by their law; None where they have no tension."""
+        return next((family for family in self.families if family.lines), None)
+
+    @property
+    def _in_tangent(self):
+        """Families with a stiffness or a damping: those of the pattern, in its order."""
         return [f for f in self.families if f.stiffness is not None or f.damping is not None]
 
     @cached_property
@@ -118,28 +156,31 @@ class System:
         """The fixed `refweb.system.sparsity.Pattern` of the tangent."""
         from .sparsity import Pattern
 
-        return Pattern(self.rows, self.free, [f.cells for f in self._stiff])
+        return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent])
 
     @cached_property
-    def loose(self):
-        """Parts of the net that can be carried off: (rows of a connected part, axis in which none is supported)."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
+    def mass(self):
+        """The `refweb.system.mass.Mass`."""
+        from .mass import Mass
 
-        cells = [f.cells for f in self.families if f.cells.shape[1] > 1]
-        pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
-        graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(self.rows, self.rows))
-        count, part = connected_components(graph, directed=False)
-        held = np.zeros((count, 3), dtype=bool)
-        np.logical_or.at(held, part, self.supported)
-        return [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
+        return Mass(self.net, self.free, self.pattern, self._lines_in_tangent)
 
-    def outs(self):
-        """Arrays for what each family observes per cell; those of families that share it are that of the lines."""
-        lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.shared)])))
-        return [
-            lines if f.shared or f.name == "elasticity" else np.zeros((len(f.cells), f.observed)) for f in self.families
-        ]
+    @property
+    def _lines_in_tangent(self):
+        """Number of the lines among the families of the pattern; None where they have no tension."""
+        return next((i for i, family in enumerate(self._in_tangent) if family.lines), None)
+
+    @cached_property
+    def unsupported_parts(self):
+        """Parts of the net that can be carried off, a list of `refweb.system.unsupported_parts.Part`."""
+        from .unsupported_parts import found
+
+        return found(self)
+
+    def per_cell(self):
+        """`PerCell` of new arrays; those of families over the lines are one."""
+        lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.lines)])))
+        return PerCell([lines if f.lines else np.zeros((len(f.cells), f.observed)) for f in self.families], lines)
 
     @property
     def working(self):
@@ -147,90 +188,86 @@ class System:
         signs = {"work": 1, "dissipated_energy": -1}
         return np.array([signs[f.book] if f.power is not None else 0 for f in self.families], dtype=np.int64)
 
-    @cached_property
-    def by_length(self):
-        """Kernel of ∂E/∂L of each element, E the energy of the lines."""
-        from ..effects.elasticity import by_length
-
-        return by_length(self.net)
-
-    def prepare(self, t):
-        """Give the lines their natural lengths at time t, where an effect prescribes them."""
-        if self.line_drives:
-            self.net.line_data[:, LENGTH] = self.length
+    def line_data(self, t):
+        """`Net.line_data` with the natural lengths of time t, shape (elements, columns)."""
+        if not self.line_drives:
+            return self.net.line_data
+        known = self._at_time
+        if known is None or known[0] != t:
+            numbers = self.net.line_data.copy()
+            numbers[:, LENGTH] = self.length  # TRANSITION
             for d in self.line_drives:
-                d.kernel(t, self.net.line_data, d.cells, d.data)
+                d.kernel(t, numbers, d.cells, d.data)
+            self._at_time = known = t, numbers
+        return known[1]
+
+    def natural_length(self, t):
+        """Natural length of each element at time t [m], shape (elements,)."""
+        return self.line_data(t)[:, LENGTH]
+
+    def at(self, t):
+        """The system as it stands at time t: its natural lengths are those of that time, and stay."""
+        if not self.line_drives:
+            return self
+        view = self.with_line_data(self.line_data(t))
+        view.line_drives = []
+        return view
+
+    def with_line_data(self, numbers):
+        """The same system with other numbers of its lines, of the shape of `Net.line_data`."""
+        other = copy.copy(self)
+        other.net = replace(self.net, line_data=numbers)
+        other.families = [replace(f, data=numbers) if f.lines else f for f in self.families]
+        other._at_time = None
+        return other
+
+    def _data(self, family, t):
+        return self.line_data(t) if family.lines else family.data
+
+    @cached_property
+    def length_force_kernel(self):
+        """Kernel of ∂E/∂L of each element, E the energy of the lines."""
+        from ..effects.elasticity import length_force
+
+        return length_force(self.net)
+
+    def length_force(self, t, x):
+        """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
+        force = np.empty(len(self.net.cells))
+        self.length_force_kernel(t, x, self.net.cells, self.line_data(t), force)
+        return force
 
     def drive(self, t, x, v=None):
         """Write the prescribed displacements [m] and velocities [m/s] at time t into x and v."""
         v = np.zeros_like(x) if v is None else v
         for d in self.drives:
-            d.kernel(t, x, v, self._rest, d.cells, d.data, self._rest)
+            d.kernel(t, x, v, self._zero, d.cells, d.data, self._zero)
 
     def force(self, t, x, v=None):
         """Force on every row [N], supports included, shape (rows, 3)."""
         return self.forces(t, x, v)[0]
 
     def forces(self, t, x, v=None):
-        """Force on every row [N], and what each family observes per cell (a list beside ``families``)."""
-        self.prepare(t)
+        """The `Forces` at displacement x and velocity v, by default at rest."""
         f = np.zeros((self.rows, 3))
-        v = self._rest if v is None else v
-        for family, out in zip(self.families, self._out, strict=True):
-            family.force(t, x, v, f, family.cells, family.data, out)
-        return f, self._out
+        v = self._zero if v is None else v
+        for family, out in zip(self.families, self._observed, strict=True):
+            family.force(t, x, v, f, family.cells, self._data(family, t), out)
+        return Forces(f, self._observed)
 
     def force_of(self, family, t, x, v=None):
         """Force on every row of one family [N]."""
-        self.prepare(t)
         f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), max(family.observed, 2)))
-        family.force(t, x, self._rest if v is None else v, f, family.cells, family.data, out)
+        family.force(t, x, self._zero if v is None else v, f, family.cells, self._data(family, t), out)
         return f
 
     def outer_force(self, t, x=None, v=None):
         """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
-        outer, x = np.zeros((self.rows, 3)), self._rest if x is None else x
+        outer, x = np.zeros((self.rows, 3)), self._zero if x is None else x
         for family in self.families:
             if not family.internal:
                 outer += self.force_of(family, t, x, v)
         return outer
-
-    def lengths(self, t, x):
-        """Natural length of each element [m], and ∂E/∂L [N]; the work of their change is the integral of both."""
-        self.prepare(t)
-        pull = np.empty(len(self.net.cells))
-        self.by_length(t, x, self.net.cells, self.net.line_data, pull)
-        return self.net.natural_length.copy(), pull
-
-    @cached_property
-    def _spread(self):
-        """Consistent less lumped mass of all rows, a sparse matrix [kg]; None where mass is lumped."""
-        from scipy.sparse import coo_array
-
-        net = self.net
-        if net.spread is None:
-            return None
-        i = np.repeat(net.cells[:, :, None], net.cells.shape[1], axis=2)
-        pairs = (i.ravel(), i.swapaxes(1, 2).ravel())
-        return coo_array((net.spread.ravel(), pairs), shape=(self.rows, self.rows)).tocsr()
-
-    @cached_property
-    def inverse_mass(self):
-        """Free components that have mass, and the factorized mass matrix of these."""
-        from scipy.sparse.linalg import splu
-
-        heavy = np.repeat(self.net.mass, 3)[self.free] > 0.0
-        return self.free[heavy], splu(self.pattern.matrix(self.mass())[heavy][:, heavy].tocsc())
-
-    def moved_by(self, push):
-        """M⁻¹ of a push on every row, for what is free: accelerations [m/s²] by forces; shape (rows, 3)."""
-        (at, mass), moved = self.inverse_mass, np.zeros((self.rows, 3))
-        moved.ravel()[at] = mass.solve(push.ravel()[at])
-        return moved
-
-    def kick(self, jump):
-        """Jump of all velocities where prescribed ones jump by ``jump`` [m/s]: consistent mass passes it on."""
-        return jump if self._spread is None else jump - self.moved_by(self._spread @ jump)
 
     @cached_property
     def links(self):
@@ -240,29 +277,28 @@ class System:
         return Links(self)
 
     def balance(self, t, x, v):
-        """As `forces`, and with the forces of links; on supports less those that consistent mass takes to move.
+        """`Forces` with those of links; on supports less those that consistent mass takes to move.
 
         What supports give is its negative.
         """
-        force, out = self.forces(t, x, v)
+        force, per_cell = self.forces(t, x, v)
         if self.constraints:
             force += self.links.force(x, v, force)
-        if self._spread is not None and not self.net.quasi_static:
-            force -= np.where(self.supported, self._spread @ self.moved_by(force), 0.0)
-        return force, out
+        if self.net.consistent_minus_lumped is not None and not self.net.quasi_static:
+            force -= np.where(self.supported, self.mass.passed_on(self.mass.moved_by(force)), 0.0)
+        return Forces(force, per_cell)
 
-    def momentum(self, v):
-        """M v of every row [N s], shape (rows, 3)."""
-        lumped = self.net.mass[:, None] * v
-        return lumped if self._spread is None else lumped + self._spread @ v
-
-    def mass(self):
-        """Values of the mass matrix M [kg] in the fixed pattern."""
-        values = np.zeros(len(self.pattern.indices))
-        if self.net.spread is not None:
-            values += self.assemble_lines(np.kron(self.net.spread, np.eye(3)))
-        values[self.pattern.diagonal] += np.repeat(self.net.mass, 3)[self.free]
-        return values
+    # TRANSITION: names of before, until every room has moved to those above
+    prepare = lambda self, t: self.net.line_data.__setitem__((slice(None), LENGTH), self.natural_length(t))  # noqa: E731
+    lengths = lambda self, t, x: (self.natural_length(t), self.length_force(t, x))  # noqa: E731
+    outs = per_cell
+    loose = property(lambda self: self.unsupported_parts)
+    turns = property(lambda self: bool(self.rotating))
+    by_length = property(lambda self: self.length_force_kernel)
+    inverse_mass = property(lambda self: (self.mass.heavy, self.mass.factor))
+    moved_by = lambda self, push: self.mass.moved_by(push)  # noqa: E731
+    kick = lambda self, jump: self.mass.kick(jump)  # noqa: E731
+    momentum = lambda self, v: self.mass.momentum(v)  # noqa: E731
 
     def row_name(self, row):
         """How a message calls a row: a node by its number, a body by its name."""
@@ -273,8 +309,7 @@ class System:
         out = np.zeros(len(family.cells))
         if family.energy is None:
             return out
-        self.prepare(t)
-        family.energy(t, x, family.cells, family.data, out)
+        family.energy(t, x, family.cells, self._data(family, t), out)
         return out
 
     def energy(self, t, x):
@@ -284,15 +319,14 @@ class System:
     def stiffness(self, t, x, v=None, definite=False, only=None):
         """Values of K = −∂f/∂x [N/m] in the fixed pattern; ``definite`` leaves out what is negative.
 
-        ``only`` is the name of an effect, to leave out all others.
+        ``only`` are the families to take, by default all.
         """
-        self.prepare(t)
-        v = self._rest if v is None else v
-        for family, blocks in zip(self._stiff, self._blocks, strict=True):
-            if family.stiffness is None or only not in (None, family.name):
+        v = self._zero if v is None else v
+        for family, blocks in zip(self._in_tangent, self._blocks, strict=True):
+            if family.stiffness is None or not (only is None or family in only):
                 blocks[:] = 0.0
             else:
-                family.stiffness(t, x, v, blocks, family.cells, family.data, definite)
+                family.stiffness(t, x, v, blocks, family.cells, self._data(family, t), definite)
         return self.pattern.assemble(self._blocks)
 
     @property
@@ -309,7 +343,8 @@ class System:
     def dead(self):
         """Whether the only internal forces are the tensions of the lines, and all others are dead loads."""
         outer = [f for f in self.families if not f.internal]
-        return all(f.stiffness is None and f.energy is not None for f in outer) and len(self.families) == len(outer) + 1
+        inner = [f for f in self.families if f.internal]
+        return all(f.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
 
     @property
     def convex(self):
@@ -317,23 +352,25 @@ class System:
         return self.net.law.number == TENSION_ONLY and self.dead
 
     @property
-    def turns(self):
-        """Whether centrifugal forces act."""
-        return any(family.name == "frame" for family in self.families)
+    def contact(self):
+        """Whether the web may touch bodies."""
+        return any(family.contact for family in self.families)
+
+    @property
+    def rotating(self):
+        """Families of the forces of inertia in a frame that turns, none where none does."""
+        return [family for family in self.families if family.angular_velocity is not None]
 
     def damping(self, t, x, v):
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity."""
         if not any(f.damping is not None for f in self.families):
             return None
-        self.prepare(t)
-        for family, blocks in zip(self._stiff, self._blocks, strict=True):
+        for family, blocks in zip(self._in_tangent, self._blocks, strict=True):
             blocks[:] = 0.0
             if family.damping is not None:
-                family.damping(t, x, v, blocks, family.cells, family.data, False)
+                family.damping(t, x, v, blocks, family.cells, self._data(family, t), False)
         return self.pattern.assemble(self._blocks)
 
     def assemble_lines(self, blocks):
         """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""
-        at = next(i for i, f in enumerate(self._stiff) if f.cells is self.net.cells)
-        empty = [np.zeros_like(b[:0]) for b in self._blocks]
-        return self.pattern.assemble([*empty[:at], np.ascontiguousarray(blocks), *empty[at + 1 :]])
+        return self.pattern.assemble_one(self._lines_in_tangent, blocks)

@@ -52,7 +52,7 @@ def test_kernels_equal_the_weak_form(law, seed, order, subdivide):
     got = net_system.pattern.matrix(net_system.stiffness(1.0, x)).toarray()
     np.testing.assert_allclose(got, expected, rtol=0, atol=TIGHT * np.abs(expected).max())
     expected = oracle.energy(x)
-    got = net_system.energy_of(net_system.families[0], 1.0, x)
+    got = net_system.energy_of(net_system.lines, 1.0, x)
     np.testing.assert_allclose(got, expected, rtol=0, atol=TIGHT * np.abs(expected).max())
 
 
@@ -121,14 +121,14 @@ def test_mass_is_scikit_fems(order, subdivide):
     web, cable = skew_web(), finer_cable("linear", order, subdivide)
     expected = Oracle(web, cable).mass().toarray()
     net = lines.build(web, cable, consistent=True)
-    assert lines.build(web, cable).spread is None and net.mass.min() > 0.0
+    assert lines.build(web, cable).consistent_minus_lumped is None and net.mass.min() > 0.0
     np.testing.assert_allclose(np.repeat(net.mass, 3), expected.sum(axis=1), rtol=1e-13)
     np.testing.assert_array_equal(net.mass, lines.build(web, cable).mass)
     properties = cable.properties(web)
     whole = sum(properties["density"] * properties["area"] * properties["natural_length"])
     np.testing.assert_allclose([net.mass.sum(), net.cable_mass], whole, rtol=1e-14)
     matrix = np.diag(np.repeat(net.mass, 3))
-    for cell, spread in zip(net.cells, net.spread, strict=True):
+    for cell, spread in zip(net.cells, net.consistent_minus_lumped, strict=True):
         np.testing.assert_allclose(spread.sum(axis=1), 0.0, atol=1e-15 * net.mass.max())
         for k in range(3):
             matrix[np.ix_(3 * cell + k, 3 * cell + k)] += spread
@@ -136,7 +136,9 @@ def test_mass_is_scikit_fems(order, subdivide):
     # The same through the pattern of the tangent, as a solver assembles it.
     net_system = skew_system("linear", order, subdivide)
     free = net_system.free
-    got = net_system.pattern.matrix(net_system.assemble_lines(np.kron(net.spread, np.eye(3)))).toarray()
+    got = net_system.pattern.matrix(
+        net_system.assemble_lines(np.kron(net.consistent_minus_lumped, np.eye(3)))
+    ).toarray()
     got += np.diag(np.repeat(net.mass, 3)[free])
     np.testing.assert_allclose(got, expected[np.ix_(free, free)], rtol=0, atol=TIGHT * expected.max())
 

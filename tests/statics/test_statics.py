@@ -376,17 +376,17 @@ def test_certificate_holds_away_from_the_equilibrium(prestrain, size):
     net_system = small_web(prestrain=prestrain)
     (best,) = solve(net_system)
     least, own = net_system.energy(1.0, best.x), best.duality_bound
-    stored = net_system.energy_of(net_system.families[0], 1.0, best.x).sum()
+    stored = net_system.energy_of(net_system.lines, 1.0, best.x).sum()
     for seed in range(5):
         x = best.x.copy()
         x.ravel()[net_system.free] += size * np.random.default_rng(seed).standard_normal(len(net_system.free))
-        force, out = net_system.forces(1.0, x)
-        found = duality_bound(net_system, Equilibrium(1.0, x, out[0][:, 0].copy(), force))
+        force, seen = net_system.forces(1.0, x)
+        found = duality_bound(net_system, Equilibrium(1.0, x, seen.tension.copy(), force))
         error = net_system.energy(1.0, x) - least
         # Energies of this size are sums of a hundred terms: rounding of 1e-15 of them.
         assert -own.gap - 1e-15 <= error <= found.gap + 1e-15
-        assert (np.abs(out[0][:, 0] - best.tension) <= found.tension + own.tension).all()
-        energy = net_system.energy_of(net_system.families[0], 1.0, x).sum()
+        assert (np.abs(seen.tension - best.tension) <= found.tension + own.tension).all()
+        energy = net_system.energy_of(net_system.lines, 1.0, x).sum()
         assert abs(energy - stored) <= found.strain_energy + own.strain_energy
 
 
@@ -401,12 +401,12 @@ def test_gap_of_a_hanging_line_is_its_energy_above_the_least(seed):
     net_system = joined(points, [[0, 1]], None, [0], cable, Load(node=1, force=(0.0, 0.0, -weight)))
     x = np.zeros((2, 3))
     x[1] = np.random.default_rng(seed).standard_normal(3)
-    force, out = net_system.forces(1.0, x)
-    found = duality_bound(net_system, Equilibrium(1.0, x, out[0][:, 0].copy(), force))
+    force, seen = net_system.forces(1.0, x)
+    found = duality_bound(net_system, Equilibrium(1.0, x, seen.tension.copy(), force))
     stretched = max(np.linalg.norm(points[1] + x[1]) - length, 0.0)
     above = axial / length * stretched**2 / 2 + weight * x[1, 2] + weight**2 * length / axial / 2
     assert found.gap == pytest.approx(above, rel=1e-13, abs=1e-14)
-    assert abs(out[0][0, 0] - weight) <= found.tension[0]
+    assert abs(seen.tension[0] - weight) <= found.tension[0]
 
 
 # Any start, load, slackness.

@@ -180,7 +180,7 @@ def frequencies(web, cable, consistent):
     K = net_system.pattern.matrix(net_system.stiffness(0.0, x)).toarray()
     M = np.diag(np.repeat(net.mass, 3)[net_system.free])
     if consistent:
-        spread = net_system.assemble_lines(np.kron(net.spread, np.eye(3)))
+        spread = net_system.assemble_lines(np.kron(net.consistent_minus_lumped, np.eye(3)))
         M += net_system.pattern.matrix(spread).toarray()
     return np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True))
 
@@ -578,7 +578,7 @@ def touching(position, radius, order, subdivide, stiffness=STIFFNESS):
     cable = finer(skew_cable("tension-only"), order, subdivide)
     web, contact = skew_web(), refweb.Contact(stiffness=stiffness)
     net_system = nets.system(web, cable, [ball, contact], supported=held_ends(web, cable))
-    return net_system, next(f for f in net_system.families if f.name == "contact")
+    return net_system, next(f for f in net_system.families if f.contact)
 
 
 def segment_distance(a, b, c):

@@ -177,7 +177,7 @@ def steps_of(scene, system):
 def c_run(loop, system, counts, sizes):
     """CPU time of the C loop over the same steps, its last displacement and its peaks."""
     net = system.net
-    contact = next((f for f in system.families if f.name == "contact"), None)
+    contact = next((f for f in system.families if f.contact), None)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     f, out, peaks = np.zeros_like(x), np.zeros((len(net.cells), 2)), np.zeros(3)
     inverse = np.where(system.supported, 0.0, 1.0 / net.mass[:, None])

@@ -95,7 +95,7 @@ class CentralDifference(Integrator):
                 f"elements; use subdivide = {net.order * net.subdivide}, which has the "
                 'same nodes, or method = "cvode"'
             )
-        if net.spread is not None:
+        if net.consistent_minus_lumped is not None:
             raise InputError(
                 f'[solve] mass = "consistent" must be "lumped" with {self.method}: an explicit step divides each '
                 'force by one mass, and a matrix would have to be solved; use method = "cvode"'
@@ -108,11 +108,9 @@ class CentralDifference(Integrator):
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
         families, drives = system.families, system.drives
-        self._outs = system.outs()
-        numbers = [f.data for f in families]
-        if system.line_drives:  # lengths change in a copy of this run's own
-            lines = net.line_data.copy()
-            numbers = [lines if data is net.line_data else data for data in numbers]
+        self._outs = system.per_cell()
+        self._lines = net.line_data.copy() if system.line_drives else net.line_data  # lengths change in this run's own
+        numbers = [self._lines if f.lines else f.data for f in families]
         inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
         reeled = np.unique(np.concatenate([[], *(d.cells[:, 0] for d in system.line_drives)])).astype(np.int64)
         driven = np.concatenate([[], *(d.cells[:, 0] for d in drives)]).astype(np.int64)
@@ -145,14 +143,14 @@ class CentralDifference(Integrator):
             typed_list(INDICES, [d.cells for d in drives]),
             typed_list(MATRIX, [d.data for d in drives]),
             typed_list(MATRIX, [np.zeros((len(d.cells), 0)) for d in drives]),
-            system.length[reeled],
+            net.natural_length[reeled],
             reeled,
             net.line_data[reeled],
             typed_list(LINES, [d.kernel for d in system.line_drives]),
             typed_list(INDICES, [np.searchsorted(reeled, d.cells).astype(np.int32) for d in system.line_drives]),
             typed_list(MATRIX, [d.data for d in system.line_drives]),
             net.cells[reeled],
-            typed_list(ENERGY, [system.by_length] if system.line_drives else []),
+            typed_list(ENERGY, [system.length_force_kernel] if system.line_drives else []),
         )
         corners = {t for d in system.line_drives for t in d.times}
         self._corners = np.array([*sorted(corners), *([np.inf] if system.line_drives else []), -np.inf])
@@ -182,7 +180,7 @@ class CentralDifference(Integrator):
 
     def _set_lengths(self, t):
         if self.system.line_drives:
-            set_lengths(t, *self._drives[4:10], self._data[0])
+            set_lengths(t, *self._drives[4:10], self._lines)
 
     def spent(self, course):
         """What a course has spent, for ``run.json``.
@@ -208,7 +206,7 @@ class CentralDifference(Integrator):
         values, where = np.zeros(len(signs)), np.full((len(signs), 2), PLACE)
         for i, probe in enumerate(probes):
             rows, data = np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float)
-            values[i] = probe.kernel(0.0, x, v, force, self._outs[0], rows, data, where[i])
+            values[i] = probe.kernel(0.0, x, v, force, self._outs.lines, rows, data, where[i])
         total, book = np.zeros(len(system.families) + 3), np.zeros(len(system.families) + 1)
         numbers = (self._masses[0], self._cells, self._data, *self._energies, book, self._working)
         book_energies(0.0, x, v, *numbers, total)

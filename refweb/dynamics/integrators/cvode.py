@@ -57,7 +57,7 @@ class Cvode(Sundials):
         self.family = family
         self.max_order = self.order = max_order or {"bdf": 2, "adams": 12}[family]
         self._choose(linear_solver, "block")
-        self._consistent = system.net.spread is not None
+        self._consistent = system.net.consistent_minus_lumped is not None
         if self._consistent and self.linear_solver == "sparse":
             raise InputError(
                 '[solve] linear_solver = "sparse" must be "block" or "dense" with mass = "consistent": the inverse of '
@@ -69,7 +69,7 @@ class Cvode(Sundials):
             self.choice += f"; none where a step is short, γω ≤ {SHORT:g}"
         self._gamma, self._plain, self._set_up_at, self._due = None, False, None, 0
         if self._consistent:
-            self._mass_values = system.mass()
+            self._mass_values = system.mass.values
             self._mass_matrix = system.pattern.matrix(self._mass_values)
             self._mass_factor = Symmetric(system.pattern)
             self._mass_factor.update(self._mass_values)

@@ -65,7 +65,7 @@ class Ida(Sundials):
         self.max_order = self.order = max_order
         mass = np.repeat(system.net.mass, 3)[system.free]
         self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
-        self._M = system.pattern.matrix(system.mass())
+        self._M = system.pattern.matrix(system.mass.values)
         self._massless = self._links = None
         if len(self._bare):
             from .massless_nodes import Massless
@@ -242,7 +242,7 @@ class Ida(Sundials):
         if self._links:
             slope, multipliers = self._links.start(*rows, force)
         elif len(heavy):
-            slope = self.system.moved_by(force).ravel()[self.system.free[heavy]]
+            slope = self.system.mass.moved_by(force).ravel()[self.system.free[heavy]]
         return np.concatenate([x, v[heavy], multipliers, rest]), np.concatenate([v, slope, rest, rest])
 
     # A solver's steps
@@ -263,7 +263,7 @@ class Ida(Sundials):
         if self._links:
             self._drift[:] = np.maximum(self._drift, self._links.drift(x, v))
         if self._massless:
-            tension = self.system.forces(t, x, v)[1][0][self._massless.around, 0]
+            tension = self.system.forces(t, x, v).per_cell.tension[self._massless.around]
             if self._adrift[1] or not tension.min() > 0.0:
                 self._tangent(t, y, yp)
             self._refuse_adrift()

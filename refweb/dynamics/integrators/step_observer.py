@@ -106,9 +106,10 @@ class StepObserver(Integrator):
         ]
         self._events = event_rows(events)
         self._weights = np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(families) + 3)
+        self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._book = (
             typed_list(INDICES, [f.cells for f in families]),
-            typed_list(MATRIX, [f.data for f in families]),
+            typed_list(MATRIX, [self._lines if f.lines else f.data for f in families]),
             typed_list(ENERGY, [f.energy or no_energy for f in families]),
             typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
         )
@@ -183,7 +184,7 @@ class StepObserver(Integrator):
         force, out = self.system.balance(0.0, x, v)
         where = np.full(2, PLACE)
         for i, (probe, rows, data) in enumerate(self._arrays):
-            extremes.values[i] = probe(0.0, x, v, force, out[0], rows, data, where)
+            extremes.values[i] = probe(0.0, x, v, force, out.lines, rows, data, where)
             extremes.places[i] = where[0]
         total = self._energies(run)
         extremes.values[count:] = self._weights @ total
@@ -314,7 +315,7 @@ class StepObserver(Integrator):
         run.work, run.impulse = self._booked(run, rates, end, end)
         run.rates = rates[3]
         run.time, run.x, run.v = end, *samples[1][1:3]
-        if rates[4] and self.system.net.spread is not None:  # what is free jumps as well
+        if rates[4] and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(run)
 
     def _piece(self, run, samples):
@@ -329,7 +330,7 @@ class StepObserver(Integrator):
             before, step = v.copy(), np.zeros_like(v)
             before[driven] = samples[0][2][driven]
             step[driven] = v[driven] - before[driven]
-            after = before + system.kick(step)
+            after = before + system.mass.kick(step)
             after[driven] = v[driven]
             self.hold(x, after)
             last, samples[1] = self._sample_of(t, x, before), self._sample_of(t, x, after)
@@ -370,7 +371,7 @@ class StepObserver(Integrator):
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return t, x, v, force, out[0].copy(), power
+        return t, x, v, force, out.lines.copy(), power
 
     def _refuse_endless(self, t, force):
         if not np.isfinite(force).all():
@@ -427,23 +428,26 @@ class StepObserver(Integrator):
 
     def _rates(self, t, x, v, force, lines, power):
         """Powers [W], force of the supports [N], natural lengths [m] and what pulls on them [N]."""
-        lengths = self.system.lengths(t, x) if self.system.line_drives else (np.zeros(0), np.zeros(0))
+        system, lengths = self.system, (np.zeros(0), np.zeros(0))
+        if system.line_drives:
+            lengths = system.natural_length(t), system.length_force(t, x)
         reaction = np.bincount(self._fixed % 3, force.ravel()[self._fixed], 3)
         return power, -reaction, *lengths
 
     def _kinetic(self, v):
         """Kinetic energy [J]."""
-        return 0.5 * (v * self.system.momentum(v)).sum()
+        return 0.5 * (v * self.system.mass.momentum(v)).sum()
 
     def _momentum(self, v):
         """Momentum of what is free [N s], shape (3,)."""
-        moving = self.system.momentum(np.where(self._held, 0.0, v))
+        moving = self.system.mass.momentum(np.where(self._held, 0.0, v))
         return moving[: self.system.rows - self.system.net.spins].sum(axis=0)
 
     def _energies(self, run):
         """Energy of each family, kinetic energy, work [J] and step size [s]."""
         system, total = self.system, np.zeros(len(self.system.families) + 3)
-        system.prepare(run.time)
+        if system.line_drives:
+            self._lines[:] = system.line_data(run.time)
         numbers = (system.net.mass, *self._book, run.work, self._working)
         book_energies(run.time, run.x, run.v, *numbers, total)
         total[-3] = self._kinetic(run.v)
@@ -454,7 +458,7 @@ class StepObserver(Integrator):
         where = np.zeros(2, dtype=np.int64)
         force, out = self.system.balance(run.time, run.x, run.v)
         total = self._energies(run)
-        values = [p(run.time, run.x, run.v, force, out[0], r, d, where) for p, r, d in self._arrays]
+        values = [p(run.time, run.x, run.v, force, out.lines, r, d, where) for p, r, d in self._arrays]
         row[:] = [run.time, *values, *total, *self._momentum(run.v), *run.impulse]
         own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
         run.largest = max(run.largest, np.abs(own).sum())
@@ -506,9 +510,7 @@ def scales(system):
     A strain of 1e-3 in the shortest element, and the velocity at which its ends take that up: 1e-3 of the speed of
     sound in the fastest element.
     """
-    net = system.net
-    system.prepare(0.0)
-    length = net.natural_length
+    net, length = system.net, system.natural_length(0.0)
     mass = np.maximum(np.bincount(net.cells.ravel(), minlength=system.rows), 1)
     light = np.where(net.mass > 0.0, net.mass, np.inf) / mass
     least = light[net.cells].min(axis=1)

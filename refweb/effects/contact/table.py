@@ -251,6 +251,7 @@ class Contact(Table):
         cells, data = self._numbers(net, bodies)
         return Family(
             name="contact",
+            contact=True,
             cells=cells,
             data=np.ascontiguousarray(data[:, : AWAY + 3 * element[1]]) if plain else data,
             force=force,
@@ -269,6 +270,7 @@ class Contact(Table):
         cells, data = self._numbers(net, bodies, spins)
         return Family(
             name="contact",
+            contact=True,
             cells=cells,
             data=data,
             force=force,

@@ -68,7 +68,7 @@ class Observable:
         value, changes = self.of(state).value, []
         for deviation in equilibrium.deviations:
             size = np.abs(deviation).max()
-            share = 1e-7 * state.system.net.natural_length.min() / size if size > 0.0 else 0.0
+            share = 1e-7 * state.system.natural_length(state.time).min() / size if size > 0.0 else 0.0
             there = type(state)(state.system, state.time, state.x + share * deviation)
             changes.append(abs(self.of(there).value - value) / share if share > 0.0 else 0.0)
         return float(changes[0] + 3.0 * max(changes[1:]) + 2.0 * np.finfo(float).eps * abs(value))

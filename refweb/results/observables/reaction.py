@@ -49,7 +49,7 @@ def push_on(system, rows):
 def besides_contact(system, rows):
     """What bodies feel besides contact: g [N], and B and C where a frame turns; shape (rows, 3 or 21)."""
     parts, still = [system.outer_force(0.0)[rows]], np.zeros((system.rows, 3))
-    if system.turns:
+    if system.rotating:
         moved = ([(still + unit, still) for unit in np.eye(3)], [(still, still + unit) for unit in np.eye(3)])
         for states in moved:
             slopes = [system.outer_force(0.0, x, v)[rows] - parts[0] for x, v in states]

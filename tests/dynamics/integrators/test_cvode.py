@@ -64,7 +64,7 @@ PUSH = refweb.Load(node="centre", force=(0.0, 2.0, 30.0), factor=[(0.0, 0.0), (0
 def exact(system, v, end):
     """Unknown displacements and velocities at a time; between corners of tables, so that it never passes one."""
     free, n = system.free, len(system.free)
-    mass = splu(system.pattern.matrix(system.mass()))
+    mass = splu(system.pattern.matrix(system.mass.values))
 
     def rate(t, y):
         x, w = np.zeros((system.rows, 3)), np.zeros((system.rows, 3))
@@ -214,7 +214,7 @@ def at_a_state(system, linear_solver, t=0.0):
     rng, n = np.random.default_rng(1), len(system.free)
     y = np.concatenate([1e-3 * rng.standard_normal(n), rng.standard_normal(n)])
     x, v = solver.state(t, y[:n], y[n:])
-    K, mass = system.pattern.matrix(system.stiffness(t, x, v)), system.pattern.matrix(system.mass()).toarray()
+    K, mass = system.pattern.matrix(system.stiffness(t, x, v)), system.pattern.matrix(system.mass.values).toarray()
     C = system.damping(t, x, v)
     C = np.zeros((n, n)) if C is None else system.pattern.matrix(C).toarray()
     below = np.linalg.solve(mass, np.hstack([-K.toarray(), -C]))
@@ -456,7 +456,7 @@ def test_reactions_change_the_momentum_of_the_whole_web(mass):
         )
     )
     system, times = solution.state.system, solution.history["time"]
-    momentum = np.array([system.momentum(state.v).sum(axis=0)[2] for _, state in solution.frames])
+    momentum = np.array([system.mass.momentum(state.v).sum(axis=0)[2] for _, state in solution.frames])
     force = solution.history["r"]
     # Central differences of rows err by Δt²/6 of a third derivative, (3e3/s · 1e-5 s)²/6 = 2e-4.
     np.testing.assert_allclose(np.gradient(momentum, times)[1:-1], force[1:-1], atol=1e-3 * np.abs(force).max())

@@ -1,0 +1,28 @@
+"""Parts of a net that nothing holds along an axis, and that forces along it would carry off."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Part(NamedTuple):
+    """A connected part and an axis, 0 … 2, along which no row of it is supported."""
+
+    rows: np.ndarray
+    axis: int
+
+
+def found(system):
+    """Every `Part` of a system."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    cells = [f.cells for f in system.families if f.cells.shape[1] > 1]
+    pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
+    count, part = connected_components(graph, directed=False)
+    held = np.zeros((count, 3), dtype=bool)
+    np.logical_or.at(held, part, system.supported)
+    return [Part(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
