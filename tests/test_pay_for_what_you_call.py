@@ -33,14 +33,15 @@ EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable
 """What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
 TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium", "system.unsupported_parts"}
+LOAD_STEPS = {"statics.simulation", "statics.remarks"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
 DYNAMICS = {"dynamics", "dynamics.simulation", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
 EXPLICIT = {f"dynamics.integrators.{name}" for name in ("central_difference", "explicit_loop", "step_bound")}
 SUNDIALS = TANGENT | {"system.mass", "dynamics.integrators.step_observer", "dynamics.integrators.sundials"}
 METHOD = {
-    "newton": NEWTON | {"statics.simulation"},
-    "relaxation": STATICS | {"statics.simulation", "statics.dynamic_relaxation"},
+    "newton": NEWTON | LOAD_STEPS,
+    "relaxation": STATICS | LOAD_STEPS | {"statics.dynamic_relaxation"},
     "central-difference": DYNAMICS | EXPLICIT,
     "cvode": DYNAMICS | SUNDIALS | {"dynamics.integrators.cvode"},
     "ida": DYNAMICS | SUNDIALS | {"dynamics.integrators.ida"},

@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import SolverError
-from ..net.tension_laws import LINEAR, SMOOTH
+from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.solution import SOLVER, Result
-from ..results.state import State, floor_remark, strength_remark
+from ..results.state import State
+from .remarks import Remarks, remarks_on
 
 
 class Simulation:
@@ -36,7 +37,7 @@ class Simulation:
 
     def __init__(self, scene, system, solution):
         self.scene, self.system, self.solution = scene, system, solution
-        self.rows, self._made = [], {}
+        self.rows, self._remarks = [], Remarks()
         self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
@@ -64,10 +65,8 @@ class Simulation:
                 self._frame(folder)
 
     def remarks(self):
-        """Each kind of remark once, as it was last made, with its load steps unless it was made at all of them."""
-        for made in self._made.values():
-            steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
-            yield made[-1][1] + (f" (load step {steps})" if len(made) < len(self.rows) else "")
+        """What a reader of the results has to know."""
+        return self._remarks.texts()
 
     def _smoothing(self):
         """What finds the error of smoothing, None where there is none to be found."""
@@ -97,8 +96,7 @@ class Simulation:
         solution.state = state
         if (used := state.utilisation) is not None:
             solution.utilisation = float(used.max()), int(used.argmax())
-        for kind, text in _remarks(state, stats, solution.utilisation):
-            self._made.setdefault(kind, []).append((found.step, text))
+        self._remarks.note(found.step, remarks_on(state, stats, solution.utilisation))
         return row
 
     def _results(self, found, state, smoothing):
@@ -118,22 +116,3 @@ class Simulation:
         self.solution.frames.append((len(self.rows) - 1, self.solution.state))
         if folder is not None:
             folder.frame(*self.solution.frames[-1])
-
-
-def _remarks(state, stats, utilisation):
-    """What a reader of a state has to know: pairs of a kind and a text."""
-    net = state.system.net
-    for text in floor_remark(net, float(state.stress.max())):
-        yield "floor", text
-    if stats["smallest_pivot"] == -1:
-        law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
-        reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
-        reason += 'law = "tension-only" has no such states'
-        if state.system.rotating:
-            reason = "the web would leave this state by itself; start from a web that is deflected"
-        yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
-    if stats["slack_nodes"]:
-        some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
-        yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
-    for text in strength_remark(utilisation):
-        yield "strength", text

@@ -7,20 +7,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..dynamics import initial_state as starts
 from ..errors import InputError, SolverError, in_file
-from ..net.net import SMOOTHING
-from ..net.tension_laws import LINEAR
 from ..registry import STATICS, load
 from ..results.folder import Folder, check_folder
 from ..results.provenance import versions, web_of
 from ..results.solution import SOLVER, Result, Solution, as_history
-from ..results.state import State, floor_remark
+from ..results.state import State
 from ..scene import Scene
+from ..statics.remarks import Remarks
 from ..tables import integer
-from .spectrum import STRAIN, spectrum
+from .mode_remarks import left_out, remarks_on
+from .spectrum import spectrum
 
-MOST = 1000
+MAX_MODES = 1000
 """Largest number of modes."""
 COLUMNS = ["step [1]", "mode [1]", "frequency [Hz]", "error [Hz]", "omega_squared [1/s²]", "residual [1]"]
 COLUMNS += ["modal_mass [kg]", "share_x [1]", "share_y [1]", "share_z [1]", "moving [1]", "node [1]"]
@@ -121,7 +120,7 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
         marked "failed".
     """
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
-    number = integer(at_least=1, at_most=MOST).metadata["read"]("number", number)
+    number = integer(at_least=1, at_most=MAX_MODES).metadata["read"]("number", number)
     if out is not None:
         check_folder(out, force)
     started = time.process_time(), time.perf_counter()
@@ -148,7 +147,7 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
         found.table = as_history(COLUMNS, [row for here in found.spectra for row in _rows(here)])
         spent = time.process_time() - started[0], time.perf_counter() - started[1]
         found.cost = {"cpu_s": spent[0], "wall_s": spent[1], "by_effect": {}}
-        found.warnings += _notices(system)
+        found.warnings += left_out(system)
         if out is not None:
             found.save(out, force)
     return found
@@ -167,19 +166,13 @@ def _at_rest(system):
     return rest
 
 
-def _equilibria(scene, rest, tell):
-    if scene.solve.kind == "dynamic":
-        yield starts.equilibrium(rest, tell)
-    else:
-        yield from load(STATICS[scene.solve.method])(rest, scene.solve.load_steps, tell)
-
-
 def _follow(found, rest, number, tell):
     """Equilibrium and modes of one load step after the other."""
-    scene, remarks, totals = found.scene, {}, dict(nsteps=0, nfev=0, njev=0, nlu=0)
-    steps = scene.solve.load_steps if scene.solve.kind == "static" else (0.0,)
-    method = scene.solve.method if scene.solve.kind == "static" else "newton"
-    for equilibrium in _equilibria(scene, rest, lambda text: tell(text, len(found.spectra) / len(steps))):
+    scene, remarks, totals = found.scene, Remarks(), dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    static = scene.solve.kind == "static"
+    method, steps = (scene.solve.method, scene.solve.load_steps) if static else ("newton", (0.0,))
+    solve = load(STATICS[method])
+    for equilibrium in solve(rest, steps, lambda text: tell(text, len(found.spectra) / len(steps))):
         tell(f"step {equilibrium.step:g}, modes", len(found.spectra) / len(steps))
         here = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
         found.state = State(rest, equilibrium.step, equilibrium.x)
@@ -195,9 +188,8 @@ def _follow(found, rest, number, tell):
         totals = {key: totals[key] + stats[key] for key in totals}
         found.solver = {**stats, **totals}
         found.steps.append({"step": here.step, "results": _results(here), "solver": stats, **_described(here)})
-        for kind, text in _remarks(here, found.state):
-            remarks.setdefault(kind, []).append((here.step, text))
-        found.warnings = [_at(made, len(found.spectra)) for made in remarks.values()]
+        remarks.note(here.step, remarks_on(here, found.state))
+        found.warnings = list(remarks.texts())
 
 
 def _results(here):
@@ -217,39 +209,3 @@ def _rows(here):
     count = np.arange(1, len(here.squared) + 1)
     columns = [np.full(len(count), here.step), count, here.frequency, here.error, here.squared, here.residual]
     return np.column_stack([*columns, here.modal_mass, here.shares, here.moving, here.nodes]).tolist()
-
-
-def _at(made, count):
-    """The last of some remarks of a kind, (load step, text), with its load steps unless it was made at all of them."""
-    steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
-    return made[-1][1] + (f" (load step {steps})" if len(made) < count else "")
-
-
-def _remarks(here, state):
-    """What a reader of the modes of an equilibrium has to know: pairs of a kind and a text."""
-    net = state.system.net
-    if here.unstable:
-        yield (
-            "unstable",
-            f"{here.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium is a "
-            "saddle and the web leaves it by itself",
-        )
-    if here.zero:
-        yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
-    if count := len(state.slack_nodes):
-        yield "slack", f"{count} nodes hang on slack lines only, their positions are not unique"
-    kinked = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
-    if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
-        yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
-    for text in floor_remark(net, float(state.stress.max())):
-        yield "floor", text
-
-
-def _notices(system):
-    """What the modes leave out."""
-    if system.rotating:
-        yield "Coriolis forces are left out: ± holds how far they may move the frequency of a mode that they act on"
-    if any(family.damping is not None and family not in system.rotating for family in system.families):
-        yield "forces that depend on velocity, such as damping, are left out"
-    if free := [body.name for body in system.net.bodies if not body.fixed]:
-        yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

@@ -15,7 +15,8 @@ from commands.test_cli import SCENE, files, refused
 
 import refweb
 from refweb.__main__ import main
-from refweb.studies import spectrum
+from refweb.studies import pencil
+from refweb.studies.spectrum import spectrum
 from refweb.system.system import System
 
 CLOSED = 1e-15
@@ -80,7 +81,7 @@ def test_square_lattice_has_all_its_frequencies(cells):
 def test_square_lattice_misses_none_of_its_double_frequencies():
     """The lowest twelve of 675, p ≠ q all double, by Lanczos iteration."""
     found, x, z = lattice(16, 12)
-    assert 3 * x.size > spectrum.DENSE
+    assert 3 * x.size > pencil.DENSE
     assert_within(found, hertz(z)[:12])
     assert found.spectra[0].unstable == found.spectra[0].zero == 0
     again = lattice(16, 12)[0]
@@ -353,14 +354,14 @@ def test_line_at_the_kink_is_told():
 
 def test_modes_that_are_not_found_are_missed(monkeypatch):
     """The count of eigenvalues notices pairs that the iteration passes over."""
-    whole = spectrum.eigsh
+    whole = pencil.eigsh
 
     def careless(matrix, size, *more, **options):
         squared, vectors = whole(matrix, size + 1, *more, **options)
         keep = np.argsort(squared)[np.arange(size + 1) != 1]
         return squared[keep], vectors[:, keep]
 
-    monkeypatch.setattr(spectrum, "eigsh", careless)
+    monkeypatch.setattr(pencil, "eigsh", careless)
     with pytest.raises(refweb.SolverError, match="stay unfound"):
         lattice(16, 6)
 
@@ -384,7 +385,7 @@ def test_error_of_the_equilibrium_is_in_the_error(size):
     off = exact.state.x.copy()
     free = exact.state.system.free
     off.ravel()[free] += size * np.random.default_rng(5).uniform(-1.0, 1.0, len(free))
-    here = spectrum.spectrum(exact.state.system, 1.0, off, 6)
+    here = spectrum(exact.state.system, 1.0, off, 6)
     change = abs(here.frequency - exact.frequency)
     assert (change <= 1.01 * here.error + exact.error).all()
     assert change.max() > 100.0 * exact.error.max() and change.max() > 0.5 * here.error.max()

@@ -1,0 +1,44 @@
+"""What a reader of load steps has to know: each kind of remark once, with the load steps that it is made at."""
+
+from __future__ import annotations
+
+from ..net.tension_laws import LINEAR
+from ..results.state import floor_remark, strength_remark
+
+
+class Remarks:
+    """Remarks of load steps, by kind."""
+
+    def __init__(self):
+        self._made, self._steps = {}, 0
+
+    def note(self, step, remarks):
+        """Take the remarks of a load step, pairs of a kind and a text."""
+        self._steps += 1
+        for kind, text in remarks:
+            self._made.setdefault(kind, []).append((step, text))
+
+    def texts(self):
+        """Each kind as it was last made, with its load steps unless it was made at all of them."""
+        for made in self._made.values():
+            steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
+            yield made[-1][1] + (f" (load step {steps})" if len(made) < self._steps else "")
+
+
+def remarks_on(state, stats, utilisation):
+    """Of an equilibrium: pairs of a kind and a text."""
+    net = state.system.net
+    for text in floor_remark(net, float(state.stress.max())):
+        yield "floor", text
+    if stats["smallest_pivot"] == -1:
+        law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
+        reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
+        reason += 'law = "tension-only" has no such states'
+        if state.system.rotating:
+            reason = "the web would leave this state by itself; start from a web that is deflected"
+        yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
+    if stats["slack_nodes"]:
+        some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
+        yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
+    for text in strength_remark(utilisation):
+        yield "strength", text

@@ -1,0 +1,40 @@
+"""What a reader of natural frequencies has to know: of each equilibrium, and what the modes leave out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..net.net import SMOOTHING
+from ..net.tension_laws import LINEAR
+from ..results.state import floor_remark
+from .pencil import STRAIN
+
+
+def remarks_on(here, state):
+    """What a reader of the modes of an equilibrium has to know: pairs of a kind and a text."""
+    net = state.system.net
+    if here.unstable:
+        yield (
+            "unstable",
+            f"{here.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium is a "
+            "saddle and the web leaves it by itself",
+        )
+    if here.zero:
+        yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
+    if count := len(state.slack_nodes):
+        yield "slack", f"{count} nodes hang on slack lines only, their positions are not unique"
+    kinked = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
+    if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
+        yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
+    for text in floor_remark(net, float(state.stress.max())):
+        yield "floor", text
+
+
+def left_out(system):
+    """What the modes of a system leave out."""
+    if system.rotating:
+        yield "Coriolis forces are left out: ± holds how far they may move the frequency of a mode that they act on"
+    if any(family.damping is not None and family not in system.rotating for family in system.families):
+        yield "forces that depend on velocity, such as damping, are left out"
+    if free := [body.name for body in system.net.bodies if not body.fixed]:
+        yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

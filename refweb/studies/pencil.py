@@ -1,0 +1,169 @@
+"""K and M of a system at a displacement: how many ω² lie below a mark, and the vectors of the next ones, none missed.
+
+Counts of negative pivots (Sylvester's law of inertia) say how many there are. The vectors come from Lanczos iteration
+on (K − σM)⁻¹ with σ just below those wanted, so that a thousand slack nodes cost nothing, and one more count says that
+none is missed, which matters where symmetry makes frequencies double. Nodes without mass have no frequency and follow
+the others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+
+from ..errors import SolverError
+from ..net.net import AXIAL_STIFFNESS
+from ..system.factorization import Factor
+
+STRAIN, ROUNDING = 1e-12, 1e-15
+"""A direction without stiffness: a tension of `STRAIN` EA in all lines, or `ROUNDING` of EA/L at nodes, would rule."""
+DENSE = 200
+"""Unknowns with mass up to which all pairs are found at once."""
+
+
+class Pencil:
+    """K and M at a displacement, in the unknowns of the system.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a symmetric tangent.
+    t : float
+        Load step or time.
+    x : ndarray, shape (rows, 3)
+        Displacement [m].
+    seed : int
+        Of the vector that the iteration starts from.
+
+    Attributes
+    ----------
+    K, M : sparse matrix, shape (unknowns, unknowns)
+        Tangent [N/m] and mass [kg].
+    massive, massless : ndarray of int
+        Unknowns with mass, and those without.
+    strained : sparse matrix, shape (unknowns, unknowns)
+        Stiffness across lines with a tension of EA each [N/m]; `STRAIN` of it counts as none.
+
+    Raises
+    ------
+    SolverError
+        Where nothing has mass, or something has neither mass nor stiffness.
+    """
+
+    def __init__(self, system, t, x, seed):
+        self.system, self.t, self.x, self.seed = system, t, x, seed
+        pattern, net = system.pattern, system.net
+        self._stiffness, self._mass = system.stiffness(t, x), system.mass.values
+        self.K, self.M = pattern.matrix(self._stiffness), pattern.matrix(self._mass)
+        self._factor, self._inner = Factor(pattern), None
+        own = self.M.diagonal()
+        self.massive, self.massless = np.flatnonzero(own > 0.0), np.flatnonzero(own == 0.0)
+        if not len(self.massive):
+            raise SolverError("no mode: no free node has mass; give the cable a density, or nodes a [[point_mass]]")
+        unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
+        axial = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
+        strained = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
+        self.strained = pattern.matrix(strained)
+        taut = strained[pattern.diagonal]
+        taut = np.where(taut > 0.0, taut, axial.max())
+        self._ridge = STRAIN * strained
+        self._ridge[pattern.diagonal] += ROUNDING * taut
+        sums = abs(self.K).sum(axis=0) + taut
+        self._top = 10.0 * (sums[self.massive] / own[self.massive]).max()  # above every ω², of consistent mass as well
+        if len(self.massless):
+            self._hold_massless(1e17 * sums.max() / own[self.massive].min(), taut)
+
+    def _hold_massless(self, large, taut):
+        """Refuse unknowns that have neither mass nor stiffness; factorize the stiffness of those without mass."""
+        if self.below(-large, -1.0):
+            bare = self.massless[np.argmin(self.K.diagonal()[self.massless] / taut[self.massless])]
+            raise SolverError(
+                f"no modes at step {self.t:g}: of {len(self.massless)} unknowns without mass some have no stiffness "
+                f"either, such as those of {self.system.row_name(self.system.free[bare] // 3)}: give the cable a "
+                "density, or stretch it"
+            )
+        self._inner = splu(self.K[self.massless][:, self.massless])
+
+    def below(self, shift, ridge=0.0):
+        """Number of eigenvalues below a shift; K has ``ridge`` times what no stiffness means added."""
+        self._factor.update(self._stiffness - shift * self._mass + ridge * self._ridge)
+        return self._factor.negative_pivots()
+
+    def beside(self, low, sign):
+        """A shift of a sign with at most ``low`` eigenvalues below it; the next one is within 1.5 times the shift."""
+        near, far = 1e-24 * self._top, self._top
+        while far > 1.5 * near:
+            middle = np.sqrt(near * far)
+            if (self.below(sign * middle) <= low) == (sign > 0.0):
+                near = middle
+            else:
+                far = middle
+        return near if sign > 0.0 else -far
+
+    def above(self, shift, wanted):
+        """Vectors of the next eigenvalues above a shift, shape (unknowns, wanted)."""
+        low = self.below(shift)
+        most = len(self.massive) - low
+        for attempt in range(4):
+            squared, vectors = self._nearest(shift, min(wanted + 20 * attempt, most), attempt)
+            mark = squared[wanted - 1] - 1e-7 * abs(squared[wanted - 1] - shift)
+            if self.below(mark) == low + np.count_nonzero(squared < mark):
+                return vectors[:, :wanted]
+        raise SolverError(f"no modes at step {self.t:g}: below ω² = {mark:.4g} 1/s² some of them stay unfound")
+
+    def _nearest(self, shift, size, attempt):
+        """Eigenvalues next above a shift, as far as they are found, and their vectors."""
+        self._shift, self._solve, unknowns = shift, self._solver(shift), len(self.massive)
+        mass = self.M[self.massive][:, self.massive]
+        if unknowns <= DENSE or 3 * size >= unknowns:
+            flexible, mass = np.column_stack([self._flexible(e) for e in np.eye(unknowns)]), mass.toarray()
+            product = mass @ flexible @ mass
+            inverse, parts = scipy.linalg.eigh(product + product.T, 2.0 * mass)
+            squared, parts = shift + 1.0 / inverse[: -size - 1 : -1], parts[:, : -size - 1 : -1]
+        else:
+            start = np.random.default_rng(self.seed + attempt).standard_normal(unknowns)
+            operator = LinearOperator(mass.shape, matvec=self._flexible, dtype=float)
+            try:
+                squared, parts = eigsh(mass, size, mass, shift, which="LA", v0=start, OPinv=operator)
+            except ArpackError as error:
+                raise SolverError(f"no modes at step {self.t:g}: {error}") from None
+            order = np.argsort(squared)
+            squared, parts = squared[order], parts[:, order]
+        vectors = np.zeros((self.system.pattern.size, size))
+        vectors[self.massive] = parts
+        if self._inner is not None:
+            vectors[self.massless] = -self._inner.solve((self.K @ vectors)[self.massless])
+        return squared, vectors
+
+    def _solver(self, shift):
+        """Solution of (K − shift M) y = b as a function of b."""
+        if self.below(shift):
+            return splu(self.system.pattern.matrix(self._stiffness - shift * self._mass)).solve
+        return self._factor.solve
+
+    def _flexible(self, force):
+        """Displacement of the unknowns with mass under forces on them."""
+        whole = np.zeros(self.system.pattern.size)
+        whole[self.massive] = force.ravel()
+        y = self._solve(whole)
+        if y is None:
+            raise SolverError(f"no modes at step {self.t:g}: the stiffness is singular to rounding")
+        return y[self.massive]
+
+    def moved(self, force):
+        """Displacement of the unknowns under a force, K less the last shift M."""
+        return self._solver(self._shift)(force)
+
+    def change(self, x):
+        """K at another displacement less K, a sparse matrix."""
+        return self.system.pattern.matrix(self.system.stiffness(self.t, x) - self._stiffness)
+
+    def residual(self, squared, vectors):
+        """Norm of K φ − ω² M φ in M⁻¹ of each vector, those without mass following the others."""
+        rest = self.K @ vectors - squared * (self.M @ vectors)
+        ours = rest[self.massive]
+        if self._inner is not None:
+            ours = ours - self.K[self.massive][:, self.massless] @ self._inner.solve(rest[self.massless])
+        inverse = splu(self.M[self.massive][:, self.massive]).solve(ours)
+        return np.sqrt(np.maximum((ours * inverse).sum(axis=0), 0.0))
