@@ -14,11 +14,36 @@ long, under a centre load or their weight, take 12 to 20 factorizations; Newton 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..effects.elasticity import strains
 from ..net.net import AXIAL_STIFFNESS, LENGTH
 from ..system.factorization import Factor
+
+
+class Point(NamedTuple):
+    """What the lines are at a displacement, and how far from an equilibrium.
+
+    ``length`` [m] and unit ``direction`` of each line, ``mismatch`` ε(x) − g + w, ``force`` on every row [N], and the
+    ``product`` g w.
+    """
+
+    length: np.ndarray
+    direction: np.ndarray
+    mismatch: np.ndarray
+    force: np.ndarray
+    product: np.ndarray
+
+
+class Step(NamedTuple):
+    """Changes of displacement [m], of g (``taut``) and of w (``slack``), and the largest move of a line over it."""
+
+    move: np.ndarray
+    taut: np.ndarray
+    slack: np.ndarray
+    turn: float
 
 
 class InteriorPoint:
@@ -88,61 +113,66 @@ class InteriorPoint:
 
         ``most`` bounds the iterations of this call; where they run out the last displacement is returned.
         """
-        system, bars, free = self.system, self.bars, self.system.free
         for _ in range(most):
-            line = bars @ (system.net.points + self.x)
-            length = np.maximum(np.linalg.norm(line, axis=1), 1e-3 * self.natural)
-            direction = line / length[:, None]
-            mismatch = self.w - self.g + self._strain()
-            force = self.outer + self._resultant(self.g, direction)
-            product = self.g * self.w
-            mean = product.mean()
-            scale = max(self.load, (self.axial * self.g).max())
-            worst = max(
-                np.abs(force.ravel()[free]).max(initial=0.0) / scale,
-                np.abs(mismatch).max(),
-                product.max() / max(self.g.max() ** 2, np.finfo(float).tiny),
-            )
-            if worst < tolerance:
+            here = self._point()
+            if self._worst(here) < tolerance:
                 break
-
-            def newton(target):
-                fixed = (target - product + self.g * mismatch) / (self.g + self.w)  # noqa: B023
-                rhs = force + self._resultant(fixed, direction)  # noqa: B023
-                y = self.factor.solve(rhs.ravel()[free])
-                if y is None:
-                    return None
-                p = np.zeros((system.rows, 3))
-                p.ravel()[free] = y
-                turn = bars @ p
-                stretch = np.einsum("ci,ci->c", direction, turn) / self.natural  # noqa: B023
-                dg = fixed + self.g / (self.g + self.w) * stretch
-                return p, dg, dg - stretch - mismatch, (np.linalg.norm(turn, axis=1) / self.natural).max()  # noqa: B023
-
-            for _ in self._factorize(direction, length):
-                step = newton(0.0)
-                if step is not None:
-                    break
-            else:
+            step = self._predictor(here)
+            if step is None:
                 break
-            a = self._length(step, 1.0)
-            _, dg, dw, _ = step
-            ahead = ((self.g + a * dg) * (self.w + a * dw)).mean()
+            a, mean = self._length(step, 1.0), here.product.mean()
+            ahead = ((self.g + a * step.taut) * (self.w + a * step.slack)).mean()
             centring = 10.0 if self._blocked else min(max((ahead / mean) ** 3, 1e-4), 0.8)
-            step = newton(centring * mean - a * a * dg * dw) or step
+            step = self._step(here, centring * mean - a * a * step.taut * step.slack) or step
             a = self._length(step, 0.95)
             self._blocked = a < 0.2
-            p, dg, dw, _ = step
-            self.x += a * p
-            self.g += a * dg
-            self.w += a * dw
+            self.x += a * step.move
+            self.g += a * step.taut
+            self.w += a * step.slack
         return self.x
+
+    def _point(self):
+        """The `Point` of the last displacement."""
+        line = self.bars @ (self.system.net.points + self.x)
+        length = np.maximum(np.linalg.norm(line, axis=1), 1e-3 * self.natural)
+        direction = line / length[:, None]
+        mismatch = self.w - self.g + self._strain()
+        return Point(length, direction, mismatch, self.outer + self._resultant(self.g, direction), self.g * self.w)
+
+    def _worst(self, here):
+        """Largest of residual, strain mismatch and complementarity [1]."""
+        scale = max(self.load, (self.axial * self.g).max())
+        return max(
+            np.abs(here.force.ravel()[self.system.free]).max(initial=0.0) / scale,
+            np.abs(here.mismatch).max(),
+            here.product.max() / max(self.g.max() ** 2, np.finfo(float).tiny),
+        )
+
+    def _predictor(self, here):
+        """Step towards g w = 0, by the first matrix that gives one; None where none does."""
+        for _ in self._factorize(here.direction, here.length):
+            step = self._step(here, 0.0)
+            if step is not None:
+                return step
+        return None
+
+    def _step(self, here, target):
+        """The `Step` towards g w = ``target``, by the factorization at hand; None where there is none."""
+        fixed = (target - here.product + self.g * here.mismatch) / (self.g + self.w)
+        y = self.factor.solve((here.force + self._resultant(fixed, here.direction)).ravel()[self.system.free])
+        if y is None:
+            return None
+        move = np.zeros((self.system.rows, 3))
+        move.ravel()[self.system.free] = y
+        turn = self.bars @ move
+        stretch = np.einsum("ci,ci->c", here.direction, turn) / self.natural
+        taut = fixed + self.g / (self.g + self.w) * stretch
+        return Step(move, taut, taut - stretch - here.mismatch, (np.linalg.norm(turn, axis=1) / self.natural).max())
 
     def _length(self, step, share):
         """Step length that keeps g and w positive and no line moving by more than its length."""
-        _, dg, dw, turn = step
-        a = min(1.0, 1.0 / turn) if turn > 0.0 else 1.0
-        for value, change in ((self.g, dg), (self.w, dw)):
+        a = min(1.0, 1.0 / step.turn) if step.turn > 0.0 else 1.0
+        for value, change in ((self.g, step.taut), (self.w, step.slack)):
             down = change < 0.0
             if down.any():
                 a = min(a, share * (value[down] / -change[down]).min())
