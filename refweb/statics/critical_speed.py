@@ -22,23 +22,23 @@ from ..errors import SolverError
 from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor
 
-LOOSE = 1e-10
-"""Stiffness that holds each node of a loose part against its translation, over the largest EA/L."""
+ANCHOR = 1e-10
+"""Stiffness that holds each node of an unsupported part against its translation, over the largest EA/L."""
 
 
 def drifting(system):
-    """Number of translations of loose parts that centrifugal forces drive away from the axis."""
+    """Number of translations of unsupported parts that centrifugal forces drive away from the axis."""
     if not system.unsupported_parts:
         return 0
     moves = np.zeros((len(system.free), len(system.unsupported_parts)))
-    for k, places in enumerate(_loose(system)):
+    for k, places in enumerate(_translations(system)):
         moves[places, k] = 1.0
     values = np.linalg.eigvalsh(moves.T @ (system.pattern.matrix(_centrifugal(system)) @ moves))
     return int(np.count_nonzero(values < -1e-12 * np.abs(values).max()))
 
 
-def _loose(system):
-    """Unknowns of each translation of a loose part."""
+def _translations(system):
+    """Unknowns of each translation of an unsupported part."""
     return [np.searchsorted(system.free, 3 * rows + axis) for rows, axis in system.unsupported_parts]
 
 
@@ -54,8 +54,8 @@ def check_speed(system, t):
     unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
     axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
     held = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
-    for places in _loose(system):
-        held[system.pattern.diagonal[places]] += LOOSE * axial.max()
+    for places in _translations(system):
+        held[system.pattern.diagonal[places]] += ANCHOR * axial.max()
 
     def stands(share):
         factor.update(held + share * share * taken)

@@ -18,6 +18,9 @@ may chatter between taut and slack, at rest again after every other step, and ha
 STALLED, TOUCHING = 2_000_000, 500_000
 """Steps in which the residual has to fall by a tenth; the second with contact, where each costs ten times as much."""
 
+LOOK = 2000
+"""Steps between two looks at the residual."""
+
 
 @kernel()
 def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell):
@@ -40,16 +43,6 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell):
             flat_f[q] = 0.0
         for i in range(len(kernels)):
             kernels[i](t, x, v, f, cells[i], data[i], per_cell[i])
-
-
-def _inverse_mass(system, t):
-    """What forces are multiplied by [m/N], shape (rows, 3): 0 where nothing moves."""
-    rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
-    for family in system.at(t).families:
-        if family.bound is not None:
-            family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
-    moving = ~system.supported & (rates > 0.0)[:, None]
-    return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
 
 
 def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANCE):
@@ -78,40 +71,72 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
         Where there is no equilibrium, or none is found.
     """
     system = system.at_rest()
-    kernels, seen = typed_list(FORCE, [f.force for f in system.families]), typed_list(MATRIX, system.per_cell())
-    cells = typed_list(INDICES, [f.cells for f in system.families])
-    x, scale = np.zeros((system.rows, 3)), 0.0
-    stalled = TOUCHING if system.contact else STALLED
+    relaxation, x = Relaxation(system, progress, most, tolerance), np.zeros((system.rows, 3))
     for t in load_steps:
+        state = relaxation.solve(t, x)
+        x = state.x
+        yield state
+
+
+class Relaxation:
+    """Dynamic relaxation of one system; keeps its kernels and the scale of forces between load steps.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a net whose ``quasi_static`` is True.
+    progress, most, tolerance
+        See `solve`.
+    """
+
+    def __init__(self, system, progress=None, most=10_000_000, tolerance=TOLERANCE):
+        self.system, self.progress = system, progress or (lambda text: None)
+        self.most, self.tolerance, self.scale = most, tolerance, 0.0
+        self._stalled = TOUCHING if system.contact else STALLED
+        self._kernels = typed_list(FORCE, [f.force for f in system.families])
+        self._cells = typed_list(INDICES, [f.cells for f in system.families])
+        self._per_cell = typed_list(MATRIX, system.per_cell())
+
+    def solve(self, t, x):
+        """Equilibrium at load step t from the displacement x, see `refweb.statics.newton.Newton.solve`."""
+        system = self.system
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
-        inverse, data = _inverse_mass(system, t), typed_list(MATRIX, [f.data for f in system.at(t).families])
+        inverse, data = self._inverse_mass(t), typed_list(MATRIX, [f.data for f in system.at(t).families])
         v, done, error, best, since = np.zeros_like(x), 0, np.inf, np.inf, 0
         while True:
             f, per_cell = system.forces(t, x)
-            tension = per_cell.tension
-            here = max(scale, force_scale(system, t, x, tension))
-            last, error = error, residual(system, f, here)
-            if error <= tolerance or (error <= LIMIT and done and error > 0.5 * last):
+            scale = max(self.scale, force_scale(system, t, x, per_cell.tension))
+            last, error = error, residual(system, f, scale)
+            if error <= self.tolerance or (error <= LIMIT and done and error > 0.5 * last):
                 break
             if error < 0.9 * best:
                 best, since = error, done
-            if done >= most or done - since >= stalled or not np.isfinite(error):
+            if done >= self.most or done - since >= self._stalled or not np.isfinite(error):
                 raise NotFound(
                     f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
                     f'{LIMIT:g}; use method = "newton"',
                     {"nsteps": done},
                 )
-            relax(2000, t, x, v, f, inverse, kernels, cells, data, seen)
-            done += 2000
-            if progress is not None:
-                progress(f"step {t:g}, residual {error:.0e}")
-        scale = here
+            relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell)
+            done += LOOK
+            self.progress(f"step {t:g}, residual {error:.0e}")
+        self.scale = scale
         stats = dict(nsteps=done, nfev=done, njev=0, nlu=0, residual=float(error))
-        state = Equilibrium(t, x, tension.copy(), f, stats)
+        state = Equilibrium(t, x, per_cell.tension.copy(), f, stats)
         if system.convex:
             from .duality_bound import duality_bound
 
             state.duality_bound = duality_bound(system, state)
-        yield state
+        return state
+
+    def _inverse_mass(self, t):
+        """What forces are multiplied by [m/N], shape (rows, 3): 0 where nothing moves."""
+        system = self.system
+        rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
+        for family in system.at(t).families:
+            if family.bound is not None:
+                family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
+        moving = ~system.supported & (rates > 0.0)[:, None]
+        return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)
