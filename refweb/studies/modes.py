@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import InputError, SolverError, in_file
+from ..errors import InputError, in_file
 from ..registry import STATICS, load
 from ..results.folder import Folder, check_folder
 from ..results.provenance import versions, web_of
+from ..results.run_status import Clock, recorded
 from ..results.solution import SOLVER, Result, Solution, as_history
 from ..results.state import State
 from ..scene import Scene
@@ -123,7 +123,7 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
     number = integer(at_least=1, at_most=MAX_MODES).metadata["read"]("number", number)
     if out is not None:
         check_folder(out, force)
-    started = time.process_time(), time.perf_counter()
+    clock = Clock()
     system = scene.build()
     with in_file(scene.file):
         rest = _at_rest(system)
@@ -132,21 +132,10 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
     found = Modes(scene, web=web_of(system), versions=versions(), columns=COLUMNS)
     tell = progress or (lambda text, share: None)
     try:
-        _follow(found, rest, number, tell)
-        found.status = "solved"
-    except KeyboardInterrupt:
-        found.status, found.message = "interrupted", f"interrupted after {len(found.spectra)} load steps"
-        raise
-    except SolverError as error:
-        found.status, found.message = "failed", str(error)
-        raise
-    except Exception as error:
-        found.status, found.message = "failed", f"{type(error).__name__}: {error}"
-        raise
+        with recorded(found, clock, lambda: f"{len(found.spectra)} load steps"):
+            _follow(found, rest, number, tell)
     finally:
         found.table = as_history(COLUMNS, [row for here in found.spectra for row in _rows(here)])
-        spent = time.process_time() - started[0], time.perf_counter() - started[1]
-        found.cost = {"cpu_s": spent[0], "wall_s": spent[1], "by_effect": {}}
         found.warnings += left_out(system)
         if out is not None:
             found.save(out, force)
