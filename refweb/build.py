@@ -12,7 +12,7 @@ from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
 from .messages import nearest, shown
 from .net import net as lines
-from .registry import EFFECTS, INTEGRATORS, name_of
+from .registry import EFFECTS, INTEGRATORS, load, name_of
 from .settings import START_STATES
 from .system.system import System
 from .tables import Table
@@ -146,11 +146,17 @@ def _check_motions(system):
         raise InputError(f"[[motion]] node = {rows[times > 1][0]} is moved by two tables: merge them")
 
 
+def _takes_links(method):
+    """Whether a method holds lengths exactly; methods of statics do not."""
+    return method in INTEGRATORS and getattr(load(INTEGRATORS[method].integrator), "takes_links", False)
+
+
 def _check_links(solve):
     """Refuse links for what cannot hold them."""
-    if solve.method not in ("ida", "auto"):
+    if solve.method != "auto" and not _takes_links(solve.method):
         here = f'kind = "{solve.kind}" and method = "{solve.method}"'
-        raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = "ida", not {here}')
+        able = " or ".join(f'"{method}"' for method in INTEGRATORS if _takes_links(method))
+        raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = {able}, not {here}')
     if solve.start == "equilibrium":
         raise InputError('[solve] start = "equilibrium" knows no [[link]]: it must be "web" or a result folder')
 

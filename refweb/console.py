@@ -51,7 +51,7 @@ def _box(title, rows):
     _console().print(Panel(grid, title=Text(title), title_align="left", expand=False))
 
 
-def before(scene, system):
+def print_scene(scene, system):
     """Print what is simulated: sizes, cable, effects present, solver."""
     web, cable, solve = web_of(system), scene.cable, scene.solve
     law = cable.law
@@ -87,7 +87,7 @@ def before(scene, system):
     )
 
 
-def _results(steps):
+def _results_of_steps(steps):
     names = list(steps[-1]["results"])
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
     if len(steps) > 1:
@@ -103,7 +103,7 @@ def _results(steps):
     return grid
 
 
-def _reduced(results):
+def _results_over_time(results):
     grid = Grid.grid(padding=(0, 2))
     for name, result in results.items():
         where = "" if result["where"] is None else f"at {result['where']}"
@@ -112,7 +112,7 @@ def _reduced(results):
     return grid
 
 
-def _determined(horizon):
+def _horizon(horizon):
     """How long a motion is determined, in words."""
     ended = [(k, time) for k, time in horizon["digits"] if time is not None]
     text = f"a difference of {horizon['perturbation']:.0e} m"
@@ -123,13 +123,13 @@ def _determined(horizon):
     return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
 
 
-def stored(summary, more=()):
+def print_run(summary, more=()):
     """Print the box of a finished run from the content of its ``run.json``, with ``more`` rows (name, text)."""
     solver, cost, rows = summary["solver"], summary["cost"], []
     if summary["steps"]:
-        rows.append(("results", _results(summary["steps"])))
+        rows.append(("results", _results_of_steps(summary["steps"])))
     elif summary["results"]:
-        rows.append(("results", _reduced(summary["results"])))
+        rows.append(("results", _results_over_time(summary["results"])))
     if summary["results"]:
         if any(r["error"] is None for r in summary["results"].values()):
             rows.append(("", "a value without ± has no known error"))
@@ -139,7 +139,7 @@ def stored(summary, more=()):
                 parts = (f"{name} by {readable(r[key], None, r['unit'])}" for name, r in found.items())
                 rows.append(("", f"{text} {', '.join(parts)}"))
     if horizon := summary.get("horizon"):
-        rows.append(("horizon", _determined(horizon)))
+        rows.append(("horizon", _horizon(horizon)))
         for name, r in horizon.get("ensemble", {}).items():
             unit = summary["results"][name]["unit"]
             rows.append(
@@ -163,26 +163,26 @@ def stored(summary, more=()):
     _box(f"{summary['scene']}: {summary['status']}", rows)
 
 
-def after(solution, folder):
+def print_solution(solution, folder):
     """Print results with their errors, and what they cost."""
     worst, more = solution.utilisation, []
     if worst is not None:
         used, line = worst
         digits = ".2f" if 0.01 <= used < 100.0 else ".2g"
         more.append(("strength", f"utilisation {used:{digits}} at line {line}"))
-    stored(solution.summary(), more)
+    print_run(solution.summary(), more)
     print(f"results in {folder}")
 
 
-def modal(summary):
+def print_modes(summary):
     """Print the box of modes from the content of their ``run.json``."""
     steps, rows = summary["steps"], []
     if steps:
         rows.append(("modes", _modes(steps[-1])))
     if len(steps) > 1:
         first = [{**step, "results": dict(list(step["results"].items())[:3])} for step in steps]
-        rows.append(("steps", _results(first)))
-    stored({**summary, "scene": f"{summary['scene']}, modes", "steps": [], "results": {}}, rows)
+        rows.append(("steps", _results_of_steps(first)))
+    print_run({**summary, "scene": f"{summary['scene']}, modes", "steps": [], "results": {}}, rows)
 
 
 def _modes(step):
@@ -208,7 +208,7 @@ def _equal(one, other):
     return abs(one["value"] - other["value"]) <= max(within, 1e-9 * abs(one["value"]))
 
 
-def work_precision(summary):
+def print_cost(summary):
     """Print the box of a work-precision diagram from the content of its ``run.json``."""
     unit, runs = summary["observable"]["unit"], summary["runs"]
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)

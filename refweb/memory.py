@@ -11,10 +11,10 @@ import sys
 
 from .errors import InputError
 
-EXPLICIT, IMPLICIT, CONTACT, KEPT = 1e3, 6e3, 3e2, 2e2
+BYTES_EXPLICIT, BYTES_IMPLICIT, BYTES_PER_BODY, BYTES_PER_STATE = 1e3, 6e3, 3e2, 2e2
 """Bytes for each element of order 1: of explicit methods and of others, for each body that it may touch, and of each
 state that is kept."""
-READ = 10.0
+READING = 10.0
 """Memory to read a mesh file, over its size."""
 
 
@@ -55,5 +55,5 @@ def needed(elements, order, explicit, bodies, states):
     states : int
         Number of states that are kept to the end.
     """
-    each = EXPLICIT if explicit else IMPLICIT * (0.5 * (order + 1)) ** 2
-    return elements * (each + CONTACT * bodies + KEPT * order * states)
+    each = BYTES_EXPLICIT if explicit else BYTES_IMPLICIT * (0.5 * (order + 1)) ** 2
+    return elements * (each + BYTES_PER_BODY * bodies + BYTES_PER_STATE * order * states)

@@ -105,28 +105,28 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
         solution.warnings += _notices(scene, system)
     else:
         solution.warnings += _before(kept, summary, system, solution.versions)
-    follower = follower_of(scene, system, solution, kept)
-    solution.columns = follower.columns
+    simulation = simulation_of(scene, system, solution, kept)
+    solution.columns = simulation.columns
     row = None if kept is None else int(kept["row"])
     folder = Folder(out, scene, solution.columns, solution.summary(), row=row) if out is not None else None
     tell = progress or (lambda text, share: None)
     try:
-        with recorded(solution, clock, lambda: follower.done):
-            follower.follow(folder, tell)
+        with recorded(solution, clock, lambda: simulation.done):
+            simulation.follow(folder, tell)
             if scene.accuracy.refine:
                 tell("finding the errors of elements", 1.0)
                 _refine(scene, solution)
             if scene.accuracy.horizon:
                 from .studies.predictability import horizon
 
-                solution.horizon = horizon(follower, solution.results, scene.accuracy.ensemble, tell)
+                solution.horizon = horizon(simulation, solution.results, scene.accuracy.ensemble, tell)
     finally:
         if folder is None or scene.solve.kind == "static":
-            solution.table = as_history(solution.columns, follower.rows)
+            solution.table = as_history(solution.columns, simulation.rows)
         else:
             solution.path = folder.path.absolute()
-        solution.cost["by_effect"] = _shares(system, solution)
-        solution.warnings += follower.remarks()
+        solution.cost["by_effect"] = _cpu_by_effect(system, solution)
+        solution.warnings += simulation.remarks()
         if folder is not None:
             folder.close()
             folder.summary(solution.summary())
@@ -159,7 +159,7 @@ def _before(kept, summary, system, versions):
         yield f"resumed with {changes}: what follows may differ in its last digits"
 
 
-def follower_of(scene, system, solution, kept=None):
+def simulation_of(scene, system, solution, kept=None):
     """What leads a scene from start to end; refuses what its solver cannot take, with an `InputError`."""
     with in_file(scene.file):
         if scene.solve.kind == "static":
@@ -180,7 +180,7 @@ def _notices(scene, system):
         yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
 
 
-def _shares(system, solution):
+def _cpu_by_effect(system, solution):
     """Estimate of each effect's share of the CPU time [s]: its kernel alone at the last state × its calls."""
     state, share = solution.state, {}
     for family in system.families if state is not None else ():

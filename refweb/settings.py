@@ -7,19 +7,7 @@ from dataclasses import dataclass
 from .errors import InputError
 from .messages import shown
 from .registry import INTEGRATORS, STATICS
-from .tables import (
-    Table,
-    boolean,
-    choice,
-    components,
-    field,
-    integer,
-    node_number,
-    nodes,
-    numbers_list,
-    real,
-    text,
-)
+from .tables import Table, boolean, choice, components, field, integer, node_number, nodes, numbers_list, real, text
 
 START_STATES = ("web", "equilibrium")
 """What ``start`` may be besides a result folder."""

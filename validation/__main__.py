@@ -10,7 +10,7 @@ import time
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from refweb.tables import nearest
+from refweb.messages import nearest
 
 from .harness import page as report
 from .harness.case import Case, names, run, text

@@ -8,12 +8,12 @@ def add_arguments(parser):
 
 def run(arguments):
     """Refuse what a run would refuse, else print what it would solve."""
-    from ..console import before
+    from ..console import print_scene
     from ..results.solution import Solution
-    from ..runner import follower_of
+    from ..runner import simulation_of
     from ..scene import Scene
 
     scene = Scene.load(arguments.scene)
     system = scene.build()
-    follower_of(scene, system, Solution(scene))
-    before(scene, system)
+    simulation_of(scene, system, Solution(scene))
+    print_scene(scene, system)

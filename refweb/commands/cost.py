@@ -16,14 +16,14 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print what is solved, compare the methods, print what they cost."""
-    from ..console import before, progress
+    from ..console import print_scene, progress
     from ..scene import Scene
     from ..studies.work_precision import cost
 
     scene, out = Scene.load(arguments.scene), arguments.out
     options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
     with progress() as tell:
-        found = cost(scene, progress=tell, announce=before, **options)
+        found = cost(scene, progress=tell, announce=print_scene, **options)
     show(found.summary())
     if out is not None:
         print(f"diagram in {pathlib.Path(out) / 'cost.png'}")
@@ -31,6 +31,6 @@ def run(arguments):
 
 def show(summary):
     """Print the box of a work-precision diagram from the content of its ``run.json``."""
-    from ..console import work_precision
+    from ..console import print_cost
 
-    work_precision(summary)
+    print_cost(summary)

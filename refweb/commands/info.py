@@ -40,7 +40,7 @@ def _folder(folder, as_json):
 
 
 def _scene(source, as_json):
-    from ..console import before
+    from ..console import print_scene
     from ..results.provenance import web_of
     from ..scene import Scene
 
@@ -49,7 +49,7 @@ def _scene(source, as_json):
     if as_json:
         _print({"scene": scene.to_dict(), "web": web_of(system)})
     else:
-        before(scene, system)
+        print_scene(scene, system)
 
 
 def _print(content):

@@ -15,20 +15,20 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print what vibrates, find its modes, print them."""
-    from ..console import before, progress
+    from ..console import print_scene, progress
     from ..scene import Scene, slug
     from ..studies.modes import modes
 
     scene = Scene.load(arguments.scene)
     out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
     with progress() as tell:
-        found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=before)
+        found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=print_scene)
     show(found.summary())
     print(f"modes in {out}")
 
 
 def show(summary):
     """Print the box of modes from the content of their ``run.json``."""
-    from ..console import modal
+    from ..console import print_modes
 
-    modal(summary)
+    print_modes(summary)

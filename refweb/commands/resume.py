@@ -9,8 +9,8 @@ def add_arguments(parser):
 def run(arguments):
     """Go on from the last checkpoint, print the results."""
     from .. import runner
-    from ..console import after, before, progress
+    from ..console import print_scene, print_solution, progress
 
     with progress() as tell:
-        solution = runner.resume(arguments.folder, progress=tell, announce=before)
-    after(solution, arguments.folder)
+        solution = runner.resume(arguments.folder, progress=tell, announce=print_scene)
+    print_solution(solution, arguments.folder)

@@ -19,7 +19,7 @@ def run(arguments):
     from dataclasses import replace
 
     from .. import runner
-    from ..console import after, before, progress
+    from ..console import print_scene, print_solution, progress
     from ..scene import Scene, slug
 
     scene = Scene.load(arguments.scene)
@@ -29,12 +29,12 @@ def run(arguments):
         scene = scene.replace(accuracy=replace(scene.accuracy, horizon=True))
     out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
     with progress() as tell:
-        solution = runner.run(scene, out=out, force=arguments.force, progress=tell, announce=before)
-    after(solution, out)
+        solution = runner.run(scene, out=out, force=arguments.force, progress=tell, announce=print_scene)
+    print_solution(solution, out)
 
 
 def show(summary):
     """Print the box of a finished run from the content of its ``run.json``."""
-    from ..console import stored
+    from ..console import print_run
 
-    stored(summary)
+    print_run(summary)

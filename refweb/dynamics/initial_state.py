@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..messages import short
 from ..net.rigid_body import row_names
-from ..tables import short
 
 
 def equilibrium(system, progress=None):

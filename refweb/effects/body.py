@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import InputError
+from ..messages import shown
 from ..net.rigid_body import RigidBody
 from ..net.shapes import KINDS
-from ..tables import Table, boolean, choice, real, rows, shown, text, vector
+from ..tables import Table, boolean, choice, real, rows, text, vector
 
 NEEDS = {
     "sphere": ("radius",),

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..tables import Table, nodes, shown
+from ..messages import shown
+from ..tables import Table, nodes
 from .base import Constraint
 
 

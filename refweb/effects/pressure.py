@@ -19,8 +19,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..messages import nearest, shown
 from ..net.net import REFERENCE
-from ..tables import Table, field, nearest, node_number, numbers_list, real, rows, shown, vector
+from ..tables import Table, field, node_number, numbers_list, real, rows, vector
 from .base import Family
 from .time_tables import factor, factor_at, largest
 

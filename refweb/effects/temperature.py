@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..tables import Table, by_group, field, nearest, real, rows, short, shown
+from ..messages import nearest, short, shown
+from ..tables import Table, by_group, field, real, rows
 from .length_factor import scaled
 
 

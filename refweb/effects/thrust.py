@@ -18,8 +18,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..messages import shown
 from ..net.net import REFERENCE
-from ..tables import Table, field, node_number, nodes, real, rows, shown
+from ..tables import Table, field, node_number, nodes, real, rows
 from .base import Family
 from .time_tables import factor, factor_at, largest
 

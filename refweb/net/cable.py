@@ -7,7 +7,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import InputError
-from ..tables import LARGEST, Table, by_group, choice, integer, nearest, real, shown
+from ..messages import nearest, shown
+from ..tables import LARGEST, Table, by_group, choice, integer, real
 from .tension_laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")

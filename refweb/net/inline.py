@@ -10,7 +10,8 @@ import numpy as np
 from .. import memory
 from .. import tables as inputs
 from ..errors import InputError
-from ..tables import Table, choice, node_number, numbers_list, real, rows, shown
+from ..messages import shown
+from ..tables import Table, choice, node_number, numbers_list, real, rows
 from .web import Web, in_range
 
 FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".msh": "gmsh"}
@@ -135,7 +136,7 @@ def _read(path):
         raise InputError(f"there is no file {path}")
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"format {shown(path.suffix)} must be one of {', '.join(FORMATS)}: use meshio convert")
-    memory.check(memory.READ * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
+    memory.check(memory.READING * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():

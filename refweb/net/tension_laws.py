@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..kernels import kernel, ufunc
-from ..tables import nearest
+from ..messages import nearest
 
 SMOOTH, TENSION_ONLY, LINEAR = 0, 1, 2
 NAMES = {"smooth": SMOOTH, "tension-only": TENSION_ONLY, "linear": LINEAR}

@@ -8,7 +8,8 @@ from itertools import chain
 import numpy as np
 
 from ..errors import InputError
-from ..tables import nearest, node_number, shown
+from ..messages import nearest, shown
+from ..tables import node_number
 
 SELECTIONS = ("centre", "rim", "corners", "all")
 _TIE = 1e-9  # two distances are equal if they differ by less than this part of the web's size

@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..messages import nearest
 from ..pictures import camera as views
 from ..pictures import frames as shots
 from ..pictures import render as drawing
 from ..results.folder import read_summary, write_atomically
 from ..results.units import prefixed
-from ..tables import nearest
 from .render import Balls, Surface, Tubes
 
 SIZE, FILM_SIZE = (1600, 1000), (1200, 750)

@@ -19,8 +19,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ..errors import InputError, SolverError
+from ..messages import short
 from ..net.rigid_body import row_names, surface
-from ..tables import short
 
 OWN = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..tables import nearest
+from ..messages import nearest
 
 SOLVER = dict.fromkeys(
     "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift".split()

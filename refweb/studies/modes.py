@@ -15,7 +15,7 @@ from ..results.solution import SOLVER, Result, Solution, as_history
 from ..results.state import State
 from ..scene import Scene
 from ..statics.remarks import Remarks
-from ..tables import integer
+from ..tables import checked, integer
 from .mode_remarks import left_out, remarks_on
 from .spectrum import spectrum
 
@@ -120,7 +120,7 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
         marked "failed".
     """
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
-    number = integer(at_least=1, at_most=MAX_MODES).metadata["read"]("number", number)
+    number = checked("number", number, integer(at_least=1, at_most=MAX_MODES))
     if out is not None:
         check_folder(out, force)
     clock = Clock()

@@ -23,12 +23,14 @@ from itertools import combinations, takewhile
 import numpy as np
 
 from ..errors import InputError, SolverError, in_file
+from ..messages import nearest, shown
 from ..registry import OBSERVABLES, load
 from ..results.folder import as_toml, check_folder, clear, write_atomically, write_text
 from ..results.observables.observe import default
 from ..results.provenance import versions, web_of
+from ..results.run_status import Clock, recorded
 from ..scene import Scene
-from ..tables import nearest, real, shown
+from ..tables import checked, real
 from .trials import Dynamics, OverBudget, Statics, trials
 
 SHARE = 1.0 / 3.0
@@ -199,8 +201,8 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     SolverError
         Where no method solves the scene.
     """
-    began = time.process_time(), time.perf_counter()
-    budget = real(above=0, unit="s").metadata["read"]("budget", budget)
+    clock, began = Clock(), time.perf_counter()
+    budget = checked("budget", budget, real(above=0, unit="s"))
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
         check_folder(out, force)
@@ -215,17 +217,15 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     ladders = trials(scene)
     found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
     try:
-        _compile(ladders, runner)
-        deadline = max(began[1] + 0.9 * budget, time.perf_counter() + 0.5 * budget)  # the rest is for the diagram
-        _climb(ladders, runner, deadline, budget, progress or (lambda text, share: None))
-        found.status = "solved" if any(t.status == "solved" for t in found.trials) else "failed"
-    except KeyboardInterrupt:
-        found.status = "interrupted"
-        raise
+        with recorded(found, clock):
+            _compile(ladders, runner)
+            deadline = max(began + 0.9 * budget, time.perf_counter() + 0.5 * budget)  # the rest is for the diagram
+            _climb(ladders, runner, deadline, budget, progress or (lambda text, share: None))
+            if not any(t.status == "solved" for t in found.trials):
+                found.status = "failed"
     finally:
         _compare(found)
-        found.cost = {"cpu_s": time.process_time() - began[0], "wall_s": time.perf_counter() - began[1]}
-        if found.status == "failed":
+        if found.status == "failed" and not found.message:
             found.message = next((f"{t.method}: {t.message}" for t in found.trials if t.message), found.sentence)
         if out is not None:
             found.save(out, force)

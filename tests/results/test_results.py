@@ -432,8 +432,8 @@ def test_utilisation():
 
 
 def test_utilisation_in_the_box(capsys, tmp_path):
-    from refweb.console import after
+    from refweb.console import print_solution
 
-    after(straight("linear", 0.1, groups={"weak": refweb.Group(strength=2e4)}), tmp_path)
+    print_solution(straight("linear", 0.1, groups={"weak": refweb.Group(strength=2e4)}), tmp_path)
     box = capsys.readouterr().out
     assert "│ strength  utilisation 0.50 at line 1 " in box and f"results in {tmp_path}" in box

@@ -19,8 +19,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ...messages import nearest, shown
 from ...net.shapes import SPHERE
-from ...tables import Table, field, nearest, real, shown
+from ...tables import Table, field, real
 from ..base import Family
 from ..vectors import dot
 from .nearest_point import AWAY, PENALTY, RADIUS, closest, lightness, numbers, point, share, touched
