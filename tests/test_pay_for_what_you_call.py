@@ -38,7 +38,8 @@ NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.e
 DYNAMICS = {"dynamics", "dynamics.simulation", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
 EXPLICIT = {f"dynamics.integrators.{name}" for name in ("central_difference", "explicit_loop", "step_bound")}
-SUNDIALS = TANGENT | {"system.mass", "dynamics.integrators.step_observer", "dynamics.integrators.sundials"}
+AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
+SUNDIALS = TANGENT | {"system.mass"} | {f"dynamics.integrators.{name}" for name in ("sundials", *AROUND_STEPS)}
 METHOD = {
     "newton": NEWTON | LOAD_STEPS,
     "relaxation": STATICS | LOAD_STEPS | {"statics.dynamic_relaxation"},

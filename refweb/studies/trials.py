@@ -216,7 +216,8 @@ class Dynamics:
         """Run scipy's DOP853 with the forces of the system."""
         from scipy.integrate import DOP853
 
-        from ..dynamics.integrators.step_observer import TRAVEL, scales
+        from ..dynamics.integrators.step_limits import TRAVEL
+        from ..dynamics.integrators.tolerances import scales
 
         system, free, n = self.system, self.system.free, len(self.system.free)
         x = np.zeros((system.rows, 3)) if self.begin[0] is None else self.begin[0].copy()

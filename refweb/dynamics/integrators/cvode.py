@@ -53,7 +53,6 @@ class Cvode(Sundials):
 
     def __init__(self, system, *observed, family="bdf", max_order=None, linear_solver="auto", **tolerances):
         super().__init__(system, *observed, **tolerances)
-        self._keys = dict(family=family, max_order=max_order, linear_solver=linear_solver)
         self.family = family
         self.max_order = self.order = max_order or {"bdf": 2, "adams": 12}[family]
         self._choose(linear_solver, "block")

@@ -27,14 +27,30 @@ References
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from ...errors import InputError, SolverError
-from .step_observer import Stopped, scales
+from .step_observer import ObservedCourse, Stopped
 from .sundials import Sundials, Symmetric
+from .tolerances import scales
 
 UNTESTED = 1e30
 """Absolute tolerance of multipliers, which takes them out of the error test."""
+
+
+@dataclass(eq=False, kw_only=True)
+class LinkedCourse(ObservedCourse):
+    """State of a run with links.
+
+    Attributes
+    ----------
+    constraint_drift : ndarray, shape (2,)
+        Largest relative error of a length, and largest rate of one [m/s], at the ends of steps.
+    """
+
+    constraint_drift: np.ndarray = field(default_factory=lambda: np.zeros(2))
 
 
 class Ida(Sundials):
@@ -58,10 +74,10 @@ class Ida(Sundials):
 
     method = "ida"
     takes_massless = takes_links = True
+    course_type = LinkedCourse
 
     def __init__(self, system, *observed, max_order=2, linear_solver="auto", **tolerances):
         super().__init__(system, *observed, **tolerances)
-        self._keys = dict(max_order=max_order, linear_solver=linear_solver)
         self.max_order = self.order = max_order
         mass = np.repeat(system.net.mass, 3)[system.free]
         self._heavy, self._bare = np.flatnonzero(mass > 0.0), np.flatnonzero(mass <= 0.0)
@@ -209,19 +225,11 @@ class Ida(Sundials):
             self._links.hold(x, v)
         if self._massless:
             self._massless.settle(x, v, *scales(system))
-        run = super().start(x, v)
-        run.constraint_drift = self._drift = np.zeros(2)
-        return run
+        return super().start(x, v)
 
-    def save(self, run):
-        return {**super().save(run), "constraint_drift": run.constraint_drift}
-
-    def load(self, arrays):
-        arrays = dict(arrays)
-        drift = arrays.pop("constraint_drift")
-        run = super().load(arrays)
-        run.constraint_drift = self._drift = drift
-        return run
+    def _enter(self, course):
+        self._drift = course.constraint_drift  # written to at the end of each step
+        super()._enter(course)
 
     def _made(self, **options):
         from sksundae.ida import IDA
@@ -278,10 +286,10 @@ class Ida(Sundials):
                 f"{REMEDY}"
             ) from None
 
-    def spent(self, run):
+    def spent(self, course):
         """What a run has spent, and the `constraint_drift` of its steps: of lengths [1], and of their rates [m/s]."""
-        drift = {"constraint_drift": run.constraint_drift.tolist()} if self._links else {}
-        return {**super().spent(run), **drift}
+        drift = {"constraint_drift": course.constraint_drift.tolist()} if self._links else {}
+        return {**super().spent(course), **drift}
 
     def hold(self, x, v):
         """Move a state to the nearest one with the lengths of the links."""

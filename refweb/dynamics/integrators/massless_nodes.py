@@ -69,7 +69,7 @@ class Massless:
         x, v : ndarray, shape (rows, 3)
             Displacement [m] and velocity [m/s] of all rows.
         near, fast : float
-            Small ones of these, see `refweb.dynamics.integrators.step_observer.scales`.
+            Small ones of these, see `refweb.dynamics.integrators.tolerances.scales`.
 
         Raises
         ------

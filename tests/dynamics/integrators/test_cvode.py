@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics import simulation as dynamics
-from refweb.dynamics.integrators import step_observer, sundials
+from refweb.dynamics.integrators import simpson_book, sundials
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
@@ -488,7 +488,7 @@ def test_an_open_book_is_repeated_with_a_tenth_of_the_tolerance(tmp_path, monkey
     drifts = drift_at(1e-4), drift_at(1e-5)
     assert drifts[1] < 0.7 * drifts[0]
     expected = refweb.run(scene(ball(), rtol=1e-5))
-    monkeypatch.setattr(step_observer, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
+    monkeypatch.setattr(simpson_book, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
     kept, written = refweb.run(scene(ball(), rtol=1e-4)), refweb.run(scene(ball(), rtol=1e-4), out=tmp_path / "out")
     for solution in (kept, written):
         assert solution.results == expected.results and solution.solver == expected.solver

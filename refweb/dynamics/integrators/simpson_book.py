@@ -1,0 +1,243 @@
+"""Books of energy and momentum around steps of any method: work and impulse by Simpson's rule.
+
+A piece of a step is known at its start, in its middle and at its end. The parabolas through the powers there, through
+what supports give and what pulls on lines that change their length, are integrated to any time within. Where Simpson's
+rule and the trapezoidal one differ too much, as where damped lines go slack in a long step, a piece is to be halved.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import OpenBook, SolverError
+from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
+from .energy_book import CLOSING, DRIFT, book_energies, no_energy
+
+UNEVEN = 1e-3
+"""Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
+
+
+class Sample(NamedTuple):
+    """A system at an instant.
+
+    Attributes
+    ----------
+    time : float
+        Time [s].
+    x, v, force : ndarray, shape (rows, 3)
+        Displacement [m], velocity [m/s] and force [N] of each row; what supports give is its negative.
+    lines : ndarray, shape (cells, columns)
+        What the line elements show: tension [N], strain [1].
+    power : ndarray, shape (families + 1,)
+        Power of each family and, last, of motion [W].
+    """
+
+    time: float
+    x: np.ndarray
+    v: np.ndarray
+    force: np.ndarray
+    lines: np.ndarray
+    power: np.ndarray
+
+
+class Rates(NamedTuple):
+    """What is integrated.
+
+    Attributes
+    ----------
+    power : ndarray, shape (families + 1,)
+        Power of each family and, last, of motion [W].
+    reaction : ndarray, shape (3,)
+        Force of the supports [N].
+    lengths : ndarray
+        Natural lengths [m]; none where nothing changes them.
+    length_force : ndarray
+        ∂E/∂L of each of them [N].
+    """
+
+    power: np.ndarray
+    reaction: np.ndarray
+    lengths: np.ndarray
+    length_force: np.ndarray
+
+
+class Jump(NamedTuple):
+    """What a jump of velocities at the corner of a motion takes: energy [J] and momentum [N s], shape (3,)."""
+
+    energy: float
+    momentum: np.ndarray
+
+
+class Piece(NamedTuple):
+    """A part of a step, from where a course is.
+
+    Attributes
+    ----------
+    begin : float
+        Time at its start [s].
+    work, impulse : ndarray
+        Work of each family and of motion, and impulse of the supports, until then.
+    step : float
+        Size of the step that it is a part of [s].
+    middle, end : Sample
+        The system there; at the end with the velocities behind a jump.
+    rates : tuple of Rates
+        At the start, in the middle and at the end.
+    behind : Rates
+        At the start of the next piece: others where velocities jump.
+    jump : Jump or None
+        What that takes.
+    """
+
+    begin: float
+    work: np.ndarray
+    impulse: np.ndarray
+    step: float
+    middle: Sample
+    end: Sample
+    rates: tuple[Rates, Rates, Rates]
+    behind: Rates
+    jump: Jump | None
+
+    def booked(self, t):
+        """Work, and impulse of the supports, at a time within."""
+        width = self.end.time - self.begin
+        s = (t - self.begin) / width
+        a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
+        start, _, last = self.rates
+        mean = Rates(*(a * p + b * q + c * r for p, q, r in zip(*self.rates, strict=True)))
+        work, impulse = self.work + width * mean.power, self.impulse + width * mean.reaction
+        work[-1] += mean.length_force @ (last.lengths - start.lengths)
+        if self.jump and t == self.end.time:
+            work[-1], impulse = work[-1] + self.jump.energy, impulse + self.jump.momentum
+        return work, impulse
+
+    @property
+    def unevenness(self):
+        """Difference of the work between Simpson's and the trapezoidal rule [J]."""
+        start, middle, last = (rates.power for rates in self.rates)
+        return (self.end.time - self.begin) * np.abs(start - 2.0 * middle + last).sum() / 12.0
+
+
+class SimpsonBook:
+    """The books of one system.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    hold : callable
+        ``hold(x, v)`` moves a state to the nearest one that the equations allow.
+    """
+
+    def __init__(self, system, hold):
+        self.system, self._hold = system, hold
+        families = system.families
+        self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
+        self._families = (
+            typed_list(INDICES, [f.cells for f in families]),
+            typed_list(MATRIX, [self._lines if f.lines else f.data for f in families]),
+            typed_list(ENERGY, [f.energy or no_energy for f in families]),
+            typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
+        )
+        self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
+        self._working = system.working
+        self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
+        self._held, self._fixed = system.supported, np.flatnonzero(system.supported)
+
+    def sample(self, t, x, v):
+        """The `Sample` of a state."""
+        force, out = self.system.balance(t, x, v)
+        self.refuse_endless(t, force)
+        power, driven = np.zeros(len(out) + 1), self._driven
+        for i, column in self._powered:
+            power[i] = out[i][:, column].sum()
+        power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
+        return Sample(t, x, v, force, out.lines.copy(), power)
+
+    def refuse_endless(self, t, force):
+        """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""
+        if not np.isfinite(force).all():
+            name = self.system.row_name(int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0]))
+            raise SolverError(f"number not finite at {name}, t = {t:.6g} s: use a smaller rtol") from None
+
+    def rates(self, sample):
+        """The `Rates` of a sample."""
+        system, lengths = self.system, (np.zeros(0), np.zeros(0))
+        if system.line_drives:
+            lengths = system.natural_length(sample.time), system.length_force(sample.time, sample.x)
+        reaction = np.bincount(self._fixed % 3, sample.force.ravel()[self._fixed], 3)
+        return Rates(sample.power, -reaction, *lengths)
+
+    def piece(self, course, middle, end):
+        """The `Piece` from where a course is, by the samples in its middle and at its end.
+
+        At the corner of a motion velocities jump: until then the given ones are those in the middle.
+        """
+        driven, last, jump = self._driven, end, None
+        if len(driven) and (end.v[driven] != middle.v[driven]).any():
+            before, step = end.v.copy(), np.zeros_like(end.v)
+            before[driven] = middle.v[driven]
+            step[driven] = end.v[driven] - before[driven]
+            after = before + self.system.mass.kick(step)
+            after[driven] = end.v[driven]
+            self._hold(end.x, after)
+            last, end = self.sample(end.time, end.x, before), self.sample(end.time, end.x, after)
+            jump = Jump(self.kinetic(after) - self.kinetic(before), self.momentum(after) - self.momentum(before))
+        rates = course.rates, self.rates(middle), self.rates(last)
+        behind = self.rates(end)
+        return Piece(course.time, course.work, course.impulse, course.step, middle, end, rates, behind, jump)
+
+    def uneven(self, course, piece):
+        """Whether powers change too much within a piece."""
+        apart = piece.unevenness
+        return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(piece.end.v)
+
+    def kinetic(self, v):
+        """Kinetic energy [J]."""
+        return 0.5 * (v * self.system.mass.momentum(v)).sum()
+
+    def momentum(self, v):
+        """Momentum of what is free [N s], shape (3,)."""
+        moving = self.system.mass.momentum(np.where(self._held, 0.0, v))
+        return moving[: self.system.rows - self.system.net.spins].sum(axis=0)
+
+    def energies(self, sample, work, step):
+        """Energy of each family, kinetic energy, work [J] and step size [s], for the work of each family."""
+        t, x, v, system, total = sample.time, sample.x, sample.v, self.system, np.zeros(len(self.system.families) + 3)
+        if system.line_drives:
+            self._lines[:] = system.line_data(t)
+        book_energies(t, x, v, system.net.mass, *self._families, work, self._working, total)
+        total[-3] = self.kinetic(v)
+        total[-1] = step
+        return total
+
+    def energies_within(self, piece, sample):
+        """The same at a sample of a piece."""
+        return self.energies(sample, piece.booked(sample.time)[0], piece.step)
+
+    def open(self, course, energies):
+        """Note the energy at the start of a course."""
+        own = self._own(energies)
+        course.energy, course.largest = own.sum(), np.abs(own).sum()
+
+    def close(self, course, energies, before, remedy):
+        """Hold the energies at a row against the work; `OpenBook` where the drift is large and does not fall."""
+        own, work = self._own(energies), energies[-2]
+        course.largest = max(course.largest, np.abs(own).sum())
+        drift = abs(own.sum() - work - course.energy)
+        course.worst = max(course.worst, drift)
+        share = drift / course.largest if course.largest > 0.0 else drift
+        if not share <= max(DRIFT, CLOSING * course.share):
+            raise OpenBook(
+                f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and "
+                f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}"
+            )
+        if course.largest > 0.0:
+            course.share = share
+
+    def _own(self, energies):
+        """Energies of the families that are no work, and kinetic energy."""
+        return np.delete(energies[:-2], np.flatnonzero(self._working > 0))

@@ -1,0 +1,46 @@
+"""How far a step may go: to the next corner of a table, and not so far that a body passes through something."""
+
+from __future__ import annotations
+
+import numpy as np
+
+TRAVEL = 0.2
+"""Largest share of a body's thickness that anything may move in a step, so that nothing passes through; where bodies
+are further away, half of that distance."""
+
+
+class StepLimits:
+    """The limits of steps of one system.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        Its tables of time, and its bodies.
+    """
+
+    def __init__(self, system):
+        self._net, self._moving = system.net, system.rows - system.net.spins
+        times = [t for part in (*system.families, *system.drives, *system.line_drives) for t in part.times]
+        self._corners = np.unique(np.array(times, dtype=float))
+        bodies = system.net.bodies
+        self._thickness = min((body.thickness for body in bodies), default=np.inf)
+        self._outreach = np.array([body.radius + np.linalg.norm(body.core) for body in bodies])
+
+    def stop(self, t, x, v, end):
+        """Time that a step from a state must not pass, on the way to ``end`` [s]; infinite where nothing limits it."""
+        ahead = self._corners[self._corners > t * (1.0 + 1e-12)]
+        stop = ahead[0] if len(ahead) else np.inf
+        if np.isfinite(self._thickness):
+            speed = 2.0 * np.sqrt((v[: self._moving] ** 2).sum(axis=1).max())
+            way = max(TRAVEL * self._thickness, 0.5 * self._gap(x))
+            stop = min(stop, t + way / speed) if speed > 0.0 else stop
+        return t + 1e-12 * end if stop - t < 1e-12 * end else stop
+
+    def _gap(self, x):
+        """At most the least distance between a body and a node [m]: that of balls around and a box around."""
+        net = self._net
+        place = net.points + x
+        low, high = place[: net.nodes].min(axis=0), place[: net.nodes].max(axis=0)
+        middles = place[[body.row for body in net.bodies]]
+        apart = np.maximum(np.maximum(low - middles, middles - high), 0.0)
+        return (np.linalg.norm(apart, axis=1) - self._outreach).min()

@@ -1,0 +1,20 @@
+"""What tolerances of displacements and velocities are relative to, where the state itself is near zero."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def scales(system):
+    """Displacement [m] and velocity [m/s] of which rtol is the absolute tolerance.
+
+    A strain of 1e-3 in the shortest element, and the velocity at which its ends take that up: 1e-3 of the speed of
+    sound in the fastest element.
+    """
+    net, length = system.net, system.natural_length(0.0)
+    mass = np.maximum(np.bincount(net.cells.ravel(), minlength=system.rows), 1)
+    light = np.where(net.mass > 0.0, net.mass, np.inf) / mass
+    least = light[net.cells].min(axis=1)
+    rate = np.sqrt(net.line_data[:, 1] / length / np.where(np.isfinite(least), least, np.inf)).max(initial=0.0)
+    near = 1e-3 * length.min()
+    return near, near * rate if rate > 0.0 else near
