@@ -1,1 +1,55 @@
-"""One system through time, seen by probes; it knows no scene, no files and no errors of results."""
+"""One system through time, seen by probes; it knows no scene, no files and no errors of results.
+
+How to write an integrator
+--------------------------
+A method that takes steps of its own choice, as its tolerances ask for, is a `StepObserver` and brings three methods.
+Rows, books, extremes, events, ± and refusals are made around its steps. A whole file,
+``refweb/dynamics/integrators/heun.py``::
+
+    '''Heun's method: Euler's step and, by the slopes at its end, a correction, which is taken for the error.'''
+
+    import numpy as np
+
+    from refweb.dynamics.integrators.step_observer import StepObserver
+
+
+    class Heun(StepObserver):
+        method, order = "heun", 2
+
+        def begin(self, t, x, v):
+            self.now, self.h = (t, x, v, self.acceleration(t, x, v)), 1e-9
+
+        def step(self, stop, end):
+            (t, x, v, a), share = self.now, 2.0
+            while share > 1.0:
+                h = min(self.h, stop - t)
+                b = self.acceleration(t + h, x + h * v, v + h * a)
+                more = 0.5 * h * h * a, 0.5 * h * (b - a)
+                share = self.over_tolerance(*more, x, v)
+                self.h = h * min(2.0, 0.9 / np.sqrt(share + 1e-3))
+            x, v = x + h * v + more[0], v + h * a + more[1]
+            self.before, self.now = self.now, (t + h, x, v, self.acceleration(t + h, x, v))
+            return t + h
+
+        def interpolated(self, t):
+            (start, x, v, a), (end, y, w, b) = self.before, self.now
+            h, s = end - start, (t - start) / (end - start)
+            cubic = lambda p, p_rate, q, q_rate: (
+                p + s * s * (3.0 - 2.0 * s) * (q - p) + h * s * (1.0 - s) * ((1.0 - s) * p_rate - s * q_rate)
+            )
+            return cubic(x, v, y, w), cubic(v, a, w, b)
+
+A line in `refweb.registry.INTEGRATORS` makes it a ``method`` of scenes, with the keys of ``[solve]`` that it takes::
+
+    "heun": Method("refweb.dynamics.integrators.heun:Heun", _TOLERANCES),
+
+``x`` and ``v`` are displacement and velocity of all that is free, vectors; ``begin`` is also called in the middle of a
+run, where velocities jump. No step passes ``stop``, where tables have corners and bodies might pass through lines; the
+next row, ``end``, may be passed. A step that is not found raises `Stopped` of the same module with the reason.
+
+An implicit method finds K = −∂f/∂x and C = −∂f/∂v by ``self.system.stiffness(t, *self.state(t, x, v))`` and
+``damping``, None without any, and M by ``self.system.mass()``: values of which ``self.system.pattern.matrix`` makes a
+sparse matrix. ``self.force`` is f, and ``self.acceleration`` M⁻¹f. It says by ``takes_massless`` and ``takes_links``
+that its equations have a place for nodes without mass and rigid links. What else there is to say about an integrator,
+also one that takes steps by another key than rtol, is in `refweb.dynamics.integrators.integrator.Integrator`.
+"""
