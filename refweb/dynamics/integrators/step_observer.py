@@ -280,6 +280,8 @@ class StepObserver(Integrator):
             reached = self.step(stop, ahead)
             if not reached > course.reached:
                 raise Stopped("no step is long enough to change the time")
+            if self._wrong is not None and not np.isfinite(self.interpolated(reached)).all():
+                raise Stopped("numbers are not finite")
         if abs(reached - stop) <= 4.0 * np.spacing(reached):  # a sum of time and step, and corners are to be met
             reached = stop
         course.step, course.reached, course.nsteps = reached - course.reached, reached, course.nsteps + 1
