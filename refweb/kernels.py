@@ -19,8 +19,8 @@ all its digits, which it loses when positions are the unknowns.
 
 Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at
 the file a function stands in, and would go on using a kernel whose law, in another file, has changed. It also finds the
-machine code of kernels in typed lists by name: kernels of one factory, which differ in the numbers that they capture,
-are named after these.
+machine code of kernels in typed lists by name: kernels of one factory, which differ in the numbers and the kernels that
+they capture, are named after these, a captured kernel by the content of the files that it is made of.
 """
 
 from __future__ import annotations
@@ -34,6 +34,8 @@ import warnings
 import numba
 import numba.typed
 from numba import types
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 from numba.core.typing import Signature
 
 # Kernels in typed lists are numba's first-class functions, which it calls experimental at every compilation.
@@ -74,6 +76,29 @@ def _cache_folder():
 _folder = _cache_folder()
 
 
+class _CacheByName(FunctionCache):
+    """Machine code of a function whose name tells what it captures.
+
+    numba's own key is made of what the function captures as bytes, which of a kernel differ in every process.
+    """
+
+    def _index_key(self, signature, codegen):
+        return signature, codegen.magic_tuple(), self._py_func.__qualname__
+
+
+def _njit(function, signature, options):
+    dispatcher = numba.njit(**options)(function)
+    captured = [cell.cell_contents for cell in function.__closure__ or ()]
+    if any(isinstance(value, Dispatcher) for value in captured):
+        dispatcher._cache = _CacheByName(function)
+    else:
+        dispatcher.enable_caching()
+    if signature is not None:
+        dispatcher.compile(signature)
+        dispatcher.disable_compile()
+    return dispatcher
+
+
 def _compile(decorator, function):
     default = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = _folder or default
@@ -83,10 +108,26 @@ def _compile(decorator, function):
         numba.config.CACHE_DIR = default
 
 
+@functools.cache
+def _content(path):
+    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+
+
+def _told(value):
+    """What tells a captured value apart from all others, the same in every process."""
+    if not isinstance(value, Dispatcher):
+        return repr(value)
+    function = value.py_func
+    path, names = function.__code__.co_filename, function.__code__.co_names
+    called = [function.__globals__.get(name) for name in names]
+    elsewhere = [k for k in called if isinstance(k, Dispatcher) and k.py_func.__code__.co_filename != path]
+    return " ".join([function.__module__, function.__qualname__, _content(path), *map(_told, elsewhere)])
+
+
 def _named(function):
     """A function whose name tells apart what it captures."""
     if function.__closure__:
-        captured = repr([cell.cell_contents for cell in function.__closure__])
+        captured = str([_told(cell.cell_contents) for cell in function.__closure__])
         function.__qualname__ += "_" + hashlib.sha256(captured.encode()).hexdigest()[:16]
     return function
 
@@ -96,9 +137,8 @@ def kernel(signature=None, **options):
 
     Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
     """
-    arguments = () if signature is None else (signature,)
-    options = {"cache": True, "error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
-    return lambda function: _compile(numba.njit(*arguments, **options), _named(function))
+    options = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
+    return lambda function: _compile(lambda named: _njit(named, signature, options), _named(function))
 
 
 def ufunc(signatures):

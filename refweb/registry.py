@@ -59,6 +59,14 @@ OBSERVABLES = {
 }
 """Quantities of ``[[observe]]``."""
 
+SHAPES = {
+    "sphere": "refweb.net.shapes.sphere:Sphere",
+    "ring": "refweb.net.shapes.ring:Ring",
+    "box": "refweb.net.shapes.box:Box",
+    "cylinder": "refweb.net.shapes.cylinder:Cylinder",
+}
+"""Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
+
 
 class Method(NamedTuple):
     """A method of dynamics: where its integrator lives, and the keys of ``[solve]`` that mean something to it.

@@ -270,11 +270,16 @@ class Table:
         """Refuse impossible combinations of values; the default refuses none."""
 
     @classmethod
+    def keys(cls, given):
+        """Names of the keys that the table may have when it is read from a dict."""
+        return [f.name for f in dataclasses.fields(cls)]
+
+    @classmethod
     def read(cls, where, given):
         """The table from a dict; ``where`` (such as ``[gravity]``) begins every message."""
         if not isinstance(given, dict):
             raise InputError(f"{where} = {shown(given)} must be a table")
-        known = [f.name for f in dataclasses.fields(cls)]
+        known = cls.keys(given)
         for key in given:
             if key not in known:
                 raise InputError(f"{where} {short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")

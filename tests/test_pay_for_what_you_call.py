@@ -17,7 +17,7 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
-from refweb.registry import EFFECTS, OBSERVABLES, WEBS, load
+from refweb.registry import EFFECTS, OBSERVABLES, SHAPES, WEBS, load
 from refweb.scene import SHIPPED_SCENES
 
 ROOT = pathlib.Path(refweb.__file__).parent
@@ -26,11 +26,11 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 # Modules
 
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
-EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.shapes", "net.rigid_body"}
+EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.rigid_body"}
 EVERY |= {"results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
 EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "provenance", "run_status")}
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
-"""What every scene needs: a web, its lines and their law, a system, results; kinds of bodies are four numbers."""
+"""What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
 TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium", "system.unsupported_parts"}
 LOAD_STEPS = {"statics.simulation", "statics.remarks"}
@@ -51,7 +51,9 @@ TABLES_OF_TIME = {"effects.time_tables"}
 BELOW = {name: TABLES_OF_TIME for name in ("load", "motion", "pressure", "thrust")}
 BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
 VECTORS = {"effects.vectors"}
-BELOW |= {"contact": {"effects.contact", "effects.contact.nearest_point", *VECTORS}, "bending": VECTORS}
+BELOW |= {"contact": {"effects.contact", "effects.contact.nearest_point", "effects.contact.pair", *VECTORS}}
+BELOW |= {"bending": VECTORS}
+GENERAL = {"effects.contact.places", "net.grown_core"}
 """What effects are made of besides their own file."""
 OBSERVED = {"reaction": {"results.observables.nodal"}}
 """What observables are made of besides their own file."""
@@ -91,13 +93,17 @@ def called(given):
         modules |= {EFFECTS[effect].split(":")[0].removeprefix("refweb.")} | BELOW.get(effect, set())
     for quantity in (observe["quantity"] for observe in given.get("observe", DEFAULT)):
         modules |= {OBSERVABLES[quantity].split(":")[0].removeprefix("refweb.")} | OBSERVED.get(quantity, set())
+    for body in given.get("body", ()):
+        modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
     if "contact" in given:
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
-        rubs = keys & {"damping", "friction"}
-        if rubs or "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"]):
-            modules |= {"effects.contact.signed_distance", "effects.contact.penalty"}
-        if rubs:
-            modules.add("effects.contact.friction")
+        general = "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"])
+        if keys & {"damping", "friction"}:
+            modules |= {"effects.contact.friction", "effects.contact.penalty", *GENERAL}
+        elif general:
+            modules |= {"effects.contact.penalty", *GENERAL}
+        if any(body.get("shape", "sphere") == "sphere" for body in given["body"]) and not keys & {"exponent"}:
+            modules.add("effects.contact.sphere")
     rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
     if solve.get("start", "web") != "web":
         modules.add("dynamics.initial_state")

@@ -2,33 +2,33 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, fields, replace
 
 import numpy as np
 
 from ..errors import InputError
 from ..messages import shown
-from ..net.rigid_body import RigidBody
-from ..net.shapes import KINDS
-from ..tables import Table, boolean, choice, real, rows, text, vector
-
-NEEDS = {
-    "sphere": ("radius",),
-    "ring": ("radius", "normal"),
-    "box": ("size",),
-    "cylinder": ("radius", "length", "axis"),
-}
-MAY = {"sphere": (), "ring": (), "box": ("axes", "rounding"), "cylinder": ("rounding",)}
-"""Keys that a shape needs, and that it may have."""
-OWN = {key for keys in (*NEEDS.values(), *MAY.values()) for key in keys}
-ROUNDING = 0.02
-"""Radius of edges, where none is given, over the smallest size."""
+from ..net.rigid_body import RigidBody, Shape
+from ..registry import SHAPES, load
+from ..tables import Table, boolean, choice, field, real, text, vector
 
 
-@dataclass(frozen=True, kw_only=True)
+def _shape(name, value):
+    return choice(*SHAPES).metadata["read"](name, value)
+
+
+def _keys(shape):
+    """Names of the keys of a shape."""
+    return [f.name for f in fields(load(SHAPES[shape]))]
+
+
+def _given(name, value):
+    return value
+
+
+@dataclass(frozen=True, kw_only=True, init=False)
 class Body(Table):
-    """A rigid body, free or fixed; boxes and cylinders are fixed.
+    """A rigid body, free or fixed; its shape has keys of its own.
 
     A body moves without turning, but for spheres and rings under friction, which turn, a ring about its normal only. A
     ring is a rigid circle that touches the web as the disc inside it would, at any distance from its plane: how deep a
@@ -39,7 +39,7 @@ class Body(Table):
     name : str
         Name in observables and files.
     shape : {"sphere", "ring", "box", "cylinder"}
-        Its shape.
+        Its shape, of `refweb.registry.SHAPES`; "sphere" by default.
     radius : float
         Radius of a sphere, a ring or a cylinder [m], > 0.
     normal : sequence of 3 float
@@ -53,8 +53,8 @@ class Body(Table):
     axis : sequence of 3 float
         Axis of a cylinder.
     rounding : float, optional
-        Radius of the edges of a box or a cylinder [m], > 0, by default `ROUNDING` of its smallest size. Contact that is
-        no deeper has a force of one direction.
+        Radius of the edges of a box or a cylinder [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of its
+        smallest size. Contact that is no deeper has a force of one direction.
     mass : float, optional
         Mass [kg], > 0; needed unless the body is fixed.
     position : sequence of 3 float
@@ -80,14 +80,8 @@ class Body(Table):
     several = True
 
     name: str = text(most=80)
-    shape: str = choice(*NEEDS, default="sphere")
-    radius: float | None = real(None, above=0, unit="m")
-    normal: tuple | None = vector(None)
-    size: tuple | None = vector(None, unit="m")
-    axes: tuple | None = rows(3, None)
-    length: float | None = real(None, above=0, unit="m")
-    axis: tuple | None = vector(None)
-    rounding: float | None = real(None, above=0, unit="m")
+    shape: str = field(_shape, "sphere")
+    form: Shape = field(_given, None)  # the keys of the shape, as its own table
     mass: float | None = real(None, above=0, unit="kg")
     position: tuple = vector(unit="m")
     velocity: tuple = vector((0.0, 0.0, 0.0), unit="m/s")
@@ -95,17 +89,49 @@ class Body(Table):
     inertia: float | None = real(None, above=0, unit="kg m²")
     fixed: bool = boolean(False)
 
+    def __init__(self, **given):
+        form = given.pop("form", None)  # of the body that this one is a copy of
+        own = {f.name: getattr(form, f.name) for f in fields(form)} if form else {}
+        for f in fields(self):
+            if f.name not in given and f.name != "form" and f.default is MISSING:
+                raise TypeError(f"Body.__init__() missing required keyword-only argument: {f.name!r}")
+            object.__setattr__(self, f.name, given.pop(f.name, f.default))
+        object.__setattr__(self, "form", {**own, **given})
+        self.__post_init__()
+
+    def __getattr__(self, key):
+        form = self.__dict__.get("form")
+        if isinstance(form, Shape) and key in _keys(self.shape):
+            return getattr(form, key)
+        raise AttributeError(f"'Body' object has no attribute {key!r}")
+
+    @classmethod
+    def keys(cls, given):
+        """Names of its keys: its own with those of its shape in their place, of all shapes where one is none of them.
+
+        What ``given`` does not ask for is not imported.
+        """
+
+        def among(*shapes):
+            own = dict.fromkeys(key for shape in shapes for key in _keys(shape))
+            return [key for f in fields(cls) for key in (own if f.name == "form" else [f.name])]
+
+        shape = given.get("shape", "sphere")
+        known = among(shape) if isinstance(shape, str) and shape in SHAPES else []
+        return known if given.keys() <= set(known) else among(*SHAPES)
+
+    def to_dict(self):
+        """The table as plain TOML values, the keys of the shape among the others."""
+        pairs = super().to_dict().items()
+        return {k: v for key, value in pairs for k, v in (value.items() if key == "form" else [(key, value)])}
+
     def check(self):
         """Refuse half a shape, a free body without mass, a fixed one that moves, a name that is no file name."""
-        for key in NEEDS[self.shape]:
-            if getattr(self, key) is None:
-                raise InputError(f'{key} is missing: shape = "{self.shape}" needs {key} = ...')
-        for key in OWN - {*NEEDS[self.shape], *MAY[self.shape]}:
-            if (value := getattr(self, key)) is not None:
-                raise InputError(f'{key} = {shown(value)} has no meaning for shape = "{self.shape}"')
-        if not self.fixed and self.shape in ("box", "cylinder"):
+        object.__setattr__(self, "form", self._form())
+        if not self.fixed and not self.form.free:
+            free = [shape for shape, reference in SHAPES.items() if load(reference).free]
             raise InputError(
-                f'fixed = false: shape = "{self.shape}" must have fixed = true; sphere and ring may be free'
+                f'fixed = false: shape = "{self.shape}" must have fixed = true; {" and ".join(free)} may be free'
             )
         if not self.fixed and self.mass is None:
             raise InputError("mass is missing: a free body needs mass = ... [kg]; fixed = true holds it")
@@ -114,45 +140,19 @@ class Body(Table):
                 raise InputError(f"{key} = {list(getattr(self, key))} must be zero where fixed = true")
         if not self.name.replace("-", "").replace("_", "").isalnum() or self.name.lower() == "web":
             raise InputError(f'name = "{self.name}" must be letters, digits, - and _, and not "web": it names files')
-        if self.size is not None and min(self.size) <= 0.0:
-            raise InputError(f"size = {list(self.size)} must be > 0 [m]")
-        self._frame()
-        if self.rounding is not None and self.rounding > 0.5 * min(self._sizes()):
-            raise InputError(f"rounding = {self.rounding:g} must be ≤ {0.5 * min(self._sizes()):g} [m], half the size")
-        along = np.linalg.norm(np.cross(self.angular_velocity, self.normal)) if self.shape == "ring" else 0.0
-        if along > 1e-9 * np.linalg.norm(self.angular_velocity) * np.linalg.norm(self.normal or 0.0):
-            raise InputError(f"angular_velocity = {list(self.angular_velocity)} must be along the normal of the ring")
+        self.form.refuse_turning(self.angular_velocity)
 
-    def _sizes(self):
-        return self.size if self.shape == "box" else (2.0 * self.radius, self.length or math.inf)
-
-    def _frame(self):
-        """Unit vectors of the axes, shape (3, 3); of a ring or a cylinder its own comes third."""
-        if self.shape == "sphere" or (self.shape == "box" and self.axes is None):
-            return np.eye(3)
-        if self.shape == "box":
-            if len(self.axes) != 2:
-                raise InputError(f"axes = {shown(self.axes)} must be two vectors, not {len(self.axes)}")
-            first, second = (_unit(f"axes[{i}]", axis) for i, axis in enumerate(self.axes))
-            if abs(first @ second) > 1e-6:
-                raise InputError(f"axes = {shown(self.axes)} must be at right angles")
-            second = _unit("axes", second - (first @ second) * first)
-            return np.array([first, second, np.cross(first, second)])
-        key = "normal" if self.shape == "ring" else "axis"
-        own = _unit(key, getattr(self, key))
-        first = np.cross(own, np.eye(3)[np.abs(own).argmin()])
-        first /= np.linalg.norm(first)
-        return np.array([np.cross(first, own), first, own])
-
-    def _grown(self):
-        """(radius of growth, half sizes of the core) of `refweb.effects.contact.signed_distance`."""
-        if self.shape == "sphere":
-            return self.radius, (0.0, 0.0, 0.0)
-        if self.shape == "ring":
-            return self.radius, (0.0, 0.0, math.inf)
-        edge = self.rounding or ROUNDING * min(self._sizes())
-        half = self.size if self.shape == "box" else (2.0 * self.radius, 2.0 * self.radius, self.length)
-        return edge, tuple(max(0.5 * size - edge, 0.0) for size in half)
+    def _form(self):
+        """The table of the shape, from what is given of its keys."""
+        kind, given = load(SHAPES[self.shape]), {k: value for k, value in self.form.items() if value is not None}
+        for f in fields(kind):
+            if f.default is MISSING and f.name not in given:
+                raise InputError(f'{f.name} is missing: shape = "{self.shape}" needs {f.name} = ...')
+        for key in given.keys() - _keys(self.shape):
+            if not any(key in _keys(shape) for shape in SHAPES):
+                raise TypeError(f"Body.__init__() got an unexpected keyword argument {key!r}")
+            raise InputError(f'{key} = {shown(given[key])} has no meaning for shape = "{self.shape}"')
+        return kind(**given)
 
     def extend(self, net):
         """The net with one more row."""
@@ -160,18 +160,13 @@ class Body(Table):
             raise InputError(f'name = "{self.name}" stands twice: names of bodies are unique')
         if not self.fixed and net.quasi_static:
             raise InputError("fixed = false: a free body has no place in statics; fixed = true holds it")
-        radius, core = self._grown()
-        share = {"sphere": 0.4, "ring": 1.0}.get(self.shape, 0.0)
         body = RigidBody(
             name=self.name,
             row=len(net.points),
-            radius=radius,
+            shape=self.form,
             velocity=self.velocity,
             fixed=self.fixed,
-            kind=KINDS[self.shape],
-            core=core,
-            axes=tuple(map(tuple, self._frame().tolist())),
-            inertia=self.inertia or share * (self.mass or 0.0) * radius**2,
+            inertia=self.inertia or self.form.inertia(self.mass or 0.0),
             angular_velocity=self.angular_velocity,
         )
         return replace(
@@ -180,10 +175,3 @@ class Body(Table):
             mass=np.append(net.mass, self.mass or 0.0),
             bodies=(*net.bodies, body),
         )
-
-
-def _unit(name, axis):
-    size = np.linalg.norm(axis)
-    if not size > 0.0:
-        raise InputError(f"{name} = {list(axis)} must not be zero")
-    return np.array(axis) / size

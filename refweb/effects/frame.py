@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..net.shapes import RING
 from ..tables import Table, vector
 from .base import Family, column
 
@@ -147,7 +146,10 @@ class Frame(Table):
 
         The centrifugal force lowers frequencies and makes no step of an explicit method shorter: it needs no bound.
         """
-        heavy, spins = net.heavy, np.array([b.spin for b in net.bodies if b.spin is not None and b.kind != RING], int)
+        heavy, spins = (
+            net.heavy,
+            np.array([b.spin for b in net.bodies if b.spin is not None and not b.shape.planar], int),
+        )
         pulled = column(heavy), self._numbers(net.mass[heavy], net.points[heavy])
         halves = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
         rows = np.concatenate([heavy, spins])

@@ -1,15 +1,127 @@
-"""Rigid bodies: rows of the unknowns after those of the web's nodes."""
+"""Rigid bodies: rows of the unknowns after those of the web's nodes, and what a shape has to say.
+
+How to write a body shape: a file with a class, whose fields are the keys of ``[[body]]``, and one line in
+`refweb.registry.SHAPES`, here ``"wall": "refweb.net.shapes.wall:Wall"``. Its keys are then read, checked and written,
+and it is touched, rubbed and drawn, as any other shape. All that lies behind a plane:
+
+    from dataclasses import dataclass
+    from math import inf
+
+    import numpy as np
+
+    from refweb.kernels import kernel
+    from refweb.net.rigid_body import Grown, Shape, axes_about
+    from refweb.tables import real, vector
+
+    @kernel()
+    def depth(p, grown):  # of a point from the centre along the axes [m]; its gradient; its Hessian 00 01 02 11 12 22
+        return -p[2], (0.0, 0.0, -1.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @dataclass(frozen=True, kw_only=True)
+    class Wall(Shape):
+        normal: tuple = vector()  # a key that it needs
+        drawn: float = real(1.0, above=0, unit="m")  # a key that it may have: the edge of the square that is drawn
+
+        def check(self):  # raises refweb.errors.InputError for what cannot be: here a normal that is zero
+            self.frame()
+
+        def grown(self):  # radius of growth and half sizes of the core: the least box around both is out of reach
+            return Grown(0.0, (inf, inf, inf))
+
+        def frame(self):  # unit vectors of the axes; x, y and z where there is none
+            return axes_about("normal", self.normal)
+
+        def depth(self):
+            return depth
+
+        def surface(self):  # points and triangles about the centre, along the axes
+            corners = 0.5 * self.drawn * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+            return corners, np.array([(0, 1, 2), (0, 2, 3)])
+
+A body is convex. Its depth is the distance from its surface, negative outside: concave, of a gradient of length 1 that
+does not jump as far as contact may go, which is why edges are rounded: ``grown`` is a core, and the radius by which it
+has grown on all sides. Where the core is a box, or round about the third axis, ``grown`` is enough: its depth and its
+surface are those of `Shape`, which says what else there is.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from .shapes import CYLINDER, RING, SPHERE
+from ..errors import InputError
+from ..tables import Table
 
-TUBE = 0.04
-"""Thickness of the tube that a ring is drawn as, over its radius."""
+
+class Grown(NamedTuple):
+    """A core about the centre of a body, grown by a radius; a record that kernels read.
+
+    Attributes
+    ----------
+    radius : float
+        Radius of growth [m].
+    core : tuple of 3 float
+        Half sizes of the core along the body's axes [m]; infinite where it has no end.
+    round : bool
+        Whether the core is a cylinder about the third axis, of the radius that stands first, and not a box.
+    """
+
+    radius: float
+    core: tuple
+    round: bool = False
+
+
+class Shape(Table):
+    """What a body looks like: its keys in ``[[body]]`` as fields of a table, and what follows from them alone.
+
+    Attributes
+    ----------
+    free : bool
+        Whether a body of this shape may move: it looks the same however friction turns it.
+    once : bool
+        Whether its core is a point: a sphere touches a line once, at the deepest place, other shapes each element at
+        both ends and once in between.
+    planar : bool
+        Whether it turns about its third axis only.
+    """
+
+    free = False
+    once = False
+    planar = False
+
+    def grown(self):
+        """Its core and the radius of growth, a `Grown`."""
+        raise NotImplementedError
+
+    def frame(self):
+        """Unit vectors of its axes, right-handed, shape (3, 3)."""
+        return np.eye(3)
+
+    def inertia(self, mass):
+        """Moment of inertia of a mass [kg m²], where none is given."""
+        return 0.0
+
+    def refuse_turning(self, angular_velocity):
+        """Refuse an angular velocity [rad/s] that it cannot have."""
+
+    def depth(self):
+        """Kernel of its depth, as `refweb.net.grown_core.depth`, which is that of boxes and of round cores."""
+        from .grown_core import depth
+
+        return depth
+
+    def farthest(self, normals):
+        """Points of the core (n, 3) [m] that are farthest along unit vectors (n, 3)."""
+        return np.sign(normals) * self.grown().core
+
+    def surface(self):
+        """Its surface about the centre as points (n, 3) [m] and triangles (t, 3), outward."""
+        from .surfaces import sphere
+
+        normals, triangles = sphere()
+        return self.grown().radius * normals + self.farthest(normals), triangles
 
 
 @dataclass(frozen=True)
@@ -22,18 +134,12 @@ class RigidBody:
         Its name.
     row : int
         Its row of x and v.
-    radius : float
-        Radius of a sphere or a ring, of the edges of a box or a cylinder [m].
+    shape : Shape
+        What it looks like.
     velocity : tuple of 3 float
         Initial velocity [m/s].
     fixed : bool
         Whether it does not move.
-    kind : int
-        Kind of its shape, see `refweb.net.shapes`.
-    core : tuple of 3 float
-        Half sizes of the core that ``radius`` lets grow [m]; of a cylinder's the radius, twice, and half its length.
-    axes : tuple of 3 tuples of 3 float
-        Unit vectors of its axes.
     inertia : float
         Moment of inertia [kg m²].
     angular_velocity : tuple of 3 float
@@ -44,15 +150,22 @@ class RigidBody:
 
     name: str
     row: int
-    radius: float
+    shape: Shape
     velocity: tuple
     fixed: bool
-    kind: int = SPHERE
-    core: tuple = (0.0, 0.0, 0.0)
-    axes: tuple = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     inertia: float = 0.0
     angular_velocity: tuple = (0.0, 0.0, 0.0)
     spin: int | None = None
+
+    @property
+    def radius(self):
+        """Radius of growth of its shape [m]."""
+        return self.shape.grown().radius
+
+    @property
+    def core(self):
+        """Half sizes of the core of its shape [m]."""
+        return self.shape.grown().core
 
     @property
     def thickness(self):
@@ -64,69 +177,28 @@ class RigidBody:
         """Largest distance from its centre to its surface as a web sees it [m]; infinite for a ring."""
         return self.radius + float(np.linalg.norm(self.core))
 
+    def surface(self, centre):
+        """Its surface about a centre as points (n, 3) [m] and triangles (t, 3), outward."""
+        local, triangles = self.shape.surface()
+        return np.asarray(centre) + local @ self.shape.frame(), triangles
+
 
 def row_names(bodies):
     """Names of the rows behind those of the nodes: of bodies, and of their rotations, with a dot."""
     return [body.name for body in bodies] + [f"{body.name}.spin" for body in bodies if body.spin is not None]
 
 
-def surface(body, centre):
-    """Surface of a body as points (n, 3) [m] and triangles (t, 3), outward: a ring is a thin tube."""
-    if body.kind == RING:
-        local, triangles = _tube(body.radius)
-    else:
-        sphere, triangles = _sphere()
-        local = body.radius * sphere + _corners(body, sphere)
-    return np.asarray(centre) + local @ np.array(body.axes), triangles
+def unit(name, axis):
+    """The unit vector along a key's value; zero is refused."""
+    size = np.linalg.norm(axis)
+    if not size > 0.0:
+        raise InputError(f"{name} = {list(axis)} must not be zero")
+    return np.array(axis) / size
 
 
-def _corners(body, normals):
-    """Points of the core that are farthest along normals."""
-    side = np.sign(normals)
-    if body.kind == CYLINDER:
-        around = np.linalg.norm(normals[:, :2], axis=1, keepdims=True)
-        side[:, :2] = normals[:, :2] / np.where(around > 0.0, around, 1.0)
-    return side * body.core
-
-
-def _sphere():
-    """Unit sphere as points and triangles."""
-    level = 24
-    polar = np.linspace(0.0, np.pi, level // 2 + 1)[1:-1]
-    around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)
-    rings = np.stack(
-        [
-            np.outer(np.sin(polar), np.cos(around)),
-            np.outer(np.sin(polar), np.sin(around)),
-            np.outer(np.cos(polar), np.ones(level)),
-        ],
-        axis=-1,
-    ).reshape(-1, 3)
-    points = np.vstack([rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    here = np.arange(level)
-    after = (here + 1) % level
-    last, top, bottom = level * (len(polar) - 1), len(rings), len(rings) + 1
-    triangles = [np.column_stack([np.full(level, top), here, after])]
-    for ring in range(len(polar) - 1):
-        triangles += _band(ring * level + here, ring * level + after, level)
-    triangles.append(np.column_stack([np.full(level, bottom), last + after, last + here]))
-    return points, np.vstack(triangles)
-
-
-def _tube(radius):
-    """Ring about the third axis as points and triangles; its outer edge has the radius."""
-    level, sides, thin = 48, 8, TUBE * radius
-    around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)[:, None]
-    across = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
-    out = radius - thin + thin * np.cos(across)
-    points = np.stack([out * np.cos(around), out * np.sin(around), thin * np.sin(across) + 0.0 * around], axis=-1)
-    here = np.arange(level * sides).reshape(level, sides)
-    after = np.roll(here, -1, axis=1)
-    return points.reshape(-1, 3), np.vstack(
-        [t for i in range(level) for t in _band(here[i], after[i], here[(i + 1) % level] - here[i])]
-    )
-
-
-def _band(here, after, step):
-    """Triangles between a row of points, each with the one after it, and the row a step on."""
-    return [np.column_stack([here, here + step, after + step]), np.column_stack([here, after + step, after])]
+def axes_about(name, axis):
+    """Unit vectors, shape (3, 3), the third along a key's value."""
+    own = unit(name, axis)
+    first = np.cross(own, np.eye(3)[np.abs(own).argmin()])
+    first /= np.linalg.norm(first)
+    return np.array([np.cross(first, own), first, own])

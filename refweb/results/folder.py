@@ -20,7 +20,7 @@ import numpy as np
 
 from ..errors import InputError, SolverError
 from ..messages import short
-from ..net.rigid_body import row_names, surface
+from ..net.rigid_body import row_names
 
 OWN = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
@@ -121,7 +121,7 @@ def write_body(path, body, state):
     """Write the surface of a body as VTU, at its current position."""
     import meshio
 
-    points, triangles = surface(body, state.position[body.row])
+    points, triangles = body.surface(state.position[body.row])
     data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
     point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
     mesh = meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)

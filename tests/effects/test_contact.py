@@ -11,8 +11,6 @@ from scipy.special import beta
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
-from refweb.effects.contact.signed_distance import depth
-from refweb.net.rigid_body import surface
 from refweb.results.state import State
 
 GRAVITY = 9.81
@@ -86,8 +84,9 @@ def brute_depth(shape, points, seed=0):
 def own_depth(shape, points):
     """Depth, gradient and Hessian as contact has them."""
     (body,) = rigid(shape).extend(nets.skew_net()).bodies
-    axes = np.array(body.axes)
-    values = [depth(body.kind, *(axes @ p), body.radius, *body.core) for p in points]
+    axes = body.shape.frame()
+    depth, grown = body.shape.depth(), body.shape.grown()
+    values = [depth(tuple(axes @ p), grown) for p in points]
     hessian = np.array([[[h[0], h[1], h[2]], [h[1], h[3], h[4]], [h[2], h[4], h[5]]] for *_, h in values])
     gradient = np.array([g for _, g, _ in values])
     return np.array([d for d, *_ in values]), gradient @ axes, axes.T @ hessian @ axes
@@ -139,7 +138,7 @@ def test_derivatives_of_depth(shape):
 def test_drawn_surface_lies_on_the_shape(shape):
     """Points of the surface have the depth 0, those of the tube that a ring is drawn as 0 at its outer edge."""
     (body,) = rigid(shape).extend(nets.skew_net()).bodies
-    points, triangles = surface(body, (1.0, 2.0, 3.0))
+    points, triangles = body.surface((1.0, 2.0, 3.0))
     deep = own_depth(shape, points - [1.0, 2.0, 3.0])[0]
     if shape == "ring":
         assert abs(deep.min()) < 1e-15 and deep.max() < 0.1 * 0.3
@@ -575,7 +574,7 @@ def test_shape_under_a_heavy_cable(shape):
     np.testing.assert_allclose(found["held"] - found["push"], weight, rtol=1e-8)
     assert found["push"] < -0.1 * weight
     points = solution.positions[:41] - np.array(body.position)
-    axes = np.array(body.extend(nets.skew_net()).bodies[0].axes)
+    axes = body.extend(nets.skew_net()).bodies[0].shape.frame()
     turned = points @ axes.T if shape in ("ring", "cylinder") else points
     deep = brute_depth(shape, turned)
     assert deep.max() <= 1.05 * -found["push"] / 1e4

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from refweb.net.rigid_body import surface
 from refweb.pictures import render as drawing
 from refweb.pictures.camera import View
 
@@ -39,7 +38,7 @@ class Shown:
         """The web of a solution, in its last state or another."""
         state = state or solution.state
         net = state.system.net
-        bodies = [surface(body, state.position[body.row]) for body in net.bodies]
+        bodies = [body.surface(state.position[body.row]) for body in net.bodies]
         return cls(title, state.position[: len(net.web.points)], net.web.lines, state.stress, state.slack, bodies)
 
 

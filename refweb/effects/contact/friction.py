@@ -1,6 +1,6 @@
 """Losses of contact, by damping and by friction, as compiled kernels.
 
-At a contact, see `refweb.effects.contact.signed_distance`, let N₀ = k W δ^p be the push of the penalty, n = −∂δ/∂x the
+At a contact, see `refweb.effects.contact.places`, let N₀ = k W δ^p be the push of the penalty, n = −∂δ/∂x the
 normal, u the velocity of the line's point relative to the body's, with the rate of depth δ̇ = −n·u and the slip u_t = u
 + δ̇ n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossley [1]_ and by Coulomb, regularised,
 
@@ -21,26 +21,54 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
-from ...net.shapes import RING, SPHERE
 from ..vectors import cross, dot
-from .nearest_point import AWAY, FRICTION, KIND, LOSS, PENALTY, SLIP, lightness, share
-from .penalty import SHALLOW, foreseen, lowered, raised, thickness, turn
-from .signed_distance import PLACES, along_axes, bent, contacts, from_axes, moves, window, within
+from .nearest_point import lightness, share
+from .pair import pair_of
+from .penalty import SHALLOW, foresight, power_of_depth, push_of, slope_of_power, thickness, turn_block
+from .places import PLACES, along_axes, from_axes, hessian_times, place_moves, places, window
 
 
-@kernel()
-def turning(data, c, nodes, w):
+class Slip(NamedTuple):
+    """How the line moves at a contact, along the axes of the body.
+
+    Attributes
+    ----------
+    velocity : tuple of 3 float
+        u, of the line's point relative to the body's [m/s].
+    slope : tuple of 3 float
+        Of the line's velocity along the line, by ξ [m/s].
+    turning : tuple of 3 float
+        Angular velocity of the body [rad/s].
+    """
+
+    velocity: tuple
+    slope: tuple
+    turning: tuple
+
+
+class Loss(NamedTuple):
+    """(max(d δ̇, −1), N, q, √(|u_t|² + v_s²)) of a contact."""
+
+    damped: float
+    normal: float
+    direction: tuple
+    size: float
+
+
+@kernel(forceinline=True)
+def turned_by(planar, w):
     """What of an angular velocity, or a moment, turns the body: of a ring that about its normal."""
-    return (0.0, 0.0, w[2]) if data[c, AWAY + 3 * nodes + KIND] == RING else w
+    return (0.0, 0.0, w[2]) if planar else w
 
 
 @kernel()
-def slipping(v, cells, data, c, nodes, spins, functions, place, y):
-    """(velocity of the line's point relative to the body's, its slope along the line, angular velocity), along axes."""
+def slip_of(v, cells, c, nodes, spins, functions, pair, place, y):
+    """The `Slip` at a place of cell c."""
     b, w = cells[c, nodes], (0.0, 0.0, 0.0)
     u0, u1, u2 = -v[b, 0], -v[b, 1], -v[b, 2]
     s0 = s1 = s2 = 0.0
@@ -49,30 +77,30 @@ def slipping(v, cells, data, c, nodes, spins, functions, place, y):
         value, slope = share(a, nodes, functions, place)
         u0, u1, u2 = u0 + value * v[i, 0], u1 + value * v[i, 1], u2 + value * v[i, 2]
         s0, s1, s2 = s0 + slope * v[i, 0], s1 + slope * v[i, 1], s2 + slope * v[i, 2]
-    u, s = along_axes(data, c, nodes, (u0, u1, u2)), along_axes(data, c, nodes, (s0, s1, s2))
+    u, s = along_axes(pair.axes, (u0, u1, u2)), along_axes(pair.axes, (s0, s1, s2))
     if spins:
         r = cells[c, nodes + 1]
-        w = turning(data, c, nodes, along_axes(data, c, nodes, (v[r, 0], v[r, 1], v[r, 2])))
+        w = turned_by(pair.planar, along_axes(pair.axes, (v[r, 0], v[r, 1], v[r, 2])))
         wy = cross(w, y)
         u = u[0] - wy[0], u[1] - wy[1], u[2] - wy[2]
-    return u, s, w
+    return Slip(u, s, w)
 
 
 @kernel()
-def lost(data, c, nodes, push, g, u):
-    """(max(d δ̇, −1), N, q, √(|u_t|² + v_s²)) of the push N₀."""
-    at, rate = AWAY + 3 * nodes, dot(g, u)
-    damped = max(data[c, at + LOSS] * rate, -1.0)
+def hunt_crossley(pair, push, g, u):
+    """The `Loss` of the push N₀."""
+    rate = dot(g, u)
+    damped = max(pair.damping * rate, -1.0)
     t = u[0] - rate * g[0], u[1] - rate * g[1], u[2] - rate * g[2]
-    size = math.sqrt(dot(t, t) + data[c, at + SLIP] ** 2)
-    return damped, push * (1.0 + damped), (t[0] / size, t[1] / size, t[2] / size), size
+    size = math.sqrt(dot(t, t) + pair.slip_velocity**2)
+    return Loss(damped, push * (1.0 + damped), (t[0] / size, t[1] / size, t[2] / size), size)
 
 
 @kernel()
-def rubbed(data, c, nodes, push, g, u):
+def friction_force(pair, push, g, u):
     """F along the axes of the body."""
-    damped, normal, q, _ = lost(data, c, nodes, push, g, u)
-    drag = data[c, AWAY + 3 * nodes + FRICTION] * normal
+    damped, normal, q, _ = hunt_crossley(pair, push, g, u)
+    drag = pair.friction * normal
     return (
         -push * damped * g[0] - drag * q[0],
         -push * damped * g[1] - drag * q[1],
@@ -81,28 +109,26 @@ def rubbed(data, c, nodes, push, g, u):
 
 
 @kernel()
-def by_velocity(data, c, nodes, push, g, u, matrix):
+def by_velocity(pair, push, g, u, matrix):
     """Write ∂F/∂u."""
-    at = AWAY + 3 * nodes
-    damped, normal, q, size = lost(data, c, nodes, push, g, u)
-    friction, slope = data[c, at + FRICTION], push * data[c, at + LOSS] if damped > -1.0 else 0.0
-    drag = friction * normal / size
+    damped, normal, q, size = hunt_crossley(pair, push, g, u)
+    slope = push * pair.damping if damped > -1.0 else 0.0
+    drag = pair.friction * normal / size
     for i in range(3):
         for j in range(3):
             along = g[i] * g[j]
             across = (1.0 if i == j else 0.0) - along - q[i] * q[j]
-            matrix[i, j] = -slope * along - drag * across - friction * slope * q[i] * g[j]
+            matrix[i, j] = -slope * along - drag * across - pair.friction * slope * q[i] * g[j]
 
 
 @kernel()
-def by_place(data, c, nodes, push, steep, g, bend, u, matrix):
-    """Write ∂F/∂y at a given u; ``steep`` is ∂N₀/∂δ."""
-    at = AWAY + 3 * nodes
-    damped, normal, q, size = lost(data, c, nodes, push, g, u)
-    friction, slope = data[c, at + FRICTION], push * data[c, at + LOSS] if damped > -1.0 else 0.0
-    rate, turned = dot(g, u), bent(bend, u)
+def by_place(pair, push, steep, g, bend, u, matrix):
+    """Write ∂F/∂y at a given u; ``steep`` is ∂N₀/∂δ, ``bend`` the Hessian of the depth."""
+    damped, normal, q, size = hunt_crossley(pair, push, g, u)
+    slope = push * pair.damping if damped > -1.0 else 0.0
+    rate, turned = dot(g, u), hessian_times(bend, u)
     h = ((bend[0], bend[1], bend[2]), (bend[1], bend[3], bend[4]), (bend[2], bend[4], bend[5]))
-    qh = bent(bend, q)
+    qh = hessian_times(bend, q)
     for j in range(3):
         pushed, faster = steep * g[j], slope * turned[j]  # ∂N₀/∂y, N₀ ∂(d δ̇)/∂y
         pressed = pushed * (1.0 + damped) + faster  # ∂N/∂y
@@ -110,19 +136,89 @@ def by_place(data, c, nodes, push, steep, g, bend, u, matrix):
         for i in range(3):
             slid = -rate * h[i][j] - g[i] * turned[j] + q[i] * along  # size ∂q/∂y
             matrix[i, j] = -(pushed * damped + faster) * g[i] - push * damped * h[i][j]
-            matrix[i, j] -= friction * (pressed * q[i] + normal * slid / size)
+            matrix[i, j] -= pair.friction * (pressed * q[i] + normal * slid / size)
+
+
+@kernel(forceinline=True)
+def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_u):
+    """Add what a contact has of −∂f/∂x, along the axes of the body.
+
+    ``z`` is what `place_moves` writes; ``by_y`` and ``by_u (3, 3)`` are space to work in.
+    """
+    c, place, pair, (y, d, _, deep, g, bend) = touch.c, touch.place, touch.pair, touch.spot
+    w, w1, _ = window(pair.once, place, touch.inner)
+    push = push_of(touch)
+    steep = pair.stiffness * w * slope_of_power(pair.exponent, deep)
+    u, s, turns = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
+    own = friction_force(pair, push, g, u)
+    by_velocity(pair, push, g, u, by_u)
+    by_place(pair, push, steep, g, bend, u, by_y)
+    for b in range(nodes + 1):
+        part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
+        for j in range(3):
+            step = z[b, j]
+            dy = (
+                step * d[0] + (part if j == 0 else 0.0),
+                step * d[1] + (part if j == 1 else 0.0),
+                step * d[2] + (part if j == 2 else 0.0),
+            )
+            wy = cross(turns, dy)
+            du = step * s[0] - wy[0], step * s[1] - wy[1], step * s[2] - wy[2]
+            fading = step * w1 / w
+            change = (
+                dot(by_y[0], dy) + dot(by_u[0], du) + fading * own[0],
+                dot(by_y[1], dy) + dot(by_u[1], du) + fading * own[1],
+                dot(by_y[2], dy) + dot(by_u[2], du) + fading * own[2],
+            )
+            for a in range(nodes):
+                value, slope = share(a, nodes, functions, place)
+                for i in range(3):
+                    blocks[c, 3 * a + i, 3 * b + j] -= value * change[i] + slope * step * own[i]
+            for i in range(3):
+                blocks[c, 3 * nodes + i, 3 * b + j] += change[i]
+            if spins:
+                one, two = cross(dy, own), cross(y, change)
+                moment = turned_by(pair.planar, (one[0] + two[0], one[1] + two[1], one[2] + two[2]))
+                for i in range(3):
+                    blocks[c, 3 * nodes + 3 + i, 3 * b + j] += moment[i]
+
+
+@kernel(forceinline=True)
+def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
+    """Add what a contact has of −∂f/∂v, along the axes of the body; ``by_u (3, 3)`` is space to work in."""
+    c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
+    u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
+    by_velocity(pair, push_of(touch), touch.spot.gradient, u, by_u)
+    for b in range(nodes + 1 + spins):
+        part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
+        for j in range(3):
+            unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
+            du = part * unit[0], part * unit[1], part * unit[2]
+            if b > nodes:
+                du = cross(y, turned_by(pair.planar, unit))
+            change = dot(by_u[0], du), dot(by_u[1], du), dot(by_u[2], du)
+            for i in range(3):
+                for a in range(nodes):
+                    value = share(a, nodes, functions, place)[0]
+                    blocks[c, 3 * a + i, 3 * b + j] -= value * change[i]
+                blocks[c, 3 * nodes + i, 3 * b + j] += change[i]
+            if spins:
+                moment = turned_by(pair.planar, cross(y, change))
+                for i in range(3):
+                    blocks[c, 3 * nodes + 3 + i, 3 * b + j] += moment[i]
 
 
 @kernel()
-def spread(most, mass, rates, cells, data, c, nodes, spins):
+def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
     """Add the row sums of the contacts of an element, with ∂F/∂u, or ∂F/∂y, of at most ``most`` each.
 
     Unknowns of the body are scaled as in `refweb.effects.contact.nearest_point.lightness`, and its rotation likewise.
     """
-    delta, thick, b = lightness(mass, cells, c, nodes), thickness(data, c, nodes), cells[c, nodes]
+    pair = pair_of(data, c, nodes)
+    delta, thick, b = lightness(mass, cells, c, nodes), thickness(pair.shape), cells[c, nodes]
     most *= 1.0 if nodes == 2 else float(nodes * nodes)
     near, all_of = 1.6, 3.0  # 1 + max W N of a node; both ends and one between
-    if data[c, AWAY + 3 * nodes + KIND] == SPHERE:
+    if pair.once:
         near = all_of = 1.0
     spun = 0.0
     if spins:
@@ -136,17 +232,19 @@ def spread(most, mass, rates, cells, data, c, nodes, spins):
 
 
 @functools.cache
-def kernels(pieces, nodes, functions, spins):
+def kernels(depth, pieces, nodes, functions, spins):
     """Force, stiffness and its bound, damping and its bound.
 
     Parameters
     ----------
-    pieces, nodes, functions
+    depth, pieces, nodes, functions
         See `refweb.effects.contact.penalty.kernels`.
     spins : int
         1 where the last row of a cell is the rotation of the body, else 0.
     """
     arity = nodes + 1 + spins
+    _, _, contacts, touch_of = places(depth)
+    foreseen = foresight(depth)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -154,19 +252,18 @@ def kernels(pieces, nodes, functions, spins):
         out[:, 0] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                y, _, _, deep, g, _ = within(x, cells, data, c, nodes, functions, place)
-                push = data[c, PENALTY] * window(data, c, nodes, place, inner)[0] * raised(data, c, nodes, deep)
-                u, _, _ = slipping(v, cells, data, c, nodes, spins, functions, place, y)
-                own = rubbed(data, c, nodes, push, g, u)
+                touch = touch_of(x, cells, data, nodes, functions, found, n)
+                c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
+                u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
+                own = friction_force(pair, push_of(touch), touch.spot.gradient, u)
                 out[c, 0] += dot(own, u)
-                pull = from_axes(data, c, nodes, own)
+                turned = from_axes(pair.axes, own)
                 for k in range(3):
                     for a in range(nodes):
-                        f[cells[c, a], k] += share(a, nodes, functions, place)[0] * pull[k]
-                    f[cells[c, nodes], k] -= pull[k]
+                        f[cells[c, a], k] += share(a, nodes, functions, place)[0] * turned[k]
+                    f[cells[c, nodes], k] -= turned[k]
                 if spins:
-                    moment = from_axes(data, c, nodes, turning(data, c, nodes, cross(y, own)))
+                    moment = from_axes(pair.axes, turned_by(pair.planar, cross(y, own)))
                     for k in range(3):
                         f[cells[c, nodes + 1], k] -= moment[k]
 
@@ -177,46 +274,11 @@ def kernels(pieces, nodes, functions, spins):
         blocks[:] = 0.0
         for first in range(0, cells.shape[0] if not definite else 0, pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                y, d, e, deep, g, bend = within(x, cells, data, c, nodes, functions, place)
-                moves(data, c, nodes, functions, place, inner, d, e, deep, g, bend, z)
-                w, w1, _ = window(data, c, nodes, place, inner)
-                push = data[c, PENALTY] * w * raised(data, c, nodes, deep)
-                steep = data[c, PENALTY] * w * lowered(data, c, nodes, deep)
-                u, s, turns = slipping(v, cells, data, c, nodes, spins, functions, place, y)
-                own = rubbed(data, c, nodes, push, g, u)
-                by_velocity(data, c, nodes, push, g, u, by_u)
-                by_place(data, c, nodes, push, steep, g, bend, u, by_y)
-                for b in range(nodes + 1):
-                    part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
-                    for j in range(3):
-                        step = z[b, j]
-                        dy = (
-                            step * d[0] + (part if j == 0 else 0.0),
-                            step * d[1] + (part if j == 1 else 0.0),
-                            step * d[2] + (part if j == 2 else 0.0),
-                        )
-                        wy = cross(turns, dy)
-                        du = step * s[0] - wy[0], step * s[1] - wy[1], step * s[2] - wy[2]
-                        fading = step * w1 / w
-                        change = (
-                            dot(by_y[0], dy) + dot(by_u[0], du) + fading * own[0],
-                            dot(by_y[1], dy) + dot(by_u[1], du) + fading * own[1],
-                            dot(by_y[2], dy) + dot(by_u[2], du) + fading * own[2],
-                        )
-                        for a in range(nodes):
-                            value, slope = share(a, nodes, functions, place)
-                            for i in range(3):
-                                blocks[c, 3 * a + i, 3 * b + j] -= value * change[i] + slope * step * own[i]
-                        for i in range(3):
-                            blocks[c, 3 * nodes + i, 3 * b + j] += change[i]
-                        if spins:
-                            one, two = cross(dy, own), cross(y, change)
-                            moment = turning(data, c, nodes, (one[0] + two[0], one[1] + two[1], one[2] + two[2]))
-                            for i in range(3):
-                                blocks[c, 3 * nodes + 3 + i, 3 * b + j] += moment[i]
+                touch = touch_of(x, cells, data, nodes, functions, found, n)
+                place_moves(touch, touch.inner, nodes, functions, z)
+                add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_u)
             for c in range(first, first + pieces):
-                turn(blocks, c, arity, data, nodes, q)
+                turn_block(blocks, c, arity, data, nodes, q)
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
@@ -224,52 +286,30 @@ def kernels(pieces, nodes, functions, spins):
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                y, _, _, deep, g, _ = within(x, cells, data, c, nodes, functions, place)
-                push = data[c, PENALTY] * window(data, c, nodes, place, inner)[0] * raised(data, c, nodes, deep)
-                u, _, _ = slipping(v, cells, data, c, nodes, spins, functions, place, y)
-                by_velocity(data, c, nodes, push, g, u, by_u)
-                for b in range(arity):
-                    part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
-                    for j in range(3):
-                        unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
-                        du = part * unit[0], part * unit[1], part * unit[2]
-                        if b > nodes:
-                            du = cross(y, turning(data, c, nodes, unit))
-                        change = dot(by_u[0], du), dot(by_u[1], du), dot(by_u[2], du)
-                        for i in range(3):
-                            for a in range(nodes):
-                                value = share(a, nodes, functions, place)[0]
-                                blocks[c, 3 * a + i, 3 * b + j] -= value * change[i]
-                            blocks[c, 3 * nodes + i, 3 * b + j] += change[i]
-                        if spins:
-                            moment = turning(data, c, nodes, cross(y, change))
-                            for i in range(3):
-                                blocks[c, 3 * nodes + 3 + i, 3 * b + j] += moment[i]
+                touch = touch_of(x, cells, data, nodes, functions, found, n)
+                add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
-                turn(blocks, c, arity, data, nodes, q)
+                turn_block(blocks, c, arity, data, nodes, q)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep, _ = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions)
+            deep = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
             if deep > 0.0:
-                loss, friction = data[c, AWAY + 3 * nodes + LOSS], data[c, AWAY + 3 * nodes + FRICTION]
-                most = SHALLOW * loss * speed * (1.0 + friction) + friction
-                spread(
-                    most * data[c, PENALTY] * lowered(data, c, nodes, deep), mass, rates, cells, data, c, nodes, spins
-                )
+                pair = pair_of(data, c, nodes)
+                most = SHALLOW * pair.damping * speed * (1.0 + pair.friction) + pair.friction
+                most = most * pair.stiffness * slope_of_power(pair.exponent, deep)
+                add_row_sums(rates, most, mass, cells, data, c, nodes, spins)
 
     @kernel(BOUND)
     def damping_bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep, _ = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions)
+            deep = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
             if deep > 0.0:
-                at = AWAY + 3 * nodes
-                loss, friction = data[c, at + LOSS], data[c, at + FRICTION]
-                most = loss * (1.0 + friction) + friction * (1.0 + SHALLOW * loss * speed) / data[c, at + SLIP]
-                spread(
-                    most * data[c, PENALTY] * raised(data, c, nodes, deep), mass, rates, cells, data, c, nodes, spins
-                )
+                pair = pair_of(data, c, nodes)
+                fast = pair.friction * (1.0 + SHALLOW * pair.damping * speed) / pair.slip_velocity
+                most = pair.damping * (1.0 + pair.friction) + fast
+                most = most * pair.stiffness * power_of_depth(pair.exponent, deep)
+                add_row_sums(rates, most, mass, cells, data, c, nodes, spins)
 
     return force, stiffness, bound, damping, damping_bound

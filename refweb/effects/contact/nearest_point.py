@@ -4,47 +4,18 @@ A sphere touches a line once, at the line's point nearest its centre, however fi
 
 `far` and `touched` are inlined wherever they stand: with the number of nodes known, a line out of reach costs 4 ns, as
 calls 20 ns.
-
-Data of a cell begin with the columns `RADIUS` to `AWAY`, and vectors from the centre to the cell's nodes in the web's
-position; behind them stand, for `refweb.effects.contact.signed_distance`, the columns of `numbers`.
 """
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...kernels import kernel
 from ..vectors import dot
+from .pair import AWAY, RADIUS
 
-RADIUS, PENALTY, AWAY = 0, 1, 2
-"""Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
-KIND, POWER, GROWTH, CORE, AXES, LOSS, FRICTION, SLIP = 0, 1, 2, 3, 6, 15, 16, 17
-"""Columns behind the vectors: kind of the shape, exponent p, radius of growth and half sizes of the core [m], rows of
-the axes, damping [s/m], coefficient of friction and the slip velocity of its regularisation [m/s]."""
 SAMPLES = 8
 """Places on a curved element from which Newton's method may start to its nearest point."""
-
-
-def numbers(body, cells, points, stiffness, exponent, damping, friction, slip_velocity):
-    """Data of the contact of elements with a body, shape (cells, columns).
-
-    Parameters
-    ----------
-    body : refweb.net.rigid_body.RigidBody
-        The body.
-    cells : ndarray of int, shape (cells, nodes)
-        Rows along each element.
-    points : ndarray, shape (rows, 3)
-        Reference positions [m].
-    stiffness, exponent, damping, friction, slip_velocity : float
-        Of the penalty [N/m^p], [1], and of `refweb.effects.contact.friction`, [s/m], [1], [m/s].
-    """
-    away = (points[cells] - points[body.row]).reshape(len(cells), -1)
-    tail = [body.kind, exponent, body.radius, *body.core, *np.ravel(body.axes), damping, friction, slip_velocity]
-    head, tail = (np.tile(part, (len(cells), 1)) for part in ([body.extent, stiffness], tail))
-    return np.column_stack([head, away, tail])
 
 
 @kernel()
@@ -126,12 +97,12 @@ def closest(x, cells, data, c, nodes, functions):
         low, high = max(place - 1.0 / SAMPLES, 0.0), min(place + 1.0 / SAMPLES, 1.0)
         for _ in range(60):  # Newton on p·p', by bisection where it leaves the bracket
             p, d, e = point(x, cells, data, c, nodes, functions, place)
-            slope, bent = dot(p, d), dot(d, d) + dot(p, e)
+            slope, curve = dot(p, d), dot(d, d) + dot(p, e)
             if slope > 0.0:
                 high = place
             else:
                 low = place
-            step = place - slope / bent if bent > 0.0 else -1.0
+            step = place - slope / curve if curve > 0.0 else -1.0
             if not low <= step <= high:
                 step = 0.5 * (low + high)
             moved, place = abs(step - place), step

@@ -1,8 +1,8 @@
 """Penalty of contact with a body of any shape, as compiled kernels.
 
-Each contact, see `refweb.effects.contact.signed_distance`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where
-that is largest or an end of its element, so that the force is that of a fixed place. With the shares N of nodes, −1 of
-the body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the place, and y' = dy/dξ of the line,
+Each contact, see `refweb.effects.contact.places`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where that is
+largest or an end of its element, so that the force is that of a fixed place. With the shares N of nodes, −1 of the
+body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the place, and y' = dy/dξ of the line,
 
     stiffness of (a, b)    k W N_a N_b (p δ^(p−1) g⊗g + δ^p H) + c_a⊗∂ξ/∂x_b,
     c_a                    k δ^(p−1) [(W' δ + p W δ') N_a g + W δ (N_a H y' + N_a' g)].
@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ...net.shapes import SPHERE
 from ..vectors import dot
-from .nearest_point import AWAY, CORE, GROWTH, KIND, PENALTY, POWER, lightness, point, share
-from .signed_distance import PLACES, bent, contacts, deepest, from_axes, moves, window, within
+from .nearest_point import lightness, point, share
+from .pair import pair_of
+from .places import PLACES, from_axes, hessian_times, place_moves, places, window
 
 SHALLOW = 0.05
 """Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
@@ -29,72 +30,146 @@ SPREAD = 2.5
 
 
 @kernel()
-def raised(data, c, nodes, deep):
+def power_of_depth(exponent, deep):
     """δ^p of a depth δ > 0, p being 1 or 1.5."""
-    return deep if data[c, AWAY + 3 * nodes + POWER] == 1.0 else deep * math.sqrt(deep)
+    return deep if exponent == 1.0 else deep * math.sqrt(deep)
 
 
 @kernel()
-def lowered(data, c, nodes, deep):
+def slope_of_power(exponent, deep):
     """p δ^(p − 1)."""
-    return 1.0 if data[c, AWAY + 3 * nodes + POWER] == 1.0 else 1.5 * math.sqrt(deep)
+    return 1.0 if exponent == 1.0 else 1.5 * math.sqrt(deep)
+
+
+@kernel(forceinline=True)
+def push_of(touch):
+    """k W δ^p of a contact [N]."""
+    pair = touch.pair
+    faded = pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
+    return faded * power_of_depth(pair.exponent, touch.spot.depth)
 
 
 @kernel()
-def turn(blocks, c, rows, data, nodes, q):
+def turn_block(blocks, c, rows, data, nodes, q):
     """Turn the block of cell c from the axes of its body; ``q (3, 3)`` is space to work in."""
+    axes = pair_of(data, c, nodes).axes
     for r in range(0, 3 * rows, 3):
         for s in range(0, 3 * rows, 3):
             for i in range(3):
                 row = blocks[c, r + i, s], blocks[c, r + i, s + 1], blocks[c, r + i, s + 2]
-                q[i, 0], q[i, 1], q[i, 2] = from_axes(data, c, nodes, row)
+                q[i, 0], q[i, 1], q[i, 2] = from_axes(axes, row)
             for j in range(3):
-                column = from_axes(data, c, nodes, (q[0, j], q[1, j], q[2, j]))
+                column = from_axes(axes, (q[0, j], q[1, j], q[2, j]))
                 blocks[c, r, s + j], blocks[c, r + 1, s + j], blocks[c, r + 2, s + j] = column
 
 
 @kernel()
-def thickness(data, c, nodes):
+def thickness(shape):
     """Least distance from the middle of the body to its surface [m]."""
-    at = AWAY + 3 * nodes
-    return data[c, at + GROWTH] + min(data[c, at + CORE], data[c, at + CORE + 1], data[c, at + CORE + 2])
+    return shape.radius + min(shape.core[0], shape.core[1], shape.core[2])
 
 
-@kernel()
-def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
-    """(depth that a cell may come to [m], length of its slope there [m]); a depth of 0 where it stays out of reach.
+class Foreseen(NamedTuple):
+    """What may become of an element before it has moved by a reach.
 
-    It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, only by
-    `SHALLOW` of that, and not beyond twice the depth that it already has.
+    Attributes
+    ----------
+    depth : float
+        Depth that it may come to [m]; 0 where it stays out of reach.
+    length : float
+        |y'| at the deepest place [m].
     """
-    own, body = 0.0, mass[cells[c, nodes]]
-    place, deep = deepest(x, cells, data, c, nodes, functions)
-    first = within(x, cells, data, c, nodes, functions, 0.0)[3]
-    last = within(x, cells, data, c, nodes, functions, 1.0)[3]
-    _, d, _ = point(x, cells, data, c, nodes, functions, place)
-    length = math.sqrt(dot(d, d))
-    deep = max(deep, first, last)
-    nearest = 0.5 * (first + last + length) if nodes == 2 else max(first, last) + float(nodes) * length
-    if max(deep, nearest) + reach <= 0.0:
-        return 0.0, length
-    for a in range(nodes):
-        own += mass[cells[c, a]]
-    own = own * body / (own + body) if body > 0.0 else own
-    more = min(0.5 * reach, thickness(data, c, nodes))
-    if speed > 0.0:
-        power = data[c, AWAY + 3 * nodes + POWER] + 1.0
-        more = min(more, (0.5 * power * own * speed * speed / data[c, PENALTY]) ** (1.0 / power))
-    if not careful:
-        more = min(SHALLOW * more, deep if deep > 0.0 else math.inf)
-    return max(deep, 0.0) + more, length
+
+    depth: float
+    length: float
 
 
 @functools.cache
-def kernels(pieces, nodes, functions):
+def foresight(depth):
+    """Kernel ``(careful, reach, speed, x, mass, cells, data, c, nodes, functions)`` of what is `Foreseen` of a cell.
+
+    It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, only by
+    `SHALLOW` of that, and not beyond twice the depth that it already has. ``depth`` is the kernel of the bodies.
+    """
+    within, deepest, _, _ = places(depth)
+
+    @kernel()
+    def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
+        own, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
+        place, deep = deepest(x, cells, data, c, nodes, functions)
+        first = within(x, cells, data, c, nodes, functions, 0.0).depth
+        last = within(x, cells, data, c, nodes, functions, 1.0).depth
+        _, d, _ = point(x, cells, data, c, nodes, functions, place)
+        length = math.sqrt(dot(d, d))
+        deep = max(deep, first, last)
+        nearest = 0.5 * (first + last + length) if nodes == 2 else max(first, last) + float(nodes) * length
+        if max(deep, nearest) + reach <= 0.0:
+            return Foreseen(0.0, length)
+        for a in range(nodes):
+            own += mass[cells[c, a]]
+        own = own * body / (own + body) if body > 0.0 else own
+        more = min(0.5 * reach, thickness(pair.shape))
+        if speed > 0.0:
+            power = pair.exponent + 1.0
+            more = min(more, (0.5 * power * own * speed * speed / pair.stiffness) ** (1.0 / power))
+        if not careful:
+            more = min(SHALLOW * more, deep if deep > 0.0 else math.inf)
+        return Foreseen(max(deep, 0.0) + more, length)
+
+    return foreseen
+
+
+@kernel(forceinline=True)
+def add_stiffness(blocks, touch, definite, nodes, functions, z):
+    """Add what a contact has of the stiffness, along the axes of the body; ``z`` is what `place_moves` writes."""
+    c, place, pair, spot = touch.c, touch.place, touch.pair, touch.spot
+    deep, d, g, h = spot.depth, spot.d, spot.gradient, spot.hessian
+    w, w1, _ = window(pair.once, place, touch.inner)
+    steep = pair.stiffness * w * slope_of_power(pair.exponent, deep)
+    push = pair.stiffness * power_of_depth(pair.exponent, deep)
+    across = w1 * push + steep * dot(g, d)
+    turned, push = hessian_times(h, d), w * push
+    matrix = ((h[0], h[1], h[2]), (h[1], h[3], h[4]), (h[2], h[4], h[5]))
+    for a in range(nodes + 1):
+        own, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+        for b in range(nodes + 1):
+            other = share(b, nodes, functions, place)[0] if b < nodes else -1.0
+            for i in range(3):
+                tilt = across * own * g[i] + push * (own * turned[i] + slope * g[i])
+                for j in range(3):
+                    value = steep * g[i] * g[j] + (0.0 if definite else push * matrix[i][j])
+                    blocks[c, 3 * a + i, 3 * b + j] += own * other * value + tilt * z[b, j]
+
+
+@kernel(forceinline=True)
+def add_row_sums(rates, foreseen, speed, mass, cells, data, c, nodes):
+    """Add the row sums of the stiffness of an element's contacts; nothing passes through between two steps.
+
+    Half the bound are steps of a tenth of the body's thickness.
+    """
+    scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
+    deep, length, pair = foreseen.depth, foreseen.length, pair_of(data, c, nodes)
+    steep = scale * pair.stiffness * slope_of_power(pair.exponent, deep)
+    delta = lightness(mass, cells, c, nodes)
+    b, thick, own = cells[c, nodes], thickness(pair.shape), SPREAD * steep
+    if pair.once:  # a line turns under a push that slides along it
+        tilt = scale * deep / length if length > 0.0 else 0.0
+        own = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
+    body = own * (1.0 + 1.0 / delta) if delta > 0.0 else own
+    rates[b] = max(rates[b] + body, (10.0 * speed / thick) ** 2 * mass[b])
+    for a in range(nodes):
+        r = cells[c, a]
+        rates[r] = max(rates[r] + own * (1.0 + delta), (10.0 * speed / thick) ** 2 * mass[r])
+
+
+@functools.cache
+def kernels(depth, pieces, nodes, functions):
     """Force, energy, stiffness and bound kernels.
 
     Parameters
     ----------
+    depth : kernel
+        Depth in the bodies, as `refweb.net.grown_core.depth`.
     pieces : int
         Elements per line: so many cells follow each other.
     nodes : int
@@ -102,6 +177,8 @@ def kernels(pieces, nodes, functions):
     functions : tuple of float
         Coefficients of the element's functions, by power of ξ, then by node in the order along the line.
     """
+    _, _, contacts, touch_of = places(depth)
+    foreseen = foresight(depth)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -109,14 +186,13 @@ def kernels(pieces, nodes, functions):
         out[:, 0] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                _, _, _, deep, g, _ = within(x, cells, data, c, nodes, functions, place)
-                push = data[c, PENALTY] * window(data, c, nodes, place, inner)[0] * raised(data, c, nodes, deep)
+                touch = touch_of(x, cells, data, nodes, functions, found, n)
+                c, push = touch.c, push_of(touch)
                 out[c, 0] += push
-                g = from_axes(data, c, nodes, g)
+                g = from_axes(touch.pair.axes, touch.spot.gradient)
                 for k in range(3):
                     for a in range(nodes):
-                        f[cells[c, a], k] -= share(a, nodes, functions, place)[0] * push * g[k]
+                        f[cells[c, a], k] -= share(a, nodes, functions, touch.place)[0] * push * g[k]
                     f[cells[c, nodes], k] += push * g[k]
 
     @kernel(ENERGY)
@@ -125,12 +201,10 @@ def kernels(pieces, nodes, functions):
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                deep = within(x, cells, data, c, nodes, functions, place)[3]
-                stored = (
-                    data[c, PENALTY] / (data[c, AWAY + 3 * nodes + POWER] + 1.0) * raised(data, c, nodes, deep) * deep
-                )
-                out[c] += window(data, c, nodes, place, inner)[0] * stored
+                touch = touch_of(x, cells, data, nodes, functions, found, n)
+                pair, deep = touch.pair, touch.spot.depth
+                stored = pair.stiffness / (pair.exponent + 1.0) * power_of_depth(pair.exponent, deep) * deep
+                out[touch.c] += window(pair.once, touch.place, touch.inner)[0] * stored
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -138,44 +212,17 @@ def kernels(pieces, nodes, functions):
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                c, place, inner = int(found[n, 0]), found[n, 1], found[n, 2] > 0.0
-                _, d, e, deep, g, bend = within(x, cells, data, c, nodes, functions, place)
-                moves(data, c, nodes, functions, place, inner and not definite, d, e, deep, g, bend, z)
-                w, w1, _ = window(data, c, nodes, place, inner)
-                steep = data[c, PENALTY] * w * lowered(data, c, nodes, deep)
-                push = data[c, PENALTY] * raised(data, c, nodes, deep)
-                across = w1 * push + steep * dot(g, d)
-                turned, push = bent(bend, d), w * push
-                matrix = ((bend[0], bend[1], bend[2]), (bend[1], bend[3], bend[4]), (bend[2], bend[4], bend[5]))
-                for a in range(nodes + 1):
-                    own, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
-                    for b in range(nodes + 1):
-                        other = share(b, nodes, functions, place)[0] if b < nodes else -1.0
-                        for i in range(3):
-                            tilt = across * own * g[i] + push * (own * turned[i] + slope * g[i])
-                            for j in range(3):
-                                value = steep * g[i] * g[j] + (0.0 if definite else push * matrix[i][j])
-                                blocks[c, 3 * a + i, 3 * b + j] += own * other * value + tilt * z[b, j]
+                touch = touch_of(x, cells, data, nodes, functions, found, n)
+                place_moves(touch, touch.inner and not definite, nodes, functions, z)
+                add_stiffness(blocks, touch, definite, nodes, functions, z)
             for c in range(first, first + pieces):
-                turn(blocks, c, nodes + 1, data, nodes, q)
+                turn_block(blocks, c, nodes + 1, data, nodes, q)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
-        scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
         for c in range(cells.shape[0]):
-            deep, length = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
-            if deep <= 0.0:
-                continue
-            steep = scale * data[c, PENALTY] * lowered(data, c, nodes, deep)
-            delta = lightness(mass, cells, c, nodes)
-            b, thick, own = cells[c, nodes], thickness(data, c, nodes), SPREAD * steep
-            if data[c, AWAY + 3 * nodes + KIND] == SPHERE:  # a line turns under a push that slides along it
-                tilt = scale * deep / length if length > 0.0 else 0.0
-                own = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
-            body = own * (1.0 + 1.0 / delta) if delta > 0.0 else own
-            rates[b] = max(rates[b] + body, (10.0 * speed / thick) ** 2 * mass[b])
-            for a in range(nodes):  # nothing passes through between two steps, of a tenth of the body at half the bound
-                r = cells[c, a]
-                rates[r] = max(rates[r] + own * (1.0 + delta), (10.0 * speed / thick) ** 2 * mass[r])
+            most = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
+            if most.depth > 0.0:
+                add_row_sums(rates, most, speed, mass, cells, data, c, nodes)
 
     return force, energy, stiffness, bound

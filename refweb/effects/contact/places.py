@@ -1,0 +1,240 @@
+"""Where a line touches a body of any shape.
+
+A line that lies on a face, or along a ring or a cylinder, has no single nearest point: a force at the deepest one would
+jump from end to end. All shapes but spheres touch each element at both ends and once in between, at the place ξ where
+W(ξ) δ(ξ)^(p + 1) is largest, with the depth δ, the exponent p of the penalty and the window W = 4 ξ (1 − ξ). On a
+straight element that is one place, since the roots of W and δ are concave; it never jumps, and fades out where it nears
+an end, whose own contact takes over.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ...kernels import kernel
+from ..vectors import dot
+from .nearest_point import SAMPLES, far, point, share
+from .pair import Pair, pair_of
+
+PLACES = 3
+"""Largest number of contacts of an element."""
+
+
+class Spot(NamedTuple):
+    """A place of an element, as a body sees it: vectors are from its centre and along its axes.
+
+    Attributes
+    ----------
+    y, d, e : tuple of 3 float
+        The line's point y there [m], y' = dy/dξ and y''.
+    depth : float
+        Depth of that point δ [m].
+    gradient, hessian : tuple of 3 and of 6 float
+        g = ∂δ/∂y and H = ∂²δ/∂y² [1/m], of the axes 00, 01, 02, 11, 12, 22.
+    """
+
+    y: tuple
+    d: tuple
+    e: tuple
+    depth: float
+    gradient: tuple
+    hessian: tuple
+
+
+class Touch(NamedTuple):
+    """A contact.
+
+    Attributes
+    ----------
+    c : int
+        Cell.
+    place : float
+        Its place ξ.
+    inner : bool
+        Whether the place moves as the line does.
+    pair : Pair
+        The element and the body.
+    spot : Spot
+        What is there.
+    """
+
+    c: int
+    place: float
+    inner: bool
+    pair: Pair
+    spot: Spot
+
+
+@kernel()
+def along_axes(axes, p):
+    """A vector's components along the axes of the body."""
+    return (
+        axes[0][0] * p[0] + axes[0][1] * p[1] + axes[0][2] * p[2],
+        axes[1][0] * p[0] + axes[1][1] * p[1] + axes[1][2] * p[2],
+        axes[2][0] * p[0] + axes[2][1] * p[1] + axes[2][2] * p[2],
+    )
+
+
+@kernel()
+def from_axes(axes, q):
+    """The vector of components along the axes of the body."""
+    return (
+        axes[0][0] * q[0] + axes[1][0] * q[1] + axes[2][0] * q[2],
+        axes[0][1] * q[0] + axes[1][1] * q[1] + axes[2][1] * q[2],
+        axes[0][2] * q[0] + axes[1][2] * q[1] + axes[2][2] * q[2],
+    )
+
+
+@kernel()
+def hessian_times(h, p):
+    """Product of a Hessian and a vector."""
+    return (
+        h[0] * p[0] + h[1] * p[1] + h[2] * p[2],
+        h[1] * p[0] + h[3] * p[1] + h[4] * p[2],
+        h[2] * p[0] + h[4] * p[1] + h[5] * p[2],
+    )
+
+
+@kernel()
+def window(once, place, inner):
+    """(W, W', W'') of a contact; 1 at an end, and of a sphere."""
+    if not inner or once:
+        return 1.0, 0.0, 0.0
+    return 4.0 * place * (1.0 - place), 4.0 - 8.0 * place, -8.0
+
+
+@kernel(forceinline=True)
+def rise(pair, place, spot):
+    """What vanishes at the deepest place of an element, positive before it, and its slope.
+
+    W' δ + (p + 1) W δ', or where nothing is touched δ'; of a sphere the rate of −½ |y|², which is linear.
+    """
+    d, g, deep = spot.d, spot.gradient, spot.depth
+    slope, curve = dot(g, d), dot(d, hessian_times(spot.hessian, d)) + dot(g, spot.e)
+    if pair.once:
+        away = pair.shape.radius - deep
+        return away * slope, away * curve - slope * slope
+    if deep <= 0.0:
+        return slope, curve
+    power, (w, w1, w2) = pair.exponent, window(False, place, True)
+    return w1 * deep + (power + 1.0) * w * slope, w2 * deep + (power + 2.0) * w1 * slope + (power + 1.0) * w * curve
+
+
+@kernel(forceinline=True)
+def place_moves(touch, moving, nodes, functions, z):
+    """Write by how much the place of a contact moves with each node, along the body's axes, to ``z (nodes + 1, 3)``.
+
+    The last row is of the body; all are zero unless ``moving``.
+    """
+    z[:] = 0.0
+    pair, place, spot = touch.pair, touch.place, touch.spot
+    curve = rise(pair, place, spot)[1]
+    if not moving or not curve < 0.0:
+        return
+    (w, w1, _), g, turned = window(pair.once, place, True), spot.gradient, hessian_times(spot.hessian, spot.d)
+    own = pair.shape.radius - spot.depth if pair.once else (pair.exponent + 1.0) * w
+    for a in range(nodes + 1):
+        value, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+        for k in range(3):
+            z[a, k] = -(w1 * value * g[k] + own * (value * turned[k] + slope * g[k])) / curve
+
+
+class Places(NamedTuple):
+    """Kernels that find where lines touch bodies of one depth, see `places`."""
+
+    within: Callable
+    deepest: Callable
+    contacts: Callable
+    touch_of: Callable
+
+
+@functools.cache
+def places(depth):
+    """Kernels that find where lines touch.
+
+    ``within(x, cells, data, c, nodes, functions, place)`` is the `Spot` at a place of cell c, ``deepest`` of all but
+    the place (place, depth) of the contact between the ends of a cell. ``contacts`` finds those of a line, and
+    ``touch_of`` is the `Touch` that is one of them.
+
+    Parameters
+    ----------
+    depth : kernel
+        Depth in the bodies, as `refweb.net.grown_core.depth`.
+    """
+
+    @kernel()
+    def within(x, cells, data, c, nodes, functions, place):
+        pair = pair_of(data, c, nodes)
+        p, d, e = point(x, cells, data, c, nodes, functions, place)
+        p, d, e = along_axes(pair.axes, p), along_axes(pair.axes, d), along_axes(pair.axes, e)
+        deep, gradient, hessian = depth(p, pair.shape)
+        return Spot(p, d, e, deep, gradient, hessian)
+
+    @kernel()
+    def deepest(x, cells, data, c, nodes, functions):
+        low, high, place, pair = 0.0, 1.0, 0.5, pair_of(data, c, nodes)
+        if nodes > 2:
+            most = -math.inf
+            for n in range(SAMPLES + 1):
+                deep = within(x, cells, data, c, nodes, functions, n / SAMPLES).depth
+                faded = window(pair.once, n / SAMPLES, True)[0] ** (1.0 / (pair.exponent + 1.0))
+                if (felt := faded * deep if deep > 0.0 else deep) > most:
+                    most, place = felt, n / SAMPLES
+            low, high = max(place - 1.0 / SAMPLES, 0.0), min(place + 1.0 / SAMPLES, 1.0)
+        if pair.once:
+            for end in (low, high):
+                spot = within(x, cells, data, c, nodes, functions, end)
+                slope = dot(spot.gradient, spot.d)
+                if (end == 0.0 and slope <= 0.0) or (end == 1.0 and slope >= 0.0):
+                    return end, spot.depth
+        for _ in range(100):  # Newton's method, by bisection where it leaves the bracket
+            spot = within(x, cells, data, c, nodes, functions, place)
+            deep, slope = spot.depth, dot(spot.gradient, spot.d)
+            if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
+                return place, deep  # concave: nowhere deep enough
+            value, curve = rise(pair, place, spot)
+            if value > 0.0:
+                low = place
+            else:
+                high = place
+            step = place - value / curve if curve < 0.0 else -1.0
+            if not low <= step <= high:
+                step = 0.5 * (low + high)
+            moved, place = abs(step - place), step
+            if moved <= 1e-15:
+                break
+        return place, within(x, cells, data, c, nodes, functions, place).depth
+
+    @kernel()
+    def contacts(x, cells, data, first, pieces, nodes, functions, found):
+        """Write (cell, place, whether the place moves) of each contact of a line to ``found``; return their number."""
+        count, best = 0, 0.0
+        for c in range(first, first + pieces):
+            if far(x, cells, data, c, nodes):
+                continue
+            place, deep = deepest(x, cells, data, c, nodes, functions)
+            inner = 0.0 < place < 1.0
+            if pair_of(data, c, nodes).once:
+                if deep > best:
+                    best, count = deep, 1
+                    found[0, 0], found[0, 1], found[0, 2] = c, place, inner
+                continue
+            if deep > 0.0 and inner:
+                found[count, 0], found[count, 1], found[count, 2] = c, place, 1.0
+                count += 1
+            for end in range(2):
+                if within(x, cells, data, c, nodes, functions, float(end)).depth > 0.0:
+                    found[count, 0], found[count, 1], found[count, 2] = c, end, 0.0
+                    count += 1
+        return count
+
+    @kernel(forceinline=True)
+    def touch_of(x, cells, data, nodes, functions, found, n):
+        c, place = int(found[n, 0]), found[n, 1]
+        spot = within(x, cells, data, c, nodes, functions, place)
+        return Touch(c, place, found[n, 2] > 0.0, pair_of(data, c, nodes), spot)
+
+    return Places(within, deepest, contacts, touch_of)

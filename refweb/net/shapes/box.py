@@ -1,0 +1,57 @@
+"""Boxes with rounded edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ...messages import shown
+from ...tables import real, rows, vector
+from ..rigid_body import Grown, Shape, unit
+from .rounding import check_rounding, edge_radius, shrunk
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box(Shape):
+    """A box.
+
+    Parameters
+    ----------
+    size : sequence of 3 float
+        Its edges [m], > 0.
+    axes : list of 2 vectors, optional
+        Directions of the first two edges, at right angles; by default x and y.
+    rounding : float, optional
+        Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. Contact
+        that is no deeper has a force of one direction.
+    """
+
+    size: tuple = vector(unit="m")
+    axes: tuple | None = rows(3, None)
+    rounding: float | None = real(None, above=0, unit="m")
+
+    def check(self):
+        """Refuse sizes that are not > 0, axes that are not two at right angles and a rounding that is too large."""
+        if min(self.size) <= 0.0:
+            raise InputError(f"size = {list(self.size)} must be > 0 [m]")
+        self.frame()
+        check_rounding(self.rounding, self.size)
+
+    def grown(self):
+        """A smaller box, grown by the radius of the edges."""
+        edge = edge_radius(self.rounding, self.size)
+        return Grown(edge, shrunk(self.size, edge))
+
+    def frame(self):
+        """Unit vectors of its edges."""
+        if self.axes is None:
+            return np.eye(3)
+        if len(self.axes) != 2:
+            raise InputError(f"axes = {shown(self.axes)} must be two vectors, not {len(self.axes)}")
+        first, second = (unit(f"axes[{i}]", axis) for i, axis in enumerate(self.axes))
+        if abs(first @ second) > 1e-6:
+            raise InputError(f"axes = {shown(self.axes)} must be at right angles")
+        second = unit("axes", second - (first @ second) * first)
+        return np.array([first, second, np.cross(first, second)])

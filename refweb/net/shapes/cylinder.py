@@ -1,0 +1,58 @@
+"""Cylinders with rounded edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...tables import real, vector
+from ..rigid_body import Grown, Shape, axes_about
+from .rounding import check_rounding, edge_radius, shrunk
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Shape):
+    """A cylinder; its axis stands third.
+
+    Parameters
+    ----------
+    radius : float
+        Its radius [m], > 0.
+    length : float
+        Its length [m], > 0.
+    axis : sequence of 3 float
+        Its axis.
+    rounding : float, optional
+        Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. Contact
+        that is no deeper has a force of one direction.
+    """
+
+    radius: float = real(above=0, unit="m")
+    length: float = real(above=0, unit="m")
+    axis: tuple = vector()
+    rounding: float | None = real(None, above=0, unit="m")
+
+    def check(self):
+        """Refuse an axis that is zero and a rounding that is too large."""
+        self.frame()
+        check_rounding(self.rounding, self._sizes())
+
+    def _sizes(self):
+        return 2.0 * self.radius, 2.0 * self.radius, self.length
+
+    def grown(self):
+        """A smaller cylinder, grown by the radius of the edges."""
+        edge = edge_radius(self.rounding, self._sizes())
+        return Grown(edge, shrunk(self._sizes(), edge), round=True)
+
+    def frame(self):
+        """Unit vectors of its axes, its own third."""
+        return axes_about("axis", self.axis)
+
+    def farthest(self, normals):
+        """Points of the core, on the circles at its ends."""
+        side = np.sign(normals)
+        around = np.linalg.norm(normals[:, :2], axis=1, keepdims=True)
+        side[:, :2] = normals[:, :2] / np.where(around > 0.0, around, 1.0)
+        return side * self.grown().core

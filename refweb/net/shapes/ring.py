@@ -1,0 +1,62 @@
+"""Rings: rigid circles, which webs in their plane touch as the disc inside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ...tables import real, vector
+from ..rigid_body import Grown, Shape, axes_about
+
+TUBE = 0.04
+"""Thickness of the tube that a ring is drawn as, over its radius."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ring(Shape):
+    """A ring as its web sees it along its normal: no end to it along that axis, which stands third.
+
+    Parameters
+    ----------
+    radius : float
+        Its radius [m], > 0.
+    normal : sequence of 3 float
+        Its normal.
+    """
+
+    free = True
+    planar = True
+
+    radius: float = real(above=0, unit="m")
+    normal: tuple = vector()
+
+    def check(self):
+        """Refuse a normal that is zero."""
+        self.frame()
+
+    def grown(self):
+        """Its axis, grown by the radius."""
+        return Grown(self.radius, (0.0, 0.0, math.inf))
+
+    def frame(self):
+        """Unit vectors of its axes, the normal third."""
+        return axes_about("normal", self.normal)
+
+    def inertia(self, mass):
+        """Of a thin ring about its normal, m r²."""
+        return mass * self.radius**2
+
+    def refuse_turning(self, angular_velocity):
+        """Refuse to turn about another axis than the normal."""
+        across = np.linalg.norm(np.cross(angular_velocity, self.normal))
+        if across > 1e-9 * np.linalg.norm(angular_velocity) * np.linalg.norm(self.normal):
+            raise InputError(f"angular_velocity = {list(angular_velocity)} must be along the normal of the ring")
+
+    def surface(self):
+        """A thin tube whose outer edge has the radius."""
+        from ..surfaces import tube
+
+        return tube(self.radius, TUBE * self.radius)

@@ -1,0 +1,24 @@
+"""Rounded edges of boxes and cylinders."""
+
+from __future__ import annotations
+
+from ...errors import InputError
+
+ROUNDING = 0.02
+"""Radius of edges, where none is given, over the smallest size."""
+
+
+def edge_radius(rounding, sizes):
+    """Radius of edges [m] of a body of some sizes [m]; ``rounding`` is what is given, or None."""
+    return rounding or ROUNDING * min(sizes)
+
+
+def shrunk(sizes, edge):
+    """Half sizes [m] of the core that edges of a radius leave."""
+    return tuple(max(0.5 * size - edge, 0.0) for size in sizes)
+
+
+def check_rounding(rounding, sizes):
+    """Refuse edges of more than half the smallest size."""
+    if rounding is not None and rounding > 0.5 * min(sizes):
+        raise InputError(f"rounding = {rounding:g} must be ≤ {0.5 * min(sizes):g} [m], half the size")

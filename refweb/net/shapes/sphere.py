@@ -1,0 +1,32 @@
+"""Spheres: a point that has grown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...tables import real
+from ..rigid_body import Grown, Shape
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sphere(Shape):
+    """A sphere.
+
+    Parameters
+    ----------
+    radius : float
+        Its radius [m], > 0.
+    """
+
+    free = True
+    once = True
+
+    radius: float = real(above=0, unit="m")
+
+    def grown(self):
+        """A point, grown by the radius."""
+        return Grown(self.radius, (0.0, 0.0, 0.0))
+
+    def inertia(self, mass):
+        """Of a solid sphere, 2/5 m r²."""
+        return 0.4 * mass * self.radius**2

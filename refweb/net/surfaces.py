@@ -1,0 +1,48 @@
+"""Surfaces as points and triangles, outward."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def sphere():
+    """Unit sphere as points and triangles."""
+    level = 24
+    polar = np.linspace(0.0, np.pi, level // 2 + 1)[1:-1]
+    around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)
+    rings = np.stack(
+        [
+            np.outer(np.sin(polar), np.cos(around)),
+            np.outer(np.sin(polar), np.sin(around)),
+            np.outer(np.cos(polar), np.ones(level)),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    points = np.vstack([rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
+    here = np.arange(level)
+    after = (here + 1) % level
+    last, top, bottom = level * (len(polar) - 1), len(rings), len(rings) + 1
+    triangles = [np.column_stack([np.full(level, top), here, after])]
+    for ring in range(len(polar) - 1):
+        triangles += _band(ring * level + here, ring * level + after, level)
+    triangles.append(np.column_stack([np.full(level, bottom), last + after, last + here]))
+    return points, np.vstack(triangles)
+
+
+def tube(radius, thin):
+    """Ring about the third axis, a tube of a thickness whose outer edge has the radius, as points and triangles."""
+    level, sides = 48, 8
+    around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)[:, None]
+    across = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
+    out = radius - thin + thin * np.cos(across)
+    points = np.stack([out * np.cos(around), out * np.sin(around), thin * np.sin(across) + 0.0 * around], axis=-1)
+    here = np.arange(level * sides).reshape(level, sides)
+    after = np.roll(here, -1, axis=1)
+    return points.reshape(-1, 3), np.vstack(
+        [t for i in range(level) for t in _band(here[i], after[i], here[(i + 1) % level] - here[i])]
+    )
+
+
+def _band(here, after, step):
+    """Triangles between a row of points, each with the one after it, and the row a step on."""
+    return [np.column_stack([here, here + step, after + step]), np.column_stack([here, after + step, after])]
