@@ -121,7 +121,7 @@ EXPORTS = (
     "refweb.settings:Accuracy",
     "refweb.settings:Event",
     "refweb.results.observables.observe:Observe",
-    "refweb.results.solution:Solution",
+    "refweb.solution:Solution",
     "refweb.net.cable:Cable",
     "refweb.net.cable:Group",
     "refweb.net.tension_laws:Law",

@@ -12,8 +12,9 @@ from .messages import short
 from .results.folder import Folder, check_folder, read_summary
 from .results.provenance import versions, web_of
 from .results.run_status import Clock, recorded
-from .results.solution import Solution, as_history
+from .results.solution import as_history
 from .scene import Scene
+from .solution import Solution
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):

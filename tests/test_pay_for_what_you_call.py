@@ -27,8 +27,8 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
 EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.rigid_body"}
-EVERY |= {"results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
-EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "provenance", "run_status")}
+EVERY |= {"solution", "results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
+EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "files", "vtu", "provenance", "run_status")}
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
 TANGENT = {"system.sparsity", "system.factorization"}

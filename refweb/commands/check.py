@@ -9,9 +9,9 @@ def add_arguments(parser):
 def run(arguments):
     """Refuse what a run would refuse, else print what it would solve."""
     from ..console import print_scene
-    from ..results.solution import Solution
     from ..runner import simulation_of
     from ..scene import Scene
+    from ..solution import Solution
 
     scene = Scene.load(arguments.scene)
     system = scene.build()

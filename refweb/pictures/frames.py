@@ -1,4 +1,7 @@
-"""Reading a result folder for pictures: which frames it has, and one frame as lines in space with values on them."""
+"""Frames, the records that pictures draw: lines in space with values on them, supports and bodies.
+
+`read` takes one from a result folder, `frame_of` makes one of meshes in memory.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,8 @@ import contextlib
 import io
 import re
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,13 +20,27 @@ CELLS = ("line", "line3", "line4")
 POINTS_ALONG_A_CURVE = 9
 
 
-@dataclass(frozen=True)
-class Shot:
-    """One frame of a result folder.
+class Frame(NamedTuple):
+    """What is drawn of one instant.
 
-    `paths` and `origin` [m], shape (lines, points, 3), are the lines now and undeformed; `tree` says that they close no
-    loop; `fields` are values per line [SI], shape (lines,); `slack` flags, shape (lines,); `pins` the supports
-    [m], shape (n, 3); `bodies` their points [m], shape (points, 3), and triangles, shape (triangles, 3), by name.
+    Attributes
+    ----------
+    number : int
+        Its number in a result folder.
+    time : float
+        Time [s]; in statics the load step, of a mode its number.
+    paths, origin : ndarray, shape (lines, points, 3)
+        Lines where they are and undeformed [m].
+    tree : bool
+        Whether the lines close no loop.
+    fields : dict of str to ndarray, shape (lines,)
+        Values per line [SI].
+    slack : ndarray of bool, shape (lines,)
+        Slack lines.
+    supports : ndarray, shape (n, 3)
+        Places of supported nodes [m].
+    bodies : dict of str to Body
+        Bodies by name.
     """
 
     number: int
@@ -33,17 +50,31 @@ class Shot:
     tree: bool
     fields: dict
     slack: np.ndarray
-    pins: np.ndarray
+    supports: np.ndarray
     bodies: dict
 
 
-def frames(folder):
+class Body(NamedTuple):
+    """Surface of a body: points [m], shape (points, 3), and triangles, shape (triangles, 3)."""
+
+    points: np.ndarray
+    triangles: np.ndarray
+
+
+class Listed(NamedTuple):
+    """A frame of ``web.pvd``: its time, and the path of each of its meshes by name."""
+
+    time: float
+    paths: dict
+
+
+def listed(folder):
     """The frames that ``web.pvd`` lists.
 
     Returns
     -------
-    dict
-        By frame number, ascending: its time [s] (statics: the step) and the path of each mesh, by name; ``web`` is one.
+    dict of int to Listed
+        By their numbers, ascending; ``web`` is a mesh of each.
 
     Raises
     ------
@@ -60,44 +91,61 @@ def frames(folder):
     for item in sets:
         match = re.fullmatch(r"(.*)_(\d+)\.vtu", Path(item.get("file", "")).name)
         if match:
-            frame = found.setdefault(int(match[2]), (float(item.get("timestep", 0)), {}))
-            frame[1][match[1]] = Path(folder) / item.get("file")
-    found = {number: found[number] for number in sorted(found) if "web" in found[number][1]}
+            frame = found.setdefault(int(match[2]), Listed(float(item.get("timestep", 0)), {}))
+            frame.paths[match[1]] = Path(folder) / item.get("file")
+    found = {number: found[number] for number in sorted(found) if "web" in found[number].paths}
     if not found:
         raise InputError(f'"{folder}" has no frames: web.pvd lists no file such as frames/web_000000.vtu')
     return found
 
 
 def read(folder, number):
-    """One frame.
+    """One frame of a result folder.
 
     Raises
     ------
     InputError
         Where there is no such frame (names the nearest), or it cannot be read or has positions that are not finite.
     """
-    found = frames(folder)
+    found = listed(folder)
     if number not in found:
         close = min(found, key=lambda n: abs(n - number))
         raise InputError(f"frame = {number}: no such frame in {folder}, the nearest is {close}, the last {max(found)}")
-    time, files = found[number]
-    mesh = _mesh(files["web"])
-    points = mesh.points
-    if not np.isfinite(points).all():
+    time, paths = found[number]
+    web = _mesh(paths["web"])
+    if not np.isfinite(web.points).all():
         raise InputError(f"frame = {number}: has positions that are not finite, choose an earlier one")
-    origin = points - mesh.point_data.get("displacement", 0.0)
-    blocks = [(i, block.data) for i, block in enumerate(mesh.cells) if block.type in CELLS]
-    if not blocks:
-        raise InputError(f'"{files["web"]}" has no lines')
+    if not any(block.type in CELLS for block in web.cells):
+        raise InputError(f'"{paths["web"]}" has no lines')
+    meshes = {"web": web, **{name: _mesh(path) for name, path in paths.items() if name != "web"}}
+    return frame_of(number, time, meshes, _supported(folder, web))
+
+
+def frame_of(number, time, meshes, supported):
+    """A frame of meshes.
+
+    Parameters
+    ----------
+    number : int
+        Its number.
+    time : float
+        Its time [s], or load step.
+    meshes : dict of str to meshio.Mesh
+        ``web``, and bodies by name, as `refweb.results.vtu.meshes` makes them.
+    supported : ndarray of bool, shape (points,)
+        Which points of the web are supported.
+    """
+    web = meshes["web"]
+    origin = web.points - web.point_data.get("displacement", 0.0)
+    blocks = [(i, block.data) for i, block in enumerate(web.cells) if block.type in CELLS]
     samples = max(2 if cells.shape[1] == 2 else POINTS_ALONG_A_CURVE for _, cells in blocks)
-    paths, start = (np.concatenate([_curves(x[cells], samples) for _, cells in blocks]) for x in (points, origin))
-    fields = _fields(mesh, blocks)
+    paths, start = (np.concatenate([_curves(x[cells], samples) for _, cells in blocks]) for x in (web.points, origin))
+    fields = _fields(web, blocks)
     slack = np.asarray(fields.get("slack", np.zeros(len(paths)))) > 0.5
-    pins = points[_supported(folder, mesh)]
     edges = sum(cells.shape[0] * (cells.shape[1] - 1) for _, cells in blocks)
     tree = edges < len(np.unique(np.concatenate([cells.ravel() for _, cells in blocks])))
-    bodies = {name: _surface(_mesh(path)) for name, path in files.items() if name != "web"}
-    return Shot(number, time, paths, start, tree, fields, slack, pins, bodies)
+    bodies = {name: _surface(mesh) for name, mesh in meshes.items() if name != "web"}
+    return Frame(number, time, paths, start, tree, fields, slack, web.points[supported], bodies)
 
 
 def _mesh(path):
@@ -152,4 +200,4 @@ def _surface(mesh):
             corners.append(block.data)
         elif block.type == "quad":
             corners += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
-    return mesh.points, np.concatenate(corners)
+    return Body(mesh.points, np.concatenate(corners))

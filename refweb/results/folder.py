@@ -7,13 +7,11 @@ listed in ``web.pvd`` after it and the checkpoint of its state are there, and it
 from __future__ import annotations
 
 import contextlib
-import functools
 import json
 import os
 import pathlib
 import re
 import shutil
-import tempfile
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -21,111 +19,14 @@ import numpy as np
 from ..errors import InputError, SolverError
 from ..messages import short
 from ..net.rigid_body import row_names
+from .files import as_toml, number, write_atomically, write_text
+from .vtu import meshes, write_mesh
 
-OWN = re.compile(
-    r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif|frames/[^/]+_\d{6,}\.vtu"
-    r"|(frames/)?\.refweb-[^/]+"
+RESULT_FILES = re.compile(
+    r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif"
+    r"|frames/[^/]+_\d{6,}\.vtu|(frames/)?\.refweb-[^/]+"
 )
 """Files that a run writes, and that ``--force`` removes."""
-POINT_DATA = ("displacement", "velocity", "reaction", "mass")
-SHAPE_SIZE = 0.05
-"""Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
-CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
-
-
-def write_atomically(path, write):
-    """Call ``write(file name)`` for a file beside ``path`` and move it there."""
-    handle, name = tempfile.mkstemp(prefix=".refweb-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    try:
-        write(name)
-        os.chmod(name, 0o666 & ~_umask())
-        os.replace(name, path)
-    except BaseException:
-        pathlib.Path(name).unlink(missing_ok=True)
-        raise
-
-
-@functools.cache
-def _umask():
-    """The process's mask of permissions, which can only be read by setting it."""
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask
-
-
-def write_text(path, text):
-    """Write a text file atomically, as UTF-8."""
-    write_atomically(path, lambda name: pathlib.Path(name).write_text(text, encoding="utf-8"))
-
-
-def _drawn(net):
-    """Weights of a cell's nodes at the places where VTK has the nodes of a line of that order, shape (nodes, nodes).
-
-    VTK's cubic has its inner nodes at thirds, this element at the Gauss–Lobatto points: the curve through the element's
-    own nodes would have 10 % less sag than the element.
-    """
-    order = net.order
-    places = np.array([0.0, 1.0, *np.arange(1, order) / order])
-    powers = np.arange(order + 1)
-    return places[:, None] ** powers @ np.linalg.inv(net.places[:, None] ** powers)
-
-
-def frame_data(state, shape=None):
-    """Points, and point and cell data by name, of a state's web, as VTU has them; one cell per element.
-
-    The ``shape`` of a mode, of shape (nodes, 3), is point data as well, and is added to points and displacement.
-    """
-    net = state.system.at(state.time).net
-    fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
-    points, *point_data = (values[: net.nodes].copy() for values in fields)
-    curved = [points, *point_data[:2]]
-    if shape is not None:
-        large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
-        for values in curved[:2]:
-            values += large * shape
-        point_data.append(shape.copy())
-        curved.append(point_data[-1])
-    if net.order > 2:
-        inner, weights = net.cells[:, 2:], _drawn(net)[2:]
-        for values in curved:
-            values[inner] = np.einsum("ia,cax->cix", weights, values[net.cells])
-    cells = (state.element_tension, state.element_tension / net.area, state.element_strain)
-    cell_data = dict(zip(CELL_DATA, (*cells, net.natural_length, state.element_slack), strict=True))
-    if net.subdivide > 1:
-        cell_data["line"] = net.line
-    cell_data = {key: np.asarray(values, dtype=float) for key, values in cell_data.items()}
-    return points, dict(zip((*POINT_DATA, "shape"), point_data, strict=False)), cell_data
-
-
-def write_frame(path, state, shape=None):
-    """Write the web of a state as VTU: current positions, its lines in the web's own numbering, float64.
-
-    Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other. A
-    ``shape`` is drawn on it.
-    """
-    import meshio
-
-    points, point_data, cell_data = frame_data(state, shape)
-    net = state.system.net
-    mesh = meshio.Mesh(
-        points,
-        [({1: "line", 2: "line3", 3: "line4"}[net.order], net.cells)],
-        point_data=point_data,
-        cell_data={key: [values] for key, values in cell_data.items()},
-    )
-    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
-
-
-def write_body(path, body, state):
-    """Write the surface of a body as VTU, at its current position."""
-    import meshio
-
-    points, triangles = body.surface(state.position[body.row])
-    data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
-    point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
-    mesh = meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
-    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
 
 
 def read_summary(folder):
@@ -171,7 +72,7 @@ def clear(folder, keep=("run.json",)):
     """Remove what a run wrote except ``keep``, and nothing else."""
     for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
         name = path.relative_to(folder).as_posix()
-        if path.is_file() and OWN.fullmatch(name) and name not in keep:
+        if path.is_file() and RESULT_FILES.fullmatch(name) and name not in keep:
             path.unlink()
 
 
@@ -182,28 +83,10 @@ def copy(source, target):
         return
     (target / "frames").mkdir(parents=True, exist_ok=True)
     clear(target)
-    own = [p for p in source.rglob("*") if p.is_file() and OWN.fullmatch(p.relative_to(source).as_posix())]
+    own = [p for p in source.rglob("*") if p.is_file() and RESULT_FILES.fullmatch(p.relative_to(source).as_posix())]
     for path in sorted(own, key=lambda p: p.name == "run.json"):
         place = target / path.relative_to(source)
         write_atomically(place, lambda name, path=path: shutil.copyfile(path, name))
-
-
-def number(value):
-    """A number as text that reads back to the same float."""
-    return repr(float(value))
-
-
-def as_toml(given):
-    """The dict of a scene as TOML, its tables in the order they have there: sums are taken in that order."""
-    import tomli_w
-
-    parts = []
-    for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
-        if isinstance(value, list):
-            parts += [f"[[{key}]]\n{tomli_w.dumps(one)}" for one in value]
-        else:
-            parts.append(tomli_w.dumps({key: value}))
-    return "\n".join(parts)
 
 
 class Folder:
@@ -286,7 +169,9 @@ class Folder:
             self._history.seek(kept)
             for path in [*self.path.glob(".refweb-*"), *(self.path / "frames").iterdir()]:
                 number = re.search(r"_(\d{6,})\.vtu$", path.name)
-                if OWN.fullmatch(path.relative_to(self.path).as_posix()) and not (number and int(number[1]) <= row):
+                if RESULT_FILES.fullmatch(path.relative_to(self.path).as_posix()) and not (
+                    number and int(number[1]) <= row
+                ):
                     path.unlink()
         self._listed = []
         self.summary(run)
@@ -319,9 +204,8 @@ class Folder:
         ``run`` is what the checkpoint holds besides, as arrays by name, for the run to go on from it.
         """
         with self._written():
-            write_frame(self.path / f"frames/web_{number:06d}.vtu", state, shape)
-            for body in state.system.net.bodies:
-                write_body(self.path / f"frames/{body.name}_{number:06d}.vtu", body, state)
+            for name, mesh in meshes(state, shape).items():
+                write_mesh(self.path / f"frames/{name}_{number:06d}.vtu", mesh)
             net = state.system.net
             arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
             arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}

@@ -1,4 +1,4 @@
-"""What a run returns: results, fields, history and cost, as numpy arrays and plain values."""
+"""The data of a solution: what a run fills in while it goes, and what ``run.json`` says of it."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Result(NamedTuple):
 
 
 @dataclass(eq=False, repr=False)
-class Solution:
-    """A solved scene.
+class SolutionData:
+    """What is known of a scene that is solved, or being solved.
 
     Attributes
     ----------
@@ -120,50 +120,6 @@ class Solution:
         rows = np.loadtxt(self.path / "history.csv", delimiter=",", skiprows=1, ndmin=2)
         return as_history(self.columns, rows)
 
-    @property
-    def positions(self):
-        """Positions of the nodes in the last state [m], shape (nodes, 3); those of order and subdivision come last."""
-        return self.state.position[: self.state.system.net.nodes]
-
-    @property
-    def displacement(self):
-        """Displacement of the nodes in the last state [m], shape (nodes, 3)."""
-        return self.state.x[: self.state.system.net.nodes]
-
-    @property
-    def tension(self):
-        """Tension of the lines in the last state [N], shape (lines,)."""
-        return self.state.tension
-
-    @property
-    def stress(self):
-        """Stress of the lines in the last state [Pa], shape (lines,)."""
-        return self.state.stress
-
-    @property
-    def strain(self):
-        """Strain of the lines in the last state [1], shape (lines,)."""
-        return self.state.strain
-
-    @property
-    def slack(self):
-        """Lines that are slack in the last state, bool, shape (lines,)."""
-        return self.state.slack
-
-    @property
-    def velocities(self):
-        """Velocities of the nodes in the last state [m/s], shape (nodes, 3)."""
-        return self.state.v[: self.state.system.net.nodes]
-
-    @property
-    def reaction(self):
-        """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
-        return self.state.reaction[: self.state.system.net.nodes]
-
-    def __repr__(self):
-        found = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
-        return f'<Solution of "{self.scene.title}": {self.status}; {found}>'
-
     def summary(self):
         """The content of ``run.json``, a dict of plain values."""
 
@@ -185,35 +141,6 @@ class Solution:
             "warnings": self.warnings,
             **({"horizon": self.horizon} if self.horizon else {}),
         }
-
-    def save(self, folder, force=False):
-        """Write the result folder.
-
-        Parameters
-        ----------
-        folder : path-like
-            Made where it does not exist.
-        force : bool
-            Replace the results of an earlier run.
-
-        Raises
-        ------
-        InputError
-            Where the folder is not empty or cannot be written.
-        """
-        from .folder import Folder, check_folder, copy
-
-        check_folder(folder, force)
-        if self.table is None:
-            copy(self.path, folder)
-            return
-        out = Folder(folder, self.scene, self.columns, {**self.summary(), "status": "running"})
-        for row in zip(*self.history.values(), strict=True):
-            out.row(row)
-        for number, state in self.frames:
-            out.frame(number, state)
-        out.close()
-        out.summary(self.summary())
 
 
 def as_history(columns, rows):

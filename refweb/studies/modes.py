@@ -11,9 +11,10 @@ from ..registry import STATICS, load
 from ..results.folder import Folder, check_folder
 from ..results.provenance import versions, web_of
 from ..results.run_status import Clock, recorded
-from ..results.solution import SOLVER, Result, Solution, as_history
+from ..results.solution import SOLVER, Result, as_history
 from ..results.state import State
 from ..scene import Scene
+from ..solution import Solution
 from ..statics.remarks import Remarks
 from ..tables import checked, integer
 from .mode_remarks import left_out, remarks_on

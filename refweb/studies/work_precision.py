@@ -25,7 +25,8 @@ import numpy as np
 from ..errors import InputError, SolverError, in_file
 from ..messages import nearest, shown
 from ..registry import OBSERVABLES, load
-from ..results.folder import as_toml, check_folder, clear, write_atomically, write_text
+from ..results.files import as_toml, write_atomically, write_text
+from ..results.folder import check_folder, clear
 from ..results.observables.observe import default
 from ..results.provenance import versions, web_of
 from ..results.run_status import Clock, recorded

@@ -13,6 +13,9 @@ from refweb.errors import InputError
 from refweb.pictures import pictures
 from refweb.pictures import render as drawing
 from refweb.pictures.camera import View
+from refweb.pictures.frames import frame_of, read
+from refweb.pictures.stage import Stage, scaled_unit
+from refweb.results.vtu import meshes
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 FACES = np.array([[i, j, k] for i in (0, 1) for j in (2, 3) for k in (4, 5)])
@@ -120,15 +123,16 @@ def test_a_window_that_kills_the_child_is_survived(film, monkeypatch, tmp_path, 
 def test_cable_is_seen_along_the_normal_of_its_plane(no_opengl, tmp_path):
     out = pictures.picture(write(tmp_path / "cable", [(0, 0.0, catenary())]), out=tmp_path / "cable.png")
     assert colours(out)[0] > 100
-    shot = pictures.shots.read(tmp_path / "cable", 0)
-    stage = pictures.Stage.of([shot], "stress", pictures.SIZE)
+    frame = read(tmp_path / "cable", 0)
+    stage = Stage.of([frame], "stress", pictures.SIZE, frame.supports)
     assert len(stage.views) == 1
     assert np.abs(stage.views[0].axes - [[1, 0, 0], [0, 0, 1], [0, -1, 0]]).max() < 1e-12
 
 
 def test_flat_web_is_seen_obliquely(tmp_path):
-    shot = pictures.shots.read(write(tmp_path / "flat", [(0, 0.0, tent(height=0.0))]), 0)
-    assert [view.perspective for view in pictures.Stage.of([shot], "stress", pictures.SIZE).views] == [True, False]
+    frame = read(write(tmp_path / "flat", [(0, 0.0, tent(height=0.0))]), 0)
+    stage = Stage.of([frame], "stress", pictures.SIZE, frame.supports)
+    assert [view.perspective for view in stage.views] == [True, False]
 
 
 @pytest.mark.parametrize("tangent", [None, 0.2])
@@ -146,7 +150,7 @@ def test_higher_order_elements_are_curves(tmp_path):
     nodes = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0, -0.25]])
     folder = write(tmp_path / "arc", [(0, 0.0, catenary())])
     meshio.Mesh(nodes, [("line3", [[0, 1, 2]])], cell_data={"tension": [[1.0]]}).write(folder / "frames/web_000000.vtu")
-    path = pictures.shots.read(folder, 0).paths[0]
+    path = read(folder, 0).paths[0]
     assert path[:, 2] == pytest.approx(path[:, 0] * (path[:, 0] - 1), abs=1e-15)
 
 
@@ -159,19 +163,47 @@ def test_curved_elements_of_a_run_are_drawn(no_opengl, tmp_path, order):
     scene = refweb.Scene(web=web, cable=cable, effects=[gravity], supports=refweb.Supports(nodes=[0, 2]))
     refweb.run(scene, out=tmp_path / "cable")
     assert colours(pictures.picture(tmp_path / "cable"))[0] > 100
-    shot = pictures.shots.read(tmp_path / "cable", 0)
-    assert shot.paths.shape == shot.origin.shape == (4, 9, 3) and shot.tree
-    assert not shot.origin[:, :, 1:].any() and np.abs(np.diff(shot.origin, 2, axis=1)).max() < 1e-13
-    chord = np.linspace(shot.paths[:, 0], shot.paths[:, -1], 9, axis=1)
-    assert np.linalg.norm(shot.paths - chord, axis=2).max() > 0.02
+    frame = read(tmp_path / "cable", 0)
+    assert frame.paths.shape == frame.origin.shape == (4, 9, 3) and frame.tree
+    assert not frame.origin[:, :, 1:].any() and np.abs(np.diff(frame.origin, 2, axis=1)).max() < 1e-13
+    chord = np.linspace(frame.paths[:, 0], frame.paths[:, -1], 9, axis=1)
+    assert np.linalg.norm(frame.paths - chord, axis=2).max() > 0.02
+
+
+def test_a_frame_in_memory_is_that_of_its_folder(tmp_path):
+    """To the last bit: curved elements, a body, supports, all that is known of lines and nodes; and so is its page."""
+    scene = refweb.Scene(
+        title="In memory",
+        web=refweb.Window(mesh="square", rows=2, columns=2, side=0.5),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1e3, order=3),
+        effects=[
+            refweb.Gravity(acceleration=(0, 0, -9.81)),
+            refweb.Body(name="ball", radius=0.2, position=(0, 0, -0.15), fixed=True),
+            refweb.Contact(stiffness=1e3),
+        ],
+    )
+    solution = refweb.run(scene)
+    solution.save(tmp_path / "out")
+    number, state = solution.frames[-1]
+    supported = state.system.supported[: state.system.net.nodes].any(axis=1)
+    here, there = frame_of(number, state.time, meshes(state), supported), read(tmp_path / "out", number)
+    assert here.fields.keys() == there.fields.keys() and here.bodies.keys() == there.bodies.keys() == {"ball"}
+    assert (here.number, here.time, here.tree) == (there.number, there.time, there.tree)
+    pairs = [(getattr(here, name), getattr(there, name)) for name in ("paths", "origin", "slack", "supports")]
+    pairs += [(here.fields[name], there.fields[name]) for name in here.fields]
+    for a, b in [*pairs, *zip(here.bodies["ball"], there.bodies["ball"], strict=True)]:
+        np.testing.assert_array_equal(a, b)
+    page = pictures.drawn(here, pictures.Heading.of("In memory", "static"))
+    page.savefig(tmp_path / "memory.png")
+    assert (tmp_path / "memory.png").read_bytes() == pictures.picture(tmp_path / "out").read_bytes()
 
 
 def test_slack_lines_are_grey_and_no_part_of_the_range(film):
-    shot = pictures.shots.read(film, 20)
-    stage = pictures.Stage.of([shot], "stress", pictures.SIZE)
-    assert shot.slack.any() and not shot.slack.all()
-    assert stage.limits[0] == shot.fields["stress"][~shot.slack].min()
-    assert len(stage.model(shot, shot.pins)[1].paths) == shot.slack.sum()
+    frame = read(film, 20)
+    stage = Stage.of([frame], "stress", pictures.SIZE, frame.supports)
+    assert frame.slack.any() and not frame.slack.all()
+    assert stage.limits[0] == frame.fields["stress"][~frame.slack].min()
+    assert len(stage.model(frame)[1].paths) == frame.slack.sum()
 
 
 @pytest.mark.parametrize(
@@ -186,7 +218,7 @@ def test_slack_lines_are_grey_and_no_part_of_the_range(film):
     ],
 )
 def test_units(field, largest, expected):
-    factor, unit = pictures._scaled_unit(field, largest)
+    factor, unit = scaled_unit(field, largest)
     assert (pytest.approx(factor), unit) == expected
 
 

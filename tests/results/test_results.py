@@ -329,7 +329,7 @@ def test_a_save_that_is_cut_short_is_marked(tmp_path, solution, monkeypatch):
     def full(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("refweb.results.folder.write_frame", full)
+    monkeypatch.setattr("refweb.results.folder.write_mesh", full)
     with pytest.raises(refweb.SolverError, match="disk full"):
         solution.save(tmp_path / "out")
     assert read_json(tmp_path / "out")["status"] == "running" and listed(tmp_path / "out") == []

@@ -25,8 +25,8 @@ import time
 
 import refweb
 from refweb.dynamics.simulation import Motion
-from refweb.results.solution import Solution
 from refweb.scene import Scene
+from refweb.solution import Solution
 
 PLAIN = {
     "title": "square web, thrown",

@@ -23,8 +23,8 @@ import numpy as np
 from refweb.dynamics.simulation import Motion
 from refweb.effects.contact.nearest_point import AWAY, PENALTY, RADIUS
 from refweb.net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
-from refweb.results.solution import Solution
 from refweb.scene import Scene
+from refweb.solution import Solution
 
 LIMITS = {"square web hit by a ball": 1.3, "cable of 100 elements": 1.4}
 """Largest ratio to the C loop."""

@@ -24,8 +24,8 @@ list; ``code`` between double backticks. The module has one function ``case(quic
 
 - ``quick`` asks for the same assertions on smaller or fewer scenes: seconds, not minutes.
 - Figures are drawn only for the report, so ``draw`` is a function without arguments; it returns a
-  `matplotlib.figure.Figure`, see `validation.harness.plots`, or the bytes of a PNG: its ``picture`` draws a solution
-  as ``refweb picture`` does.
+  `matplotlib.figure.Figure`, see `validation.harness.plots`, whose ``picture`` draws a solution as ``refweb picture``
+  does, or the bytes of a PNG.
 - A reference never comes from the code under test, and a tolerance says where it comes from.
 - There is no empty cell: what is unknown is said to be unknown.
 """

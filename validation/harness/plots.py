@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import pathlib
-import tempfile
 
 import numpy as np
 
@@ -37,12 +35,15 @@ def ticks(plot, numbers):
 
 
 def picture(solution, field=None):
-    """The picture of a solution that ``refweb picture`` draws, the bytes of a PNG."""
-    from refweb.pictures.pictures import picture as drawn
+    """The picture of a solution in memory that ``refweb picture`` draws of its folder, a matplotlib figure."""
+    from refweb.pictures.frames import frame_of
+    from refweb.pictures.pictures import Heading, drawn
+    from refweb.results.vtu import meshes
 
-    with tempfile.TemporaryDirectory() as folder:
-        solution.save(pathlib.Path(folder) / "result")
-        return drawn(pathlib.Path(folder) / "result", field=field).read_bytes()
+    number, state = solution.frames[-1]
+    supported = state.system.supported[: state.system.net.nodes].any(axis=1)
+    frame = frame_of(number, state.time, meshes(state), supported)
+    return drawn(frame, Heading.of(solution.scene.title, solution.scene.solve.kind, solution.status), field)
 
 
 def png(drawn):

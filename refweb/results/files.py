@@ -1,0 +1,52 @@
+"""Files that are whole or not there: written beside their place and then moved; numbers and tables as text."""
+
+from __future__ import annotations
+
+import functools
+import os
+import pathlib
+import tempfile
+
+
+def write_atomically(path, write):
+    """Call ``write(file name)`` for a file beside ``path`` and move it there."""
+    handle, name = tempfile.mkstemp(prefix=".refweb-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    try:
+        write(name)
+        os.chmod(name, 0o666 & ~_umask())
+        os.replace(name, path)
+    except BaseException:
+        pathlib.Path(name).unlink(missing_ok=True)
+        raise
+
+
+@functools.cache
+def _umask():
+    """The process's mask of permissions, which can only be read by setting it."""
+    mask = os.umask(0o077)
+    os.umask(mask)
+    return mask
+
+
+def write_text(path, text):
+    """Write a text file atomically, as UTF-8."""
+    write_atomically(path, lambda name: pathlib.Path(name).write_text(text, encoding="utf-8"))
+
+
+def number(value):
+    """A number as text that reads back to the same float."""
+    return repr(float(value))
+
+
+def as_toml(given):
+    """The dict of a scene as TOML, its tables in the order they have there: sums are taken in that order."""
+    import tomli_w
+
+    parts = []
+    for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
+        if isinstance(value, list):
+            parts += [f"[[{key}]]\n{tomli_w.dumps(one)}" for one in value]
+        else:
+            parts.append(tomli_w.dumps({key: value}))
+    return "\n".join(parts)

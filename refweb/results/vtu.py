@@ -1,0 +1,103 @@
+"""A state as meshes: points, cells and what is known of them, for its web and its bodies, and their VTU files."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .files import write_atomically
+
+POINT_DATA = ("displacement", "velocity", "reaction", "mass")
+SHAPE_SIZE = 0.05
+"""Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
+CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
+
+
+def meshes(state, shape=None):
+    """The meshes of a state by name: ``web``, and its bodies.
+
+    Parameters
+    ----------
+    state : refweb.results.state.State
+        What is drawn.
+    shape : ndarray, shape (nodes, 3), optional
+        A mode that is drawn on it.
+
+    Returns
+    -------
+    dict of str to meshio.Mesh
+    """
+    return {"web": web_mesh(state, shape), **{body.name: body_mesh(body, state) for body in state.system.net.bodies}}
+
+
+def web_mesh(state, shape=None):
+    """The web of a state: current positions, its lines in the web's own numbering, float64.
+
+    Elements of order 2 and 3 are quadratic and cubic cells; those of a line that is divided follow each other. A
+    ``shape`` is drawn on it.
+    """
+    import meshio
+
+    points, point_data, cell_data = frame_data(state, shape)
+    net = state.system.net
+    return meshio.Mesh(
+        points,
+        [({1: "line", 2: "line3", 3: "line4"}[net.order], net.cells)],
+        point_data=point_data,
+        cell_data={key: [values] for key, values in cell_data.items()},
+    )
+
+
+def body_mesh(body, state):
+    """The surface of a body at its current position."""
+    import meshio
+
+    points, triangles = body.surface(state.position[body.row])
+    data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
+    point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
+    return meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
+
+
+def write_mesh(path, mesh):
+    """Write a mesh as VTU, atomically."""
+    import meshio
+
+    write_atomically(path, lambda name: meshio.write(name, mesh, file_format="vtu"))
+
+
+def frame_data(state, shape=None):
+    """Points, and point and cell data by name, of a state's web, as VTU has them; one cell per element.
+
+    The ``shape`` of a mode, of shape (nodes, 3), is point data as well, and is added to points and displacement.
+    """
+    net = state.system.at(state.time).net
+    fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
+    points, *point_data = (values[: net.nodes].copy() for values in fields)
+    curved = [points, *point_data[:2]]
+    if shape is not None:
+        large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
+        for values in curved[:2]:
+            values += large * shape
+        point_data.append(shape.copy())
+        curved.append(point_data[-1])
+    if net.order > 2:
+        inner, weights = net.cells[:, 2:], _drawn(net)[2:]
+        for values in curved:
+            values[inner] = np.einsum("ia,cax->cix", weights, values[net.cells])
+    cells = (state.element_tension, state.element_tension / net.area, state.element_strain)
+    cell_data = dict(zip(CELL_DATA, (*cells, net.natural_length, state.element_slack), strict=True))
+    if net.subdivide > 1:
+        cell_data["line"] = net.line
+    cell_data = {key: np.asarray(values, dtype=float) for key, values in cell_data.items()}
+    return points, dict(zip((*POINT_DATA, "shape"), point_data, strict=False)), cell_data
+
+
+def _drawn(net):
+    """Weights of a cell's nodes at the places where VTK has the nodes of a line of that order, shape (nodes, nodes).
+
+    VTK's cubic has its inner nodes at thirds, this element at the Gauss–Lobatto points: the curve through the element's
+    own nodes would have 10 % less sag than the element.
+    """
+    order = net.order
+    places = np.array([0.0, 1.0, *np.arange(1, order) / order])
+    powers = np.arange(order + 1)
+    return places[:, None] ** powers @ np.linalg.inv(net.places[:, None] ** powers)
