@@ -11,7 +11,7 @@ from . import memory
 from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
 from .messages import nearest, shown
-from .net import net as lines
+from .net import discretisation
 from .registry import EFFECTS, INTEGRATORS, load, name_of
 from .settings import START_STATES
 from .system.system import System
@@ -57,7 +57,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     """
     web = _web(web, folder)
     _check_memory(len(web.lines), cable, effects, solve, output)
-    net = lines.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
+    net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported)
     _check_motions(system)

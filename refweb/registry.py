@@ -16,7 +16,7 @@ WEBS = {
     "layers": "refweb.net.lattices:Layers",
     "cable": "refweb.net.single_cable:SingleCable",
     "inline": "refweb.net.inline:Inline",
-    "file": "refweb.net.inline:File",
+    "file": "refweb.net.mesh_file:File",
 }
 """Kinds of ``[web]``."""
 EFFECTS = {

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from refweb.effects.elasticity import Elasticity
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.net.cable import Cable
 from refweb.net.web import Web
 from refweb.system.system import System
@@ -35,12 +35,12 @@ def skew_cable(law="smooth"):
 
 
 def skew_net(law="smooth", pieces=1, **options):
-    return lines.build(skew_web(), replace(skew_cable(law), subdivide=pieces), **options)
+    return discretisation.build(skew_web(), replace(skew_cable(law), subdivide=pieces), **options)
 
 
 def system(web, cable, effects=(), quasi_static=True, supported=None):
     """The system of a web with its rim supported."""
-    net = lines.build(web, cable, quasi_static=quasi_static)
+    net = discretisation.build(web, cable, quasi_static=quasi_static)
     if supported is None:
         supported = np.zeros((len(net.points), 3), dtype=bool)
         supported[web.rim] = True

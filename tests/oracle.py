@@ -5,8 +5,8 @@ Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, T = A σ(
     internal force   ∫ T t·δx' ds
     tangent          ∫ [A σ' (t·δx')(t·dx') + T/λ (δx'·dx' − (t·δx')(t·dx'))] ds
 
-scikit-fem sees natural arc length through the mapping of `refweb.net.net.basis` and numbers the components of nodes in
-its own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs from the
+scikit-fem sees natural arc length through the mapping of `refweb.net.discretisation.basis` and numbers the components
+of nodes in its own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs from the
 numbering that scenes promise: the web's nodes, then those that order and subdivision add, line by line and along each
 line.
 """
@@ -15,7 +15,7 @@ import numpy as np
 import skfem
 from skfem.helpers import dot
 
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.net.elements import line_element
 
 
@@ -111,7 +111,7 @@ class Oracle:
         ends, vertex = np.unique(self.cells[:, [0, -1]], return_inverse=True)
         vertex = vertex.reshape(-1, 2)
         vector = skfem.ElementVector(element, 3)
-        self.basis = lines.basis(self.points[ends], vertex, values["natural_length"] / pieces, vector)
+        self.basis = discretisation.basis(self.points[ends], vertex, values["natural_length"] / pieces, vector)
         # Dofs of an element: first its two ends, then what lies inside along it; of each node x, y, z.
         own = np.hstack([self.cells[:, [0, -1]], self.cells[:, 1:-1]])
         self.row = np.empty(self.basis.N, dtype=int)

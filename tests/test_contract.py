@@ -22,7 +22,7 @@ from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects import elasticity
 from refweb.effects.base import Drive
 from refweb.errors import InputError
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.system.system import System
 
 EXAMPLES = {
@@ -108,7 +108,7 @@ def make(name, i, law, tensionless=False):
     """(net, system of one effect); a contact has bodies to touch, with ends of lines and with their middles."""
     web = replace(nets.skew_web(), natural_length=None) if tensionless else nets.skew_web()
     pieces = 3 if name == "Bending" else 1  # no line of it continues another
-    net = lines.build(web, replace(nets.skew_cable(law), subdivide=pieces))
+    net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
     bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name == "Contact" else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
@@ -357,7 +357,7 @@ def test_bound_bounds(effects, mass, law):
 def test_bound_bounds_one_line(mass, length, place, height, held):
     """A ball of 0.3 m far into a line, at its end or over a short one that it turns; ends held without a mass."""
     web = refweb.SingleCable(start=(0, 0, 0), end=(length, 0, 0), elements=1).web()
-    net = lines.build(web, refweb.Cable(law="linear", modulus=1.0, area=1.0, density=0.0))
+    net = discretisation.build(web, refweb.Cable(law="linear", modulus=1.0, area=1.0, density=0.0))
     supported = np.arange(2) < held
     net = replace(net, mass=np.where(supported, 0.0, 1e-2))
     ball = CLASSES["Body"](name="ball", radius=0.3, mass=mass, position=(place, 0.0, height))

@@ -26,7 +26,8 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 # Modules
 
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
-EVERY |= {"net", "net.tension_laws", "net.cable", "net.web", "net.elements", "net.net", "net.rigid_body"}
+EVERY |= {"net", *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web"))}
+EVERY |= {"net.rigid_body"}
 EVERY |= {"solution", "results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
 EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "files", "vtu", "provenance", "run_status")}
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}

@@ -16,7 +16,7 @@ from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.bending import Bending, springs
 from refweb.errors import InputError
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.system.system import System
 
 
@@ -172,7 +172,7 @@ def test_bound_of_a_straight_chain():
 
 def skew_system(seed, pieces=3, size=0.1):
     """A branching net of divided lines, in a state with turns of up to two rad."""
-    net = lines.build(skew_web(), replace(skew_cable("linear"), subdivide=pieces))
+    net = discretisation.build(skew_web(), replace(skew_cable("linear"), subdivide=pieces))
     rng = np.random.default_rng(seed)
     net = replace(net, mass=10.0 ** rng.uniform(-3, 0, len(net.mass)))
     system = System(net, [Bending(stiffness=2.0)], np.zeros((len(net.points), 3), dtype=bool))
@@ -191,7 +191,7 @@ def test_bound_bounds(size):
 @pytest.mark.parametrize("angle", [0.0, 1e-8, 1e-3, 0.0316, 0.0317, 0.5, 1.6, 2.5, 3.1, 3.1415])
 def test_tangent_at_every_angle(angle):
     """Energy and its first two derivatives along a line, against mpmath."""
-    net = lines.build(chain(2, 2.0, supports=[]).web(), bar())
+    net = discretisation.build(chain(2, 2.0, supports=[]).web(), bar())
     system = System(net, [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool))
     turned = np.array([[0.0, 0.0, 0.0], [0.7, 0.0, 0.0], [0.7 + 1.3 * np.cos(angle), 0.0, 1.3 * np.sin(angle)]])
     x, rng = turned - net.points, np.random.default_rng(7)
@@ -220,7 +220,7 @@ def test_tangent_at_every_angle(angle):
 
 def test_a_fold_is_finite():
     """½ (B/L̄) π² where a line is folded back onto itself, or an element has no length; forces B π/(L̄ |a|) beside it."""
-    net = lines.build(chain(2, 2.0, supports=[]).web(), bar())
+    net = discretisation.build(chain(2, 2.0, supports=[]).web(), bar())
     system = System(net, [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool))
     fold = np.array([[0.0] * 3, [0.0] * 3, [-1.5, 0.0, 0.0]])
     np.testing.assert_allclose(system.energy(0.0, fold), 1.5 * np.pi**2, rtol=1e-15)
@@ -235,7 +235,7 @@ def test_a_fold_is_finite():
 
 def test_tiny_deflections_keep_their_digits():
     """(k/L²) (1, −2, 1) of the force at a deflection of 1e-17 m, where positions of a metre end at 1e-16."""
-    net = lines.build(chain(2, 2.0, supports=[]).web(), bar())
+    net = discretisation.build(chain(2, 2.0, supports=[]).web(), bar())
     system = System(net, [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool))
     x = np.zeros((3, 3))
     x[1, 2] = 1e-17
@@ -247,7 +247,7 @@ def test_tiny_deflections_keep_their_digits():
 def test_springs_of_webs(mesh, through, pieces):
     """Lines run on through every node that has all of its lines, and within each divided line."""
     web = refweb.Window(mesh=mesh, rows=6, columns=6, side=0.2).web()
-    net = lines.build(web, refweb.Cable(modulus=7e7, area=1e-4, density=1.0, subdivide=pieces))
+    net = discretisation.build(web, refweb.Cable(modulus=7e7, area=1e-4, density=1.0, subdivide=pieces))
     rows, elements = springs(net)
     inner = np.bincount(rows[:, 1], minlength=len(net.points))
     full = np.bincount(web.lines.ravel()) == 2 * through
@@ -284,7 +284,7 @@ def star(*degrees):
     ],
 )
 def test_every_end_takes_the_line_that_continues_it_best(web, expected):
-    rows, _ = springs(lines.build(web.web(), bar()))
+    rows, _ = springs(discretisation.build(web.web(), bar()))
     if isinstance(expected, int):
         assert len(rows) == expected
     else:
@@ -294,7 +294,9 @@ def test_every_end_takes_the_line_that_continues_it_best(web, expected):
 def test_stiffness_is_over_the_mean_length():
     points = [[0, 0, 0], [1, 0, 0], [4, 0, 0]]
     web = refweb.Inline(points=points, lines=[[0, 1], [1, 2]], natural_length=[1.5, 2.5], supports=[])
-    (family,) = System(lines.build(web.web(), bar()), [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool)).families
+    (family,) = System(
+        discretisation.build(web.web(), bar()), [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool)
+    ).families
     np.testing.assert_array_equal(family.data[:, 0], [1.5])
 
 

@@ -15,7 +15,7 @@ from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
 from refweb.errors import InputError
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.results.state import State
 from refweb.system.system import System
 
@@ -230,7 +230,7 @@ def bar(effects, elements=12, consistent=False, **cable):
     """A taut cable of 1 m along x with both ends fixed."""
     web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=elements).web()
     given = {"law": "tension-only", "modulus": 1e4, "area": 1e-2, "density": 100.0, "prestrain": 0.2}
-    net = lines.build(web, refweb.Cable(**{**given, **cable}), consistent=consistent)
+    net = discretisation.build(web, refweb.Cable(**{**given, **cable}), consistent=consistent)
     supported = np.zeros((len(net.points), 3), dtype=bool)
     supported[web.rim] = True
     return System(net, [Elasticity(), *effects], supported)
@@ -335,7 +335,7 @@ def test_bound_bounds(law):
     effect = refweb.Damping(time=0.1)
     for seed, order in enumerate((1, 2, 3, 1, 2, 3)):
         rng = np.random.default_rng(seed)
-        net = lines.build(nets.skew_web(), replace(nets.skew_cable(law), order=order))
+        net = discretisation.build(nets.skew_web(), replace(nets.skew_cable(law), order=order))
         net = replace(net, mass=10.0 ** rng.uniform(-3, 0, len(net.mass)))
         system = System(net, [effect], np.zeros((len(net.points), 3), dtype=bool))
         x, v = (0.1 * rng.standard_normal(net.points.shape) for _ in range(2))

@@ -11,8 +11,7 @@ from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
-from refweb.net import elements
-from refweb.net import net as lines
+from refweb.net import discretisation, elements
 from refweb.net.web import Web
 from refweb.statics import dynamic_relaxation as relaxation
 from refweb.statics import load_steps
@@ -32,7 +31,7 @@ def cable(law="tension-only", **changes):
 
 def system_of(web, cable, effects, supported=None, quasi_static=True):
     """A system whose rows are free but for those components of the web's nodes that ``supported`` holds."""
-    net = lines.build(web, cable, quasi_static=quasi_static)
+    net = discretisation.build(web, cable, quasi_static=quasi_static)
     held = np.zeros((len(net.points), 3), dtype=bool)
     if supported is not None:
         held[: len(supported)] = supported

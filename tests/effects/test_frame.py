@@ -13,7 +13,7 @@ from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.scene import SHIPPED_SCENES
 from refweb.statics import dynamic_relaxation as relaxation
@@ -31,7 +31,7 @@ def cable(law="linear", **changes):
 
 def turning(web, cable, speed, effects=(), supports=(), axis=ALONG_Z, quasi_static=True, consistent=False):
     """A system in a frame that turns at a speed [rad/s] about an axis; nodes of ``supports`` are held."""
-    net = lines.build(web, cable, quasi_static=quasi_static, consistent=consistent)
+    net = discretisation.build(web, cable, quasi_static=quasi_static, consistent=consistent)
     supported = np.zeros((len(net.points), 3), dtype=bool)
     supported[list(supports)] = True
     frame = refweb.Frame(angular_velocity=speed * np.array(axis))
@@ -133,7 +133,7 @@ def test_limit_of_a_net():
     """Against the generalised eigenvalue of dense matrices, put together line by line: skew axis, two nodes held."""
     axis, web = np.array([1.0, -2.0, 3.0]), nets.skew_web()
     cable = nets.skew_cable("tension-only")
-    net = lines.build(web, cable)
+    net = discretisation.build(web, cable)
     across = (axis @ axis) * np.eye(3) - np.outer(axis, axis)
     stiff, free = np.zeros((6, 6)), [1, 3, 4, 5]
     for (i, j), axial, length in zip(web.lines, net.line_data[:, 1], web.natural_length, strict=True):
@@ -281,7 +281,7 @@ def test_radial_arm_and_the_force_on_its_rail():
     l is its length in equilibrium. The rail gives it the Coriolis force, 2 m Ω times its speed.
     """
     mass, speed = 2.0, 30.0
-    net = lines.build(arm(), cable(density=0.0))
+    net = discretisation.build(arm(), cable(density=0.0))
     supported = np.array([[True] * 3, [False, True, True]])
     effects = [Elasticity(), refweb.Frame(angular_velocity=(0, 0, speed)), refweb.PointMass(node=1, mass=mass)]
     system = System(net, effects, supported)
@@ -305,7 +305,7 @@ def test_a_ring_keeps_turning_about_its_normal():
         body = refweb.Body(
             name="b", shape=shape, radius=0.05, mass=1.0, position=(0, 0, 0.5), angular_velocity=5.0 * normal, **body
         )
-        net = lines.build(arm(), cable())
+        net = discretisation.build(arm(), cable())
         effects = [Elasticity(), body, refweb.Contact(stiffness=1e4, friction=0.3)]
         system = System(net, [*effects, refweb.Frame(angular_velocity=(0, 0, 1.0))], np.ones((2, 3), dtype=bool))
         _, v, _ = at_time(system, 0.5, CentralDifference)
@@ -321,7 +321,7 @@ def wheel(speed, frame, consistent=False):
     """A free taut web of 0.8 m with a kick, seen from the frame it turns in or from outside: system, x and v."""
     web = refweb.Layers(mesh="hexagon", layers=2, cell_area=0.04).web()
     axis = np.array([0.3, 0.0, 1.0])
-    net = lines.build(web, cable("tension-only", modulus=1e5, prestrain=0.05), False, consistent)
+    net = discretisation.build(web, cable("tension-only", modulus=1e5, prestrain=0.05), False, consistent)
     effects = [refweb.Frame(angular_velocity=speed * axis)] if frame else []
     system = System(net, [Elasticity(), *effects], np.zeros(net.points.shape, dtype=bool))
     x, y, _ = net.points.T

@@ -9,8 +9,7 @@ import skfem
 from nets import LAWS, skew_cable, skew_net, skew_web, system
 from oracle import Oracle
 
-from refweb.net import elements
-from refweb.net import net as lines
+from refweb.net import discretisation, elements
 from refweb.net.cable import Cable
 from refweb.net.web import Web
 from refweb.results.state import State
@@ -33,7 +32,7 @@ def displacement(seed, rows=6, size=0.05):
 def skew_system(law, order=1, subdivide=1):
     """The skew net with two nodes held and a third in one direction only."""
     cable = finer_cable(law, order, subdivide)
-    supported = np.zeros((len(lines.build(skew_web(), cable).points), 3), dtype=bool)
+    supported = np.zeros((len(discretisation.build(skew_web(), cable).points), 3), dtype=bool)
     supported[[0, 2]] = True
     supported[4, 1] = True
     return system(skew_web(), cable, supported=supported)
@@ -60,7 +59,7 @@ def test_kernels_equal_the_weak_form(law, seed, order, subdivide):
 def test_added_nodes_follow_the_webs_own_along_each_line(order, subdivide):
     """And divide it straight, at its Gauss–Lobatto points; the elements of a line are rows that follow each other."""
     web, cable = skew_web(), finer_cable("linear", order, subdivide)
-    net, oracle = lines.build(web, cable), Oracle(web, cable)
+    net, oracle = discretisation.build(web, cable), Oracle(web, cable)
     assert net.order == order and net.nodes == len(net.points) == 6 + 9 * (order * subdivide - 1)
     np.testing.assert_array_equal(net.points[:6], web.points)
     # Two roundings of coordinates of at most 1.1 m.
@@ -93,11 +92,11 @@ def test_functions_of_an_element(order):
 def test_basis_is_scikit_fems():
     net = skew_net()
     for element in (None, skfem.ElementLineP2(), skfem.ElementVector(skfem.ElementLineP1(), 3)):
-        basis = lines.basis(net.points, net.web.lines, net.natural_length, element)
+        basis = discretisation.basis(net.points, net.web.lines, net.natural_length, element)
         assert type(basis) is skfem.Basis
         # ∫ ds: the metric is the natural length, whatever the distance of the nodes.
         np.testing.assert_allclose(basis.dx.sum(axis=1), net.natural_length, rtol=1e-15)
-    basis = lines.basis(net.points, net.web.lines, net.natural_length)
+    basis = discretisation.basis(net.points, net.web.lines, net.natural_length)
     ends = basis.interpolate(np.arange(6.0)).grad[0, :, 0] * net.natural_length
     np.testing.assert_allclose(ends, np.diff(net.web.lines, axis=1)[:, 0], rtol=1e-15)
 
@@ -109,7 +108,7 @@ def test_mass_follows_natural_length():
     web = Web(points=points, lines=pairs, natural_length=length, groups=("", "thick", "", ""))
     cable = Cable(modulus=1.0, area=0.25, density=512.0, groups={"thick": dict(area=0.5, density=256.0)})
     per_line = np.array([512 * 0.25, 256 * 0.5, 512 * 0.25, 512 * 0.25]) * length
-    mass = lines.build(web, cable).mass
+    mass = discretisation.build(web, cable).mass
     by_node = [per_line[[0, 3]].sum(), per_line[[0, 1]].sum(), per_line[1:].sum(), per_line[2]]
     assert mass.tolist() == [share / 2 for share in by_node]
     assert mass.sum() == per_line.sum()
@@ -120,10 +119,10 @@ def test_mass_is_scikit_fems(order, subdivide):
     """Lumped: the row sums of the consistent mass, none of them negative. Lumped and its spread: the matrix itself."""
     web, cable = skew_web(), finer_cable("linear", order, subdivide)
     expected = Oracle(web, cable).mass().toarray()
-    net = lines.build(web, cable, consistent=True)
-    assert lines.build(web, cable).consistent_minus_lumped is None and net.mass.min() > 0.0
+    net = discretisation.build(web, cable, consistent=True)
+    assert discretisation.build(web, cable).consistent_minus_lumped is None and net.mass.min() > 0.0
     np.testing.assert_allclose(np.repeat(net.mass, 3), expected.sum(axis=1), rtol=1e-13)
-    np.testing.assert_array_equal(net.mass, lines.build(web, cable).mass)
+    np.testing.assert_array_equal(net.mass, discretisation.build(web, cable).mass)
     properties = cable.properties(web)
     whole = sum(properties["density"] * properties["area"] * properties["natural_length"])
     np.testing.assert_allclose([net.mass.sum(), net.cable_mass], whole, rtol=1e-14)

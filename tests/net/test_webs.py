@@ -8,8 +8,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from refweb.errors import InputError
-from refweb.net.inline import File, Inline
+from refweb.net.inline import Inline
 from refweb.net.lattices import Layers, Paper, Window
+from refweb.net.mesh_file import File
 from refweb.net.single_cable import SingleCable
 from refweb.net.web import Web
 

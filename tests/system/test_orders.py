@@ -19,8 +19,7 @@ from scipy.optimize import minimize_scalar
 
 import refweb
 from refweb.effects.elasticity import Elasticity
-from refweb.net import elements
-from refweb.net import net as lines
+from refweb.net import discretisation, elements
 from refweb.net.cable import Cable
 from refweb.net.web import Web
 from refweb.results.state import State
@@ -116,7 +115,7 @@ def hanging(case, law, order, count=1, subdivide=1):
 
 
 def held_ends(web, cable):
-    rows = len(lines.build(web, cable).points)
+    rows = len(discretisation.build(web, cable).points)
     supported = np.zeros((rows, 3), dtype=bool)
     supported[web.rim] = True
     return supported
@@ -170,7 +169,7 @@ def test_a_divided_line_hangs_as_several_lines(case, order):
 
 def frequencies(web, cable, consistent):
     """Circular frequencies across a flat prestressed web [1/s], ascending, from K and M at its own position."""
-    net = lines.build(web, cable, consistent=consistent)
+    net = discretisation.build(web, cable, consistent=consistent)
     supported = np.ones((len(net.points), 3), dtype=bool)
     supported[:, 2] = False
     supported[web.rim] = True
@@ -270,7 +269,7 @@ def rod(count, order):
         rim=(0, count),
     )
     cable = Cable(law="tension-only", modulus=1.0, area=1.0, density=1.0, order=order)
-    supported = np.ones((len(lines.build(web, cable).points), 3), dtype=bool)
+    supported = np.ones((len(discretisation.build(web, cable).points), 3), dtype=bool)
     supported[:, 0] = False
     supported[web.rim] = True
     return nets.system(web, cable, quasi_static=False, supported=supported)

@@ -24,7 +24,7 @@ from refweb.dynamics.integrators.central_difference import CentralDifference, Op
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.effects.elasticity import Elasticity
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.results.state import State
 from refweb.system.system import System
 
@@ -44,7 +44,7 @@ def window(size=4):
 def small(effects=(), order=1, consistent=False, prestrain=0.05, size=4, **changes):
     """A web whose lines are strained by 5 % and stay taut, away from every kink."""
     web = window(size).web()
-    net = lines.build(web, cable(order=order, prestrain=prestrain, **changes), consistent=consistent)
+    net = discretisation.build(web, cable(order=order, prestrain=prestrain, **changes), consistent=consistent)
     supported = np.zeros((len(net.points), 3), dtype=bool)
     supported[web.rim] = True
     return System(net, [Elasticity(), *effects], supported)
@@ -190,7 +190,7 @@ def test_adams_of_order_two_is_the_trapezoidal_rule():
 def test_trapezoidal_rule_on_an_oscillator():
     """It turns the phase by 2 atan(½ωh) in each step and keeps the energy, to the rounding of a linear equation."""
     web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]]).web()
-    net = refweb.net.net.build(web, cable(law="linear"))
+    net = discretisation.build(web, cable(law="linear"))
     supported = np.array([[True] * 3, [False, True, True]])
     system = System(net, [Elasticity()], supported)
     rate = np.sqrt(MODULUS * AREA / net.mass[1])
@@ -386,7 +386,7 @@ def test_work_of_motion_is_force_times_way():
     """
     web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]]).web()
     table = [(0.0, 0.0, 0.0, 0.0), (0.013, -0.02, 0.0, 0.0), (0.021, 0.01, 0.0, 0.0), (0.03, 0.01, 0.0, 0.0)]
-    net = lines.build(web, cable(law="linear", density=0.0))
+    net = discretisation.build(web, cable(law="linear", density=0.0))
     effects = [Elasticity(), refweb.PointMass(node=1, mass=0.5), refweb.Motion(node=0, displacement=table)]
     system = System(net, effects, np.array([[True] * 3, [False, True, True]]))
     rate = np.sqrt(MODULUS * AREA / 0.5)
@@ -412,7 +412,7 @@ def test_consistent_mass_passes_a_motion_on():
     """
     web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]]).web()
     table = [(0.0, 0.0, 0.0, 0.0), (0.0013, -0.002, 0.0, 0.0), (0.0021, 0.001, 0.0, 0.0), (0.003, 0.001, 0.0, 0.0)]
-    net = lines.build(web, cable(law="linear"), consistent=True)
+    net = discretisation.build(web, cable(law="linear"), consistent=True)
     system = System(
         net, [Elasticity(), refweb.Motion(node=0, displacement=table)], np.array([[True] * 3, [False, True, True]])
     )
@@ -522,7 +522,7 @@ def test_a_corrupted_book_is_never_returned(tmp_path, monkeypatch, linear_solver
 def drifting(effects):
     """Two nodes of 2 kg on a massless line so slack that it never acts."""
     web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], natural_length=100.0).web()
-    net = lines.build(web, cable(density=0.0))
+    net = discretisation.build(web, cable(density=0.0))
     return System(net, [Elasticity(), refweb.PointMass(node="all", mass=2.0), *effects], np.zeros((2, 3), dtype=bool))
 
 

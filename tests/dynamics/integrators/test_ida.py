@@ -14,7 +14,7 @@ from refweb.effects.damping import Damping
 from refweb.effects.elasticity import Elasticity
 from refweb.effects.link import Link
 from refweb.errors import InputError, SolverError
-from refweb.net import net as lines
+from refweb.net import discretisation
 from refweb.results import probes
 from refweb.statics import load_steps
 from refweb.system.system import System
@@ -25,7 +25,7 @@ GRAVITY = 9.81
 
 def moving(web, effects, consistent=False, **cable):
     """A system in time, its rim supported."""
-    net = lines.build(
+    net = discretisation.build(
         web, refweb.Cable(**{**dict(law="tension-only", modulus=7e7, area=1e-4), **cable}), False, consistent
     )
     supported = np.zeros((len(net.points), 3), dtype=bool)
