@@ -6,9 +6,9 @@ Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, T = A σ(
     tangent          ∫ [A σ' (t·δx')(t·dx') + T/λ (δx'·dx' − (t·δx')(t·dx'))] ds
 
 scikit-fem sees natural arc length through the mapping of `refweb.net.discretisation.basis` and numbers the components
-of nodes in its own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs from the
-numbering that scenes promise: the web's nodes, then those that order and subdivision add, line by line and along each
-line.
+of nodes in its own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs
+from the numbering that scenes promise: the web's nodes, then those that order and subdivision add, line by line and
+along each line.
 """
 
 import numpy as np

@@ -27,7 +27,7 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
 EVERY |= {"net", *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web"))}
-EVERY |= {"net.rigid_body"}
+EVERY |= {"net.rigid_body", "effects.line_kernels"}
 EVERY |= {"solution", "results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
 EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "files", "vtu", "provenance", "run_status")}
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
@@ -49,7 +49,8 @@ METHOD = {
     "ida": DYNAMICS | SUNDIALS | {"dynamics.integrators.ida"},
 }
 TABLES_OF_TIME = {"effects.time_tables"}
-BELOW = {name: TABLES_OF_TIME for name in ("load", "motion", "pressure", "thrust")}
+BELOW = {name: TABLES_OF_TIME | {"effects.outer_load"} for name in ("load", "pressure", "thrust")}
+BELOW |= {"motion": TABLES_OF_TIME}
 BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
 VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", "effects.contact.nearest_point", "effects.contact.pair", *VECTORS}}

@@ -37,14 +37,15 @@ class Family:
         Numbers of each cell.
     force : kernel
         Adds to the forces.
+    book : str
+        Column of the energy book that its energy or power belongs to: "work", "dissipated_energy", or an energy of
+        its own.
     energy : kernel, optional
         Potential of the force, where there is one.
     stiffness : kernel, optional
         −∂f/∂x by cell, None where it is zero.
     bound : kernel, optional
         Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
-    book : str
-        Column of the energy book that its energy or power belongs to.
     observed : int
         Number of values per cell that ``force`` writes to its ``out``.
     power : int, optional
@@ -75,10 +76,10 @@ class Family:
     cells: np.ndarray
     data: np.ndarray
     force: Callable
-    energy: Callable | None
-    stiffness: Callable | None
-    bound: Callable | None
     book: str
+    energy: Callable | None = None
+    stiffness: Callable | None = None
+    bound: Callable | None = None
     observed: int = 0
     power: int | None = None
     lines: bool = False

@@ -33,7 +33,7 @@ ROUNDING = 1e-9
 
 
 @kernel()
-def bent(x, cells, data, c):
+def hinge(x, cells, data, c):
     """(a, b, a × b, θ, θ/|a × b|) of spring c; the last is 0 where it has no value."""
     i, j, k = cells[c, 0], cells[c, 1], cells[c, 2]
     a, b = (data[c, 1], data[c, 2], data[c, 3]), (data[c, 4], data[c, 5], data[c, 6])
@@ -58,7 +58,7 @@ def inverse_square(a):
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
     for c in range(cells.shape[0]):
-        a, b, n, _, ratio = bent(x, cells, data, c)
+        a, b, n, _, ratio = hinge(x, cells, data, c)
         first, last = cross(n, a), cross(n, b)
         first_scale = data[c, 0] * ratio * inverse_square(a)
         last_scale = data[c, 0] * ratio * inverse_square(b)
@@ -72,7 +72,7 @@ def force(t, x, v, f, cells, data, out):
 @kernel(ENERGY)
 def energy(t, x, cells, data, out):
     for c in range(cells.shape[0]):
-        angle = bent(x, cells, data, c)[3]
+        angle = hinge(x, cells, data, c)[3]
         out[c] = 0.5 * data[c, 0] * angle * angle
 
 
@@ -93,7 +93,7 @@ def stiffness(t, x, v, blocks, cells, data, definite):
     from_nodes = ((-1.0, 1.0, 0.0), (0.0, -1.0, 1.0))
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
-        a, b, _, angle, ratio = bent(x, cells, data, c)
+        a, b, _, angle, ratio = hinge(x, cells, data, c)
         if ratio == 0.0:
             continue
         va, vb, w = math.sqrt(inverse_square(a)), math.sqrt(inverse_square(b)), math.cos(angle)
@@ -121,7 +121,7 @@ def bound(reach, speed, x, mass, rates, cells, data):
     # Of a straight line the rows of k gg, g = (1/|a|, 1/|a| + 1/|b|, 1/|b|); turning adds at most k θ/|a|² along and
     # across a, and takes away out of the plane.
     for c in range(cells.shape[0]):
-        a, b, _, angle, _ = bent(x, cells, data, c)
+        a, b, _, angle, _ = hinge(x, cells, data, c)
         va, vb = math.sqrt(inverse_square(a)), math.sqrt(inverse_square(b))
         first, last = va * (va + vb + angle * va), vb * (va + vb + angle * vb)
         rates[cells[c, 0]] += 2.0 * data[c, 0] * first

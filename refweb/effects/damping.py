@@ -24,22 +24,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
+from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real
 from .base import POWER, TENSION, Family, column
-
-
-@kernel()
-def gradient(v, cells, c, q, nodes, gradients):
-    """dv/dξ at quadrature point q of cell c."""
-    v0 = v1 = v2 = 0.0
-    for a in range(nodes):
-        row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]
-        v0 += d * v[row, 0]
-        v1 += d * v[row, 1]
-        v2 += d * v[row, 2]
-    return v0, v1, v2
+from .line_kernels import gradient, pull_together, strain
 
 
 @kernel()
@@ -90,12 +79,7 @@ def kernels(law, tau, gradients, weights):
                 if q == 0 or tension > largest:
                     largest = tension
                 power -= weights[q] * data[c, LENGTH] * pull * rate
-                s = weights[q] * pull * inverse
-                for a in range(nodes):
-                    row, d = np.uint64(cells[c, a]), s * flat[q * nodes + a]
-                    f[row, 0] -= d * p0
-                    f[row, 1] -= d * p1
-                    f[row, 2] -= d * p2
+                pull_together(f, cells, c, q, nodes, flat, weights[q] * pull * inverse, p0, p1, p2)
             out[c, TENSION] = largest
             out[c, POWER] = power
 
@@ -228,9 +212,7 @@ class Damping(Table):
                     cells=net.cells,
                     data=net.line_data,
                     force=force,
-                    energy=None,
                     stiffness=stiffness,
-                    bound=None,
                     book="dissipated_energy",
                     observed=3,
                     power=POWER,
@@ -250,9 +232,6 @@ class Damping(Table):
                     cells=column(nodes),
                     data=self.rate * net.mass[nodes, None],
                     force=drag,
-                    energy=None,
-                    stiffness=None,
-                    bound=None,
                     book="dissipated_energy",
                     observed=1,
                     power=0,

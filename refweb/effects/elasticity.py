@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING, strain
+from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table
 from .base import STRAIN, TENSION, Family
+from .line_kernels import pull_together, strain
 
 
 @functools.cache
@@ -50,12 +51,7 @@ def kernels(law, gradients, weights):
                 tension = prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if q == 0 or tension > largest:
                     largest, stretched = tension, e
-                s = weights[q] * tension * inverse
-                for a in range(nodes):
-                    row, d = np.uint64(cells[c, a]), s * flat[q * nodes + a]
-                    f[row, 0] -= d * p0
-                    f[row, 1] -= d * p1
-                    f[row, 2] -= d * p2
+                pull_together(f, cells, c, q, nodes, flat, weights[q] * tension * inverse, p0, p1, p2)
             out[c, TENSION] = largest
             out[c, STRAIN] = stretched
 

@@ -166,7 +166,7 @@ class Frame(Table):
 
     def _families(self, pulled, turned):
         force, energy, stiffness, coriolis, damping, damping_bound = kernels(pulled[0].shape[1])
-        own = dict(name="frame", book="frame_energy", bound=None, angular_velocity=self.angular_velocity)
+        own = dict(name="frame", book="frame_energy", angular_velocity=self.angular_velocity)
         return [
             Family(**own, cells=pulled[0], data=pulled[1], force=force, energy=energy, stiffness=stiffness),
             Family(
@@ -174,8 +174,6 @@ class Frame(Table):
                 cells=turned[0],
                 data=turned[1],
                 force=coriolis,
-                energy=None,
-                stiffness=None,
                 damping=damping,
                 damping_bound=damping_bound,
                 symmetric=False,

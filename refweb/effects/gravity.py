@@ -51,7 +51,5 @@ class Gravity(Table):
             data=np.outer(net.mass[heavy], self.acceleration),
             force=force,
             energy=energy,
-            stiffness=None,
-            bound=None,
             book="potential_energy",
         )

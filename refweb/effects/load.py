@@ -8,8 +8,8 @@ import numpy as np
 
 from ..kernels import ENERGY, FORCE, kernel
 from ..tables import Table, nodes, rows, vector
-from .base import Family, column
-from .time_tables import factor, factor_at
+from .base import column
+from .outer_load import factor_at, outer_load
 
 
 @kernel(FORCE)
@@ -59,17 +59,5 @@ class Load(Table):
     def on(self, net):
         """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
-        numbers = [*self.force, *factor(self.factor, net.quasi_static)]
-        return Family(
-            name="load",
-            cells=column(loaded),
-            data=np.tile(numbers, (len(loaded), 1)),
-            force=force,
-            energy=energy,
-            stiffness=None,
-            bound=None,
-            book="work",
-            observed=1,
-            power=0,
-            times=tuple(t for t, _ in self.factor or ()),
-        )
+        data = np.tile(self.force, (len(loaded), 1))
+        return outer_load(net, "load", column(loaded), data, self.factor, force=force, energy=energy)

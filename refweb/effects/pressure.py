@@ -22,11 +22,10 @@ from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import nearest, shown
 from ..net.net import REFERENCE
 from ..tables import Table, field, node_number, numbers_list, real, rows, vector
-from .base import Family
-from .time_tables import factor, factor_at, largest
+from .outer_load import factor_at, outer_load
 
-# Columns of data: p n; dX/dξ; the largest |factor|; the factor.
-NORMAL, ALONG, MOST, FACTOR = 0, 3, 6, 7
+# Columns of data: p n; dX/dξ; the factor.
+NORMAL, ALONG, FACTOR = 0, 3, 6
 
 
 @functools.cache
@@ -79,7 +78,7 @@ def kernels(nodes, shares, couples):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            most = data[c, MOST] * math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))
+            most = data[c, FACTOR] * math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))
             for a in range(nodes):
                 for b in range(nodes):
                     rates[cells[c, a]] += most * abs(couples[nodes * a + b])
@@ -148,22 +147,10 @@ class Pressure(Table):
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
         pushed = self.value * sides[net.line[at], None] * normal
-        numbers = np.tile([largest(self.factor), *factor(self.factor, net.quasi_static)], (len(at), 1))
+        data = np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3]])
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
-        return Family(
-            name="pressure",
-            cells=np.ascontiguousarray(net.cells[at]),
-            data=np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3], numbers]),
-            force=force,
-            energy=None,
-            stiffness=stiffness,
-            bound=bound,
-            book="work",
-            observed=1,
-            power=0,
-            symmetric=False,
-            times=tuple(t for t, _ in self.factor or ()),
-        )
+        own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
+        return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
 
     def _found(self, web):
         """Numbers of the lines."""

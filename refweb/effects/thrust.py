@@ -21,15 +21,13 @@ from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import shown
 from ..net.net import REFERENCE
 from ..tables import Table, field, node_number, nodes, real, rows
-from .base import Family
-from .time_tables import factor, factor_at, largest
+from .outer_load import factor_at, outer_load
 
 SHORTER = 0.5
 """Length, of that at a history row, down to which a line may shrink until the next within the bound of the step."""
 
 
-# Columns of data: F; d at x = 0; ∂d/∂x of each node, the first of which is the one that is pulled; behind these the
-# largest |factor| and the factor.
+# Columns of data: F; d at x = 0; ∂d/∂x of each node, the first of which is the one that is pulled; the factor.
 ALONG, SLOPES = 1, 4
 
 
@@ -50,7 +48,7 @@ def direction(x, cells, data, c, nodes):
 @functools.cache
 def kernels(nodes):
     """Force, stiffness and bound kernels of elements with so many nodes."""
-    most, times = SLOPES + nodes, SLOPES + nodes + 1
+    times = SLOPES + nodes
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -78,7 +76,7 @@ def kernels(nodes):
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
             _, inverse = direction(x, cells, data, c, nodes)
-            turn = 1.4 * abs(data[c, 0]) * data[c, most] * inverse / SHORTER  # row sums of I − e⊗e are below 1.4
+            turn = 1.4 * abs(data[c, 0]) * data[c, times] * inverse / SHORTER  # row sums of I − e⊗e are below 1.4
             for b in range(nodes):
                 rates[cells[c, 0]] += turn * abs(data[c, SLOPES + b])
 
@@ -133,19 +131,7 @@ class Thrust(Table):
         functions = np.linalg.inv(np.vander(net.places, increasing=True))
         slopes = sign * (power[1:] * place ** (power[1:] - 1)) @ functions[1:]
         reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
-        numbers = [self.force, *reference, *slopes[order], largest(self.factor), *factor(self.factor, net.quasi_static)]
+        cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
-        return Family(
-            name="thrust",
-            cells=np.ascontiguousarray(net.cells[[cell]][:, order]),
-            data=np.array([numbers]),
-            force=force,
-            energy=None,
-            stiffness=stiffness,
-            bound=bound,
-            book="work",
-            observed=1,
-            power=0,
-            symmetric=False,
-            times=tuple(t for t, _ in self.factor or ()),
-        )
+        own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
+        return outer_load(net, "thrust", cells, data, self.factor, **own)

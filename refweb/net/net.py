@@ -6,13 +6,10 @@ there alone.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-
-from ..kernels import kernel
 
 LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0, R0, REFERENCE = range(7)
 """Columns of `Net.line_data`, what a kernel over lines finds in ``data``; ``data[:, REFERENCE : REFERENCE + 4]`` is
@@ -150,21 +147,3 @@ class Net:
         every = selection == "all" or (isinstance(selection, (list, tuple)) and "all" in selection)
         found = self.web.find(selection, name)
         return np.arange(self.nodes) if every else found
-
-
-@kernel()
-def strain(x, cells, data, c, q, nodes, gradients):
-    """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
-    u0 = u1 = u2 = 0.0
-    for a in range(nodes):
-        row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]  # unsigned: no row counts from the end
-        u0 += d * x[row, 0]
-        u1 += d * x[row, 1]
-        u2 += d * x[row, 2]
-    r0, r1, r2, r = data[c, REFERENCE], data[c, REFERENCE + 1], data[c, REFERENCE + 2], data[c, REFERENCE + 3]
-    natural = data[c, LENGTH]
-    p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
-    length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-    square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)
-    inverse = 1.0 / length if length > 0.0 else 0.0
-    return p0, p1, p2, inverse, square / (natural * (length + natural))

@@ -1,0 +1,48 @@
+"""What kernels over line elements have in common: gradients, strain, and forces along the line.
+
+``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..kernels import kernel
+from ..net.net import LENGTH, REFERENCE
+
+
+@kernel()
+def gradient(v, cells, c, q, nodes, gradients):
+    """dv/dξ at quadrature point q of cell c."""
+    v0 = v1 = v2 = 0.0
+    for a in range(nodes):
+        row, d = np.uint64(cells[c, a]), gradients[q * nodes + a]  # unsigned: no row counts from the end
+        v0 += d * v[row, 0]
+        v1 += d * v[row, 1]
+        v2 += d * v[row, 2]
+    return v0, v1, v2
+
+
+@kernel()
+def strain(x, cells, data, c, q, nodes, gradients):
+    """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
+    u0, u1, u2 = gradient(x, cells, c, q, nodes, gradients)
+    r0, r1, r2, r = data[c, REFERENCE], data[c, REFERENCE + 1], data[c, REFERENCE + 2], data[c, REFERENCE + 3]
+    natural = data[c, LENGTH]
+    p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
+    length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+    square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)
+    inverse = 1.0 / length if length > 0.0 else 0.0
+    return p0, p1, p2, inverse, square / (natural * (length + natural))
+
+
+@kernel()
+def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
+    """Add to the forces on the nodes of cell c those of a tension at quadrature point q: −``scale`` dN/dξ dx/dξ."""
+    for a in range(nodes):
+        row, d = np.uint64(cells[c, a]), scale * gradients[q * nodes + a]
+        f[row, 0] -= d * p0
+        f[row, 1] -= d * p1
+        f[row, 2] -= d * p2
