@@ -1,1 +1,87 @@
-"""What acts on a net, one file an effect; no effect knows another, a global matrix or a solver."""
+"""What acts on a net, one file an effect; no effect knows another, a global matrix or a solver.
+
+How to write an effect
+----------------------
+An effect is a table of the scene, a frozen value whose ``on(net)`` says which rows it couples, and the kernels that add
+its forces; `refweb.effects.base` has what else it may be. A whole file, ``refweb/effects/current.py``::
+
+    '''The magnetic force on lines that carry a current, I dl × B.'''
+
+    from dataclasses import dataclass
+
+    import numpy as np
+
+    from refweb.effects.base import Family
+    from refweb.errors import InputError
+    from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
+    from refweb.net.net import REFERENCE
+    from refweb.tables import Table, nodes, real, vector
+
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(len(cells)):
+            first, last = cells[c, 0], cells[c, 1]
+            push = 0.5 * np.cross(data[c, :3] + x[last] - x[first], data[c, 3:])
+            f[first] += push
+            f[last] += push
+            out[c, 0] = (push * (v[first] + v[last])).sum()
+
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        unit, half = np.eye(3), 0.0 if definite else 0.5
+        for c in range(len(cells)):
+            for k in range(3):
+                slope = half * np.cross(unit[k], data[c, 3:])
+                for node in range(2):
+                    blocks[c, 3 * node : 3 * node + 3, k] = slope
+                    blocks[c, 3 * node : 3 * node + 3, 3 + k] = -slope
+
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        for c in range(len(cells)):
+            for row in cells[c]:
+                rates[row] += np.abs(data[c, 3:]).sum()
+
+
+    @dataclass(frozen=True, kw_only=True)
+    class Current(Table):
+        '''A current from the first node of lines to their second, in a uniform field.'''
+
+        several = True
+        lines: object = nodes(what="line")
+        current: float = real(unit="A")
+        field: tuple = vector(unit="T")
+
+        def on(self, net):
+            if net.order > 1:
+                raise InputError(f"[cable] order = {net.order} must be 1: a current runs straight from node to node")
+            elements = np.flatnonzero(np.isin(net.line, net.web.find_lines(self.lines)))
+            reference = net.line_data[elements, REFERENCE : REFERENCE + 3]
+            data = np.hstack([reference, np.tile(self.current * np.array(self.field), (len(elements), 1))])
+            own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
+            return Family(name="current", cells=net.cells[elements], data=data, book="work", observed=1, power=0, **own)
+
+A line in `refweb.registry.EFFECTS` makes it known to scenes, messages and all methods::
+
+    "current": "refweb.effects.current:Current",
+
+A scene then has as many of it as it likes, ``several``, as tables of a list; without that line there is one,
+``[current]``::
+
+    [[current]]
+    lines = "all"
+    current = 20.0
+    field = [0.0, 0.0, 0.5]
+
+``x`` in a kernel is the displacement of all rows and ``net.points`` their reference; ``cells`` are the rows that each
+cell couples, ``data`` its numbers. A kernel adds to ``f`` and to ``rates``, and writes ``blocks`` and ``out``, both of
+which hold what was there before; signatures are in `refweb.kernels`. A force with a potential has an ``energy`` instead
+of a power, and a column of the book of its own. Bounds keep explicit steps stable; ``definite`` asks for a part of the
+stiffness that is positive semidefinite, such as none. A load with a factor over time is made by
+`refweb.effects.outer_load`; what changes natural lengths, `refweb.effects.length_factor`; rows, mass and columns of
+numbers of the lines are added by ``extend(net)``, which returns another net. ``tests/test_contract.py`` holds forces
+against energies and stiffness against forces, for every effect.
+"""
