@@ -28,7 +28,16 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
 EVERY |= {"net", *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web"))}
 EVERY |= {"net.rigid_body", "effects.line_kernels"}
-EVERY |= {"solution", "results", "effects", "effects.base", "effects.elasticity", "system", "system.system"}
+EVERY |= {
+    "solution",
+    "results",
+    "effects",
+    "effects.base",
+    "effects.elasticity",
+    "system",
+    "system.system",
+    "system.forces",
+}
 EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "files", "vtu", "provenance", "run_status")}
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""

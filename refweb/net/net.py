@@ -88,8 +88,6 @@ class Net:
     spins: int = 0
     columns: tuple = COLUMNS
 
-    spread = property(lambda self: self.consistent_minus_lumped)  # TRANSITION
-
     @property
     def heavy(self):
         """Rows with a mass, which a moment of inertia is not."""

@@ -29,9 +29,6 @@ class Mass:
     def __init__(self, net, free, pattern, lines=None):
         self._net, self._free, self._pattern, self._lines = net, free, pattern, lines
 
-    def __call__(self):  # TRANSITION
-        return self.values
-
     @cached_property
     def values(self):
         """M of the unknowns [kg] in the fixed pattern."""

@@ -13,40 +13,14 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import TENSION, Constraint, Drive, Family, LineDrive
+from ..effects.base import Constraint, Drive, Family, LineDrive
 from ..net.net import LENGTH
 from ..net.rigid_body import row_names
 from ..net.tension_laws import TENSION_ONLY
-
-
-class PerCell(list):
-    """What each family observes per cell, an array beside each of `System.families`.
-
-    Attributes
-    ----------
-    lines : ndarray, shape (elements, columns)
-        That of the lines, with tension [N] and strain [1] in the columns `refweb.effects.base.TENSION` and `STRAIN`.
-    """
-
-    def __init__(self, arrays, lines):
-        super().__init__(arrays)
-        self.lines = lines
-
-    @property
-    def tension(self):
-        """Tension of each element [N], a view of ``lines``."""
-        return self.lines[:, TENSION]
-
-
-class Forces(NamedTuple):
-    """Force on every row [N], shape (rows, 3), and what families observe; the next evaluation writes over that."""
-
-    force: np.ndarray
-    per_cell: PerCell
+from .forces import Forces, PerCell
 
 
 class System:
@@ -81,7 +55,6 @@ class System:
                 net = effect.extend(net)
         self.net, self.effects = net, effects
         self.rows = len(net.points)
-        self.length = net.natural_length.copy()  # TRANSITION
         acting = []
         for effect in effects:
             if hasattr(effect, "on"):
@@ -91,6 +64,8 @@ class System:
         self.line_drives = [a for a in acting if isinstance(a, LineDrive)]
         self.drives = [a for a in acting if isinstance(a, Drive)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
+        if sum(family.lines and family.power is not None for family in self.families) > 1:
+            raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
         for body in net.bodies:
             self.supported[body.row] = body.fixed
@@ -195,7 +170,6 @@ class System:
         known = self._at_time
         if known is None or known[0] != t:
             numbers = self.net.line_data.copy()
-            numbers[:, LENGTH] = self.length  # TRANSITION
             for d in self.line_drives:
                 d.kernel(t, numbers, d.cells, d.data)
             self._at_time = known = t, numbers
@@ -288,17 +262,9 @@ class System:
             force -= np.where(self.supported, self.mass.passed_on(self.mass.moved_by(force)), 0.0)
         return Forces(force, per_cell)
 
-    # TRANSITION: names of before, until every room has moved to those above
-    prepare = lambda self, t: self.net.line_data.__setitem__((slice(None), LENGTH), self.natural_length(t))  # noqa: E731
-    lengths = lambda self, t, x: (self.natural_length(t), self.length_force(t, x))  # noqa: E731
-    outs = per_cell
-    loose = property(lambda self: self.unsupported_parts)
-    turns = property(lambda self: bool(self.rotating))
+    outs = per_cell  # until the explicit loop asks for what stands above
     by_length = property(lambda self: self.length_force_kernel)
-    inverse_mass = property(lambda self: (self.mass.heavy, self.mass.factor))
-    moved_by = lambda self, push: self.mass.moved_by(push)  # noqa: E731
-    kick = lambda self, jump: self.mass.kick(jump)  # noqa: E731
-    momentum = lambda self, v: self.mass.momentum(v)  # noqa: E731
+    length = property(lambda self: self.net.natural_length)
 
     def row_name(self, row):
         """How a message calls a row: a node by its number, a body by its name."""
@@ -317,9 +283,9 @@ class System:
         return sum(self.energy_of(f, t, x).sum() for f in self.families)
 
     def stiffness(self, t, x, v=None, definite=False, only=None):
-        """Values of K = −∂f/∂x [N/m] in the fixed pattern; ``definite`` leaves out what is negative.
+        """Values of K = −∂f/∂x [N/m] in the fixed pattern.
 
-        ``only`` are the families to take, by default all.
+        ``definite`` leaves out what is negative; ``only`` are the families to take, by default all.
         """
         v = self._zero if v is None else v
         for family, blocks in zip(self._in_tangent, self._blocks, strict=True):

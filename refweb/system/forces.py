@@ -1,0 +1,35 @@
+"""What an evaluation of all forces leaves: their sum on every row, and what each family observes per cell."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..effects.base import TENSION
+
+
+class PerCell(list):
+    """What each family observes per cell, an array beside each of `System.families`.
+
+    Attributes
+    ----------
+    lines : ndarray, shape (elements, columns)
+        That of the lines, with tension [N] and strain [1] in the columns `refweb.effects.base.TENSION` and `STRAIN`.
+    """
+
+    def __init__(self, arrays, lines):
+        super().__init__(arrays)
+        self.lines = lines
+
+    @property
+    def tension(self):
+        """Tension of each element [N], a view of ``lines``."""
+        return self.lines[:, TENSION]
+
+
+class Forces(NamedTuple):
+    """Force on every row [N], shape (rows, 3), and what families observe; the next evaluation writes over that."""
+
+    force: np.ndarray
+    per_cell: PerCell
