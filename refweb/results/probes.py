@@ -1,8 +1,9 @@
-"""Compiled probes: what an explicit loop looks at in every step, one scalar each.
+"""Compiled probes: what a run looks at in every step, one scalar each.
 
-A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``lines`` holds tension and strain of
-each element, ``rows`` and ``data`` the probe's own numbers; where ``where[1]`` is `PLACE` it writes the row or
-element it stands at to ``where[0]``.
+A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``x``, ``v`` and ``f`` are the
+displacement of each row of the unknowns, its velocity and the whole force on it, shape (rows, 3); ``lines`` holds
+tension and strain of each element, shape (cells, 2 or more); ``rows`` and ``data`` are the probe's own numbers. Where
+``where[1]`` is `PLACE` it writes the row or element it stands at to ``where[0]``.
 """
 
 from __future__ import annotations

@@ -49,11 +49,15 @@ def scene(page, **changes):
 def test_in_statics(page):
     """A line drawn along its axis, and the sum m r² of where it ends; the residual's error is known without asking."""
     load = {"node": 1, "force": [0.0, 30.0, 0.0]}
+    axis = {"name": "along it", "quantity": "moment_of_inertia", "component": "y"}
+    origin = {"name": "polar", "quantity": "moment_of_inertia"}
+    page["observe"] += [axis, origin]
     solution = refweb.run(scene(page, load=[load], solve={"kind": "static", "load_steps": [0.5, 1.0]}))
     for step in solution.steps:
         found, length = step["results"]["inertia"], LENGTH + step["step"] * 30.0 / STIFFNESS
         assert found.unit == "kg m²" and found.where is None
         assert found.value == pytest.approx(MASS * length**2, rel=1e-12) and found.error < 1e-9 * found.value
+        assert step["results"]["along it"].value == 0.0 and step["results"]["polar"].value == found.value
     assert solution.columns[1] == "inertia [kg m²]"
 
 

@@ -2,64 +2,52 @@
 
 How to write an observable
 --------------------------
-An observable is a class with two faces that say the same: ``of(state)``, its value in a `refweb.results.state.State`,
-which statics asks for at every load step, and ``probe(system)``, a compiled kernel that dynamics calls in every step.
-What it may say besides is in `refweb.results.observables.observable.Observable`. A whole file,
-``refweb/results/observables/moment_of_inertia.py``::
+An observable has two faces that say the same: ``of(state)``, its value in a `refweb.results.state.State`, and
+``probe(system)``, a kernel that dynamics calls in every step. A whole file, ``moment_of_inertia.py`` in this folder::
 
-    '''The moment of inertia of a net's nodes about an axis through the origin.'''
+    '''Moment of inertia of a net's nodes about the axis ``component`` through the origin; without one, about it.'''
 
     import numpy as np
 
     from refweb.kernels import kernel
     from refweb.results.observables.observable import Observable, Value
-    from refweb.results.probes import MAGNITUDE, PROBE, Probe
+    from refweb.results.probes import PROBE, Probe
 
 
     class MomentOfInertia(Observable):
-        '''About the axis ``component``; without one, about the origin.'''
-
-        unit = "kg m²"
-        keys = ("component",)
+        unit, keys = "kg m²", ("component",)
 
         def of(self, state):
             net = state.system.net
-            squares = state.position[: net.nodes] ** 2
-            if self.observe.component is not None:
-                squares[:, self.observe.component] = 0.0
+            squares = state.position[: net.nodes, self.across()] ** 2
             return Value(float(net.mass[: net.nodes] @ squares.sum(axis=1)), None)
 
         def probe(self, system):
-            net, component = system.net, self.observe.component
-            data = np.column_stack([net.mass, net.points])[: net.nodes]
-            return Probe(inertia, [MAGNITUDE if component is None else component], data)
+            net = system.net
+            return Probe(inertia, self.across(), np.column_stack([net.mass, net.points])[: net.nodes])
+
+        def across(self):
+            return [axis for axis in range(3) if axis != self.observe.component]
 
 
     @kernel(PROBE)
     def inertia(t, x, v, f, lines, rows, data, where):
-        '''Σ m r² over the rows of data, mass and reference position of each node.'''
         total = 0.0
         for n in range(data.shape[0]):
-            for k in range(3):
-                if k != rows[0]:
-                    total += data[n, 0] * (data[n, 1 + k] + x[n, k]) ** 2
+            for k in rows:
+                total += data[n, 0] * (data[n, 1 + k] + x[n, k]) ** 2
         return total
 
-A line in `refweb.registry.OBSERVABLES` makes it known to scenes, messages and both kinds of runs::
+A line in `refweb.registry.OBSERVABLES` makes it known to scenes, messages, statics and dynamics::
 
     "moment_of_inertia": "refweb.results.observables.moment_of_inertia:MomentOfInertia",
 
-A scene then asks for it as for any other::
+A scene asks for it in ``[[observe]]``, with the keys it takes::
 
-    [[observe]]
-    name = "inertia"
-    quantity = "moment_of_inertia"
-    component = "z"
-    reduce = "max"
+    observe = [{ name = "inertia", quantity = "moment_of_inertia", component = "z", reduce = "max" }]
 
-``x`` in a kernel is the displacement of all rows, ``v`` their velocity, ``f`` the whole force on them; ``lines`` holds
-tension and strain of each element. A quantity that stands at a node or line gives ``of`` a place and says in ``place``
-what its probe's is; `refweb.results.observables.nodal` and `refweb.results.observables.line` do, and what is a sum of
-energies is a `refweb.results.observables.book.Booked`. ``tests/results/test_observable_contract.py`` holds both faces
-of all against each other, in random states.
+`refweb.results.observables.observable` says what it may have besides, `refweb.results.probes` what a kernel sees. What
+stands at a node or a line gives its ``Value`` that place, as those in ``nodal.py`` and ``line.py`` do; a sum of
+energies has weights in place of a probe, as in ``book.py``. ``tests/results/test_observable_contract.py`` holds the two
+faces of each against each other.
 """
