@@ -263,7 +263,7 @@ class Table:
             value = getattr(self, f.name)
             if value is None and f.default is None:
                 continue
-            object.__setattr__(self, f.name, f.metadata["read"](f.name, value))
+            object.__setattr__(self, f.name, checked(f.name, value, f))
         self.check()
 
     def check(self):

@@ -13,10 +13,6 @@ from ..registry import SHAPES, load
 from ..tables import Table, boolean, choice, field, real, text, vector
 
 
-def _shape(name, value):
-    return choice(*SHAPES).metadata["read"](name, value)
-
-
 def _keys(shape):
     """Names of the keys of a shape."""
     return [f.name for f in fields(load(SHAPES[shape]))]
@@ -80,7 +76,7 @@ class Body(Table):
     several = True
 
     name: str = text(most=80)
-    shape: str = field(_shape, "sphere")
+    shape: str = choice(SHAPES, default="sphere")
     form: Shape = field(_given, None)  # the keys of the shape, as its own table
     mass: float | None = real(None, above=0, unit="kg")
     position: tuple = vector(unit="m")

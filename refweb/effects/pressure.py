@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import nearest, shown
 from ..net.net import REFERENCE
-from ..tables import Table, field, node_number, numbers_list, real, rows, vector
+from ..tables import Table, checked, field, node_number, numbers_list, real, rows, vector
 from .outer_load import factor_at, outer_load
 
 # Columns of data: p n; dX/dξ; the factor.
@@ -89,7 +89,7 @@ def kernels(nodes, shares, couples):
 def _lines(name, value):
     if isinstance(value, str):
         return value
-    return numbers_list(number=node_number).metadata["read"](name, value)
+    return checked(name, value, numbers_list(number=node_number))
 
 
 @dataclass(frozen=True, kw_only=True)

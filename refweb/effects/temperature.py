@@ -8,13 +8,13 @@ import numpy as np
 
 from ..errors import InputError
 from ..messages import nearest, short, shown
-from ..tables import Table, by_group, field, real, rows
+from ..tables import Table, by_group, checked, field, real, rows
 from .length_factor import scaled
 
 
 def _change(name, value):
     table = isinstance(value, (list, tuple)) or hasattr(value, "tolist")
-    return (rows(2, increasing=True) if table else real(unit="K")).metadata["read"](name, value)
+    return checked(name, value, rows(2, increasing=True) if table else real(unit="K"))
 
 
 @dataclass(frozen=True, kw_only=True)

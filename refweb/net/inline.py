@@ -8,10 +8,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..messages import shown
-from ..tables import Table, choice, field, node_number, numbers_list, real, rows, texts
+from ..tables import Table, checked, choice, field, node_number, numbers_list, real, rows, texts
 from .web import Web, in_range
 
-_length = real(above=0, unit="m").metadata["read"]
+LENGTH = real(above=0, unit="m")
 
 
 def _lengths(name, value):
@@ -20,8 +20,8 @@ def _lengths(name, value):
             raise InputError(f'{name} = {shown(value)} must be "distance", one number or one for each line [m]')
         return value
     if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
-        return tuple(_length(f"{name}[{i}]", one) for i, one in enumerate(value))
-    return _length(name, value)
+        return tuple(checked(f"{name}[{i}]", one, LENGTH) for i, one in enumerate(value))
+    return checked(name, value, LENGTH)
 
 
 def _names(name, value):
