@@ -167,9 +167,9 @@ def simulation_of(scene, system, solution, kept=None):
             from .statics.simulation import Simulation
 
             return Simulation(scene, system, solution)
-        from .dynamics.simulation import Motion
+        from .dynamics.simulation import Simulation
 
-        return Motion(scene, system, solution, kept)
+        return Simulation(scene, system, solution, kept)
 
 
 def _notices(scene, system):

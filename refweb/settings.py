@@ -103,7 +103,7 @@ class Dynamic(Table):
     ------
     InputError
         For a duration, step or tolerance that is not > 0, a safety above 1 and an rtol that is not 1e-13 … 0.1; for a
-        key of another method, order 5, a BDF method of an order above 5, and the fixed-point solver with IDA.
+        key of another method, order 5, and a BDF method of an order above 5.
     """
 
     kind: str = choice("dynamic", default="dynamic")
@@ -138,8 +138,6 @@ class Dynamic(Table):
                 object.__setattr__(self, key, value)
         if self.family != "adams" and (self.max_order or 0) > 5:
             raise InputError(f"max_order = {self.max_order} must be ≤ 5 for BDF")
-        if self.method == "ida" and self.linear_solver == "fixed-point":
-            raise InputError('linear_solver = "fixed-point" must be one of "auto", "block", "sparse", "dense" with ida')
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -248,7 +248,7 @@ def test_a_resumed_run_can_be_resumed(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(refweb.dynamics.simulation, "with_errors", lost)
+        patch.setattr(refweb.dynamics.twin_error, "with_errors", lost)
         with pytest.raises(KeyboardInterrupt):
             refweb.resume(cut)
     assert opens(cut) == 31

@@ -45,7 +45,8 @@ TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium", "system.unsupported_parts"}
 LOAD_STEPS = {"statics.simulation", "statics.remarks"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
-DYNAMICS = {"dynamics", "dynamics.simulation", "dynamics.integrators", "results.probes", "results.observables.book"}
+DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
+DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
 EXPLICIT = {f"dynamics.integrators.{name}" for name in ("central_difference", "explicit_loop", "step_bound")}
 AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
@@ -116,8 +117,8 @@ def called(given):
         if any(body.get("shape", "sphere") == "sphere" for body in given["body"]) and not keys & {"exponent"}:
             modules.add("effects.contact.sphere")
     rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
-    if solve.get("start", "web") != "web":
-        modules.add("dynamics.initial_state")
+    if solve["kind"] == "dynamic" and given.get("accuracy", {}).get("error") != "none":
+        modules.add("dynamics.twin_error")
     if rests:
         if method != "relaxation":
             modules |= NEWTON

@@ -2,11 +2,51 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..errors import InputError
 from ..messages import short
 from ..net.rigid_body import row_names
+
+
+class Start(NamedTuple):
+    """Where a run begins.
+
+    Attributes
+    ----------
+    x : ndarray, shape (rows, 3), optional
+        Displacement [m], None for the web as it is.
+    v : ndarray, shape (rows, 3), optional
+        Velocity [m/s], None for those of the scene.
+    """
+
+    x: np.ndarray | None = None
+    v: np.ndarray | None = None
+
+
+def start_of(scene, system):
+    """The `Start` of a scene."""
+    if scene.start_folder is not None:
+        return stored(system, scene.start_folder)
+    return Start(equilibrium(system).x) if scene.solve.start == "equilibrium" else Start()
+
+
+def remarks_on(start, system):
+    """What a reader has to know of a start: jumps of motion, and bodies inside of the web."""
+    before = np.zeros((system.rows, 3)) if start.x is None else start.x
+    there = before.copy()
+    system.drive(0.0, there)
+    inner = [(family.contact, system.energy_of(family, 0.0, there)) for family in system.families if family.internal]
+    moved = np.flatnonzero((there != before).any(axis=1))
+    if len(moved):
+        stored = sum(energy.sum() for _, energy in inner)
+        yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+    pushed = np.concatenate([np.zeros(0), *(energy for contact, energy in inner if contact)])
+    if pushed.max(initial=0.0) > 0.0:
+        line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
+        yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
 
 
 def equilibrium(system, progress=None):
@@ -42,14 +82,9 @@ _STATE = ("positions", "displacements", "velocities", "bodies")
 
 
 def stored(system, folder):
-    """Displacement and velocity of the rows from the checkpoint in a result folder.
+    """The `Start` that the checkpoint in a result folder holds.
 
     Nodes are matched by number, bodies by name; a body that the folder does not have stays as its table says.
-
-    Returns
-    -------
-    x, v : ndarray, shape (rows, 3)
-        Displacement from the web's position [m], velocity [m/s].
 
     Raises
     ------
@@ -85,4 +120,4 @@ def stored(system, folder):
     v[here] = velocities[there]
     told = given.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
     v[told] = given[told]
-    return x, v
+    return Start(x, v)

@@ -21,65 +21,71 @@ from __future__ import annotations
 
 import copy
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
+from ..registry import INTEGRATORS, load
 from ..settings import Dynamic
 
-USUAL = 3
+USUAL_DIGITS = 3
 """Digits that are aimed at where a scene does not say."""
-MANY = 5
+DIGITS_OF_ORDER_6 = 5
 """Digits from which order 6 is cheaper than order 2."""
-MOST = 8
+DIGITS_OF_ADAMS = 8
 """Digits from which Adams methods are cheaper than order 2, where order 6 does not take the forces: central differences
 take √10 times the steps for each, on webs under a load with a factor 0.01 s for 6 and Adams methods 0.3 s for 9."""
 PER_STEP, PER_ELEMENT = 1e-6, 12e-9
 """CPU time of a compiled explicit step [s], and of each element in it [s]."""
-QUICK = 0.5
+QUICK_RUN = 0.5
 """CPU time of an explicit run [s] below which nothing is to be gained."""
-DAMPED = 5.0
+DAMPED_BY = 5.0
 """Factor by which damping makes explicit steps shorter, above which they are given up."""
 
 
-def decided(scene, system):
+class Choice(NamedTuple):
     """The `refweb.Dynamic` that stands for ``method = "auto"``, and the reason for it in words."""
-    net, digits = system.net, scene.accuracy.digits or USUAL
+
+    solve: Dynamic
+    reason: str
+
+
+def decided(scene, system):
+    """The `Choice` for a scene."""
+    net, digits = system.net, scene.accuracy.digits or USUAL_DIGITS
     bare = np.flatnonzero((net.mass <= 0.0) & ~system.supported.all(axis=1))
     tolerance = max(10.0 ** -(digits + 1), 1e-12)
     if system.constraints:
-        return _of(scene, "ida", rtol=tolerance), "only ida holds the lengths of [[link]]"
+        return _of(scene, "ida", "only ida holds the lengths of [[link]]", rtol=tolerance)
     if len(bare):
-        return _of(scene, "ida", rtol=tolerance), f"node {bare[0]} has no mass, which only ida takes"
-    family = "adams" if digits >= MANY else "bdf"
+        return _of(scene, "ida", f"node {bare[0]} has no mass, which only ida takes", rtol=tolerance)
+    family = "adams" if digits >= DIGITS_OF_ORDER_6 else "bdf"
     if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
-        return _of(scene, "cvode", rtol=tolerance, family=family), f"{what} is not for explicit steps"
-    system = _undamped(
-        system, lambda family: family.contact
-    )  # its bound of damping and friction is that of all lines touched at once
+        return _of(scene, "cvode", f"{what} is not for explicit steps", rtol=tolerance, family=family)
+    # the bound of damping and friction in contact is that of all lines touched at once
+    system = _undamped(system, lambda family: family.contact)
     bound = _bound(system)
     steps = scene.solve.duration / (0.5 * bound)
     seconds = steps * step_price(system)
     price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
     damped = _damped(system, bound)
-    if seconds > QUICK and damped > DAMPED:
+    if seconds > QUICK_RUN and damped > DAMPED_BY:
         why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
-        return _of(scene, "cvode", rtol=tolerance, family="adams"), why
-    if seconds > QUICK and _quiet(scene, system):
+        return _of(scene, "cvode", why, rtol=tolerance, family="adams")
+    if seconds > QUICK_RUN and _quiet(scene, system):
         why = f"tables alone move it from its equilibrium: no waves ask for {price}"
-        return _of(scene, "cvode", rtol=tolerance, family="bdf"), why
-    if digits >= MANY:
+        return _of(scene, "cvode", why, rtol=tolerance, family="bdf")
+    if digits >= DIGITS_OF_ORDER_6:
         try:
-            from .integrators.splitting import Splitting
-
-            Splitting(system)
-            return _of(scene, "explicit"), f"{digits} digits, and forces that follow from displacement alone: {price}"
+            load(INTEGRATORS["explicit"].integrator)(system)
+            return _of(scene, "explicit", f"{digits} digits, and forces that follow from displacement alone: {price}")
         except InputError:
-            if digits >= MOST:
+            if digits >= DIGITS_OF_ADAMS:
                 why = f"{digits} digits, and forces that no explicit step of order 6 takes"
-                return _of(scene, "cvode", rtol=tolerance, family="adams"), why
-    return _of(scene, "central-difference"), price
+                return _of(scene, "cvode", why, rtol=tolerance, family="adams")
+    return _of(scene, "central-difference", price)
 
 
 def _undamped(system, chosen=lambda family: True):
@@ -105,15 +111,13 @@ def _damped(system, bound):
     return _bound(_undamped(system)) / bound
 
 
-def _of(scene, method, **keys):
+def _of(scene, method, reason, **keys):
     solve = scene.solve
-    return Dynamic(method=method, duration=solve.duration, mass=solve.mass, start=solve.start, **keys)
+    return Choice(Dynamic(method=method, duration=solve.duration, mass=solve.mass, start=solve.start, **keys), reason)
 
 
 def _bound(system):
-    from .integrators.central_difference import CentralDifference
-
-    return CentralDifference(system).bound()
+    return load(INTEGRATORS["central-difference"].integrator)(system).bound()
 
 
 def _quiet(scene, system):

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 
-STYLES = {
-    "central-difference": ("#1b5e8c", "o"),
-    "explicit-4": ("#3c7a4c", "s"),
-    "explicit-6": ("#8a5a9e", "D"),
-    "cvode-bdf": ("#c8553d", "v"),
-    "cvode-adams": ("#b58900", "^"),
-    "ida": ("#7a4a2b", "<"),
-    "dop853": ("#555555", "P"),
-    "newton": ("#1b5e8c", "o"),
-    "relaxation": ("#c8553d", "v"),
-    "newton-smooth": ("#3c7a4c", "s"),
-}
-"""Colour and marker of each method."""
+from . import dop853
+
+STYLES = (
+    ("#1b5e8c", "o"),
+    ("#3c7a4c", "s"),
+    ("#8a5a9e", "D"),
+    ("#c8553d", "v"),
+    ("#b58900", "^"),
+    ("#7a4a2b", "<"),
+    ("#2f8f8f", ">"),
+    ("#a0527a", "h"),
+)
+"""Colour and marker of a method by its place among those that are compared."""
+OUTSIDER = ("#555555", "P")
+"""Those of a method that is not refweb's."""
 
 
 def diagram(cost):
@@ -45,10 +47,9 @@ def diagram(cost):
 def _curves(plot, cost, key, trust):
     seen = [getattr(t, key) for t in cost.trials if getattr(t, key) > 0.0]
     floor = max(trust, 1e-3 * min(seen, default=1.0))
-    for method, (colour, marker) in STYLES.items():
+    for place, method in enumerate(dict.fromkeys(t.method for t in cost.trials)):
         ladder = [t for t in cost.trials if t.method == method]
-        if not ladder:
-            continue
+        colour, marker = OUTSIDER if method == dop853.NAME else STYLES[place % len(STYLES)]
         solved = [t for t in ladder if t.status == "solved"]
         times, errors = [t.cpu_s for t in solved], [max(getattr(t, key), 0.3 * floor) for t in solved]
         plot.plot(times, errors, marker=marker, markersize=4, color=colour, linewidth=1.1, label=_label(method, ladder))

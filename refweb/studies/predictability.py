@@ -11,17 +11,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..dynamics.initial_state import Start
+from ..dynamics.schedule import blocks
+
 PERTURBATION = 1e-12
 """Largest difference of an unknown at the start, over the natural length of the shortest element."""
 
 
-def horizon(motion, results, ensemble=None, tell=None):
+def horizon(simulation, results, ensemble=None, tell=None):
     """What grows of a small difference.
 
     Parameters
     ----------
-    motion : refweb.dynamics.simulation.Motion
-        A motion that has been run.
+    simulation : refweb.dynamics.simulation.Simulation
+        That of a motion which has been run.
     results : dict of str to refweb.results.solution.Result
         Its results.
     ensemble : int, optional
@@ -38,17 +41,17 @@ def horizon(motion, results, ensemble=None, tell=None):
         behind the last of these times; ``ensemble``, of each result ``mean`` and ``deviation``, the standard one.
     """
     tell = tell or (lambda text, share: None)
-    times = motion._times()[0][1:]
-    pair = [motion.solver(motion._accuracy) for _ in range(2)]
-    runs = [pair[0].start(*motion.begin), pair[1].start(*_moved(motion, 1))]
-    apart, size = [np.abs(runs[0].x - runs[1].x).max()], [np.abs(runs[0].x).max()]
+    times = simulation.schedule.times[1:]
+    pair = [_integrator(simulation) for _ in range(2)]
+    courses = [pair[0].start(*simulation.begin), pair[1].start(*_beside(simulation, 1))]
+    apart, size = [np.abs(courses[0].x - courses[1].x).max()], [np.abs(courses[0].x).max()]
     for n, end in enumerate(times, 1):
-        for solver, run in zip(pair, runs, strict=True):
-            solver.advance(run, [end])
-        apart.append(np.abs(runs[0].x - runs[1].x).max())
-        size.append(np.abs(runs[0].x).max())
+        for integrator, course in zip(pair, courses, strict=True):
+            integrator.advance(course, [end])
+        apart.append(np.abs(courses[0].x - courses[1].x).max())
+        size.append(np.abs(courses[0].x).max())
         tell("horizon", n / len(times))
-        if any(run.stopped for run in runs):
+        if any(course.stopped for course in courses):
             break
     when = np.append(0.0, times)[: len(apart)]
     left = -np.log10(np.maximum(apart, 1e-300) / np.maximum(max(size), 1e-300))
@@ -57,37 +60,40 @@ def horizon(motion, results, ensemble=None, tell=None):
     known = when <= end if end is not None else np.ones(len(when), dtype=bool)
     growth = float(np.polyfit(when[known], np.log(np.maximum(apart, 1e-300))[known], 1)[0]) if known.sum() > 1 else None
     found = {
-        "perturbation": float(PERTURBATION * motion.system.net.natural_length.min()),
+        "perturbation": float(PERTURBATION * simulation.system.net.natural_length.min()),
         "growth": growth,
         "digits": digits,
         "statistical": [name for name, r in results.items() if end is not None and r.time > end],
     }
     if ensemble is not None:
-        found["ensemble"] = _ensemble(motion, ensemble, tell)
+        found["ensemble"] = _ensemble(simulation, ensemble, tell)
     return found
 
 
-def _moved(motion, seed):
-    """Start of the run of a seed: displacement and velocity."""
-    system, x = motion.system, motion.begin[0]
+def _integrator(simulation):
+    """One of the accuracy that the simulation has come to."""
+    return simulation.integrator_at(simulation.standing.knob)
+
+
+def _beside(simulation, seed):
+    """The `Start` of the run of a seed, a little beside that of the simulation."""
+    system, x = simulation.system, simulation.begin.x
     x = np.zeros((system.rows, 3)) if x is None else x.copy()
     most = PERTURBATION * system.net.natural_length.min()
     x.ravel()[system.free] += most * np.random.default_rng(seed).uniform(-1.0, 1.0, len(system.free))
-    return x, motion.begin[1]
+    return Start(x, simulation.begin.v)
 
 
-def _ensemble(motion, count, tell):
+def _ensemble(simulation, count, tell):
     """Mean and standard deviation of each result over runs of different seeds."""
-    from ..dynamics.simulation import blocks
-
-    values = []
+    watch, values = simulation.watch, []
     for seed in range(1, count + 1):
-        solver = motion.solver(motion._accuracy)
-        run = solver.start(*_moved(motion, seed))
-        for _, history in blocks(solver, run, *motion._times()):
-            last = history[-1:]
-        values.append([r.value for r in motion.results(run, motion.table(last)[0]).values()])
+        integrator = _integrator(simulation)
+        course = integrator.start(*_beside(simulation, seed))
+        for block in blocks(integrator, course, simulation.schedule):
+            table = watch.table(block.history)
+        values.append([result.value for result in watch.results(course, table[-1]).values()])
         tell("ensemble", seed / count)
-    mean, spread = np.mean(values, axis=0), np.std(values, axis=0, ddof=1)
-    names = [o.name for o in motion.scene.observables]
-    return {n: {"mean": float(m), "deviation": float(s)} for n, m, s in zip(names, mean, spread, strict=True)}
+    mean, deviation = np.mean(values, axis=0), np.std(values, axis=0, ddof=1)
+    names = [o.name for o in simulation.scene.observables]
+    return {n: {"mean": float(m), "deviation": float(d)} for n, m, d in zip(names, mean, deviation, strict=True)}

@@ -1,43 +1,36 @@
 """One scene by every method that takes it, each from coarse to fine: what `refweb.studies.work_precision` compares.
 
-A `Trial` is a method at one setting. Own solvers run with one probe, the observable, and without peaks, files or twin;
-scipy's DOP853 is the voice from outside: its own steps, driven by the same forces.
+A `Trial` is a method at one setting. The methods of dynamics are those of `refweb.registry.INTEGRATORS`, in all their
+`refweb.dynamics.integrators.integrator.Variant` s, and scipy's DOP853. They run with one probe, the observable, and
+without peaks, files or twin.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, SolverError
+from ..dynamics.integrators.integrator import Variant
+from ..errors import SolverError
+from ..registry import INTEGRATORS, STATICS, load
 from ..results.state import State
+from . import dop853
 
-SAFETIES = (0.9, 0.5, 0.25, 0.125, 0.0625, 0.03125)
-TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
-TIGHT = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-DYNAMIC = {
-    "central-difference": ("safety", SAFETIES),
-    "explicit-4": ("safety", (0.9, 0.6, 0.4, 0.25, 0.15)),
-    "explicit-6": ("safety", (0.9, 0.6, 0.4, 0.25, 0.15)),
-    "cvode-bdf": ("rtol", TOLERANCES),
-    "cvode-adams": ("rtol", TIGHT),
-    "ida": ("rtol", TOLERANCES),
-    "dop853": ("rtol", TIGHT),
+clock = time.process_time
+"""What tells how long a trial has taken, and when there is no time left for more [s]: CPU time, so that nothing depends
+on what else the machine has to do."""
+SETTINGS = {
+    "safety": (0.9, 0.5, 0.25, 0.125, 0.0625, 0.03125),
+    "rtol": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
 }
-"""Methods of dynamics: the key that is varied, and its values from coarse to fine."""
-STATIC = {
-    "newton": ("tolerance", (1e-10,)),
-    "relaxation": ("tolerance", (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)),
-    "newton-smooth": ("smoothing", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7)),
-}
-"""Methods of statics. The last is Newton with the smooth law at other smoothings than the scene's own."""
-KIND = {"explicit-4": "splitting", "explicit-6": "splitting", "central-difference": "splitting"}
-KIND |= {"cvode-bdf": "bdf", "ida": "bdf"}
-"""Methods whose errors may be alike: splittings by kicks and drifts, and BDF. Others are of a kind of their own."""
+"""Values of an integrator's knob from coarse to fine, for methods that name none of their own."""
 UNKNOWN = 12.0
 """CPU time of the coarsest implicit run over that of the longest explicit steps, until it has run."""
 OUTSIDE, CALL = 4.0, 5e-5
@@ -62,6 +55,11 @@ class Trial:
         Whether it solved; failed on the way; could not take the scene; or was left out for its price.
     message : str
         Why, where it is not solved.
+    kind : str
+        What the method has in common with others whose errors may be alike.
+    make : callable, optional
+        In dynamics makes the integrator of the method, of a system, probes and the key that is varied; in statics
+        solves, of the trial, a system, load steps and what is called with a line of text in between.
     cpu_s : float
         CPU time of the solver's loop [s], compiled before.
     values : ndarray, shape (rows,)
@@ -77,6 +75,8 @@ class Trial:
     value: float
     status: str = "budget"
     message: str = ""
+    kind: str = ""
+    make: Callable | None = None
     cpu_s: float = np.nan
     values: np.ndarray | None = None
     x: np.ndarray | None = None
@@ -89,16 +89,81 @@ class Trial:
         """The setting as text."""
         return f"{self.key} = {self.value:g}"
 
-    @property
-    def kind(self):
-        """What the method has in common with others."""
-        return KIND.get(self.method, self.method)
+
+class Ladder(NamedTuple):
+    """A method with the settings at which it is tried.
+
+    Attributes
+    ----------
+    key : str
+        The key that is varied.
+    settings : tuple of float
+        Its values from coarse to fine.
+    kind : str
+        What the method has in common with others whose errors may be alike.
+    make : callable, optional
+        See `Trial`.
+    """
+
+    key: str
+    settings: tuple
+    kind: str
+    make: Callable | None = None
 
 
-def trials(scene):
-    """The ladder of each method, a dict of lists of `Trial`."""
-    ladders = DYNAMIC if scene.solve.kind == "dynamic" else STATIC
-    found = {name: [Trial(name, key, value) for value in values] for name, (key, values) in ladders.items()}
+def _by_newton(trial, system, steps, tell):
+    return load(STATICS["newton"])(system, steps, tell)
+
+
+def _by_relaxation(trial, system, steps, tell):
+    return load(STATICS["relaxation"])(system, steps, tell, tolerance=trial.value)
+
+
+STATIC_LADDERS = {
+    "newton": Ladder("tolerance", (1e-10,), "newton", _by_newton),
+    "relaxation": Ladder("tolerance", (1e-2, 1e-4, 1e-6, 1e-8, 1e-10), "relaxation", _by_relaxation),
+    "newton-smooth": Ladder("smoothing", (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), "newton-smooth", _by_newton),
+}
+"""The `Ladder` of each method of statics by name. The last is Newton with the smooth law at other smoothings than the
+scene's own."""
+
+
+def _evaluations(integrator, duration):
+    """Evaluations of forces that a duration takes, None where only a run can tell."""
+    return integrator.evaluations(duration) if hasattr(integrator, "evaluations") else None
+
+
+def _variants(name):
+    """The `Variant` s of a method of the table by what they are called; one, of its own name, where it lists none."""
+    return getattr(load(INTEGRATORS[name].integrator), "variants", {name: Variant()})
+
+
+def dynamic_ladders():
+    """The `Ladder` of each method of dynamics by name: variants of `INTEGRATORS`, and DOP853."""
+    found = {}
+    for name, method in INTEGRATORS.items():
+        for label, variant in _variants(name).items():
+            make = functools.partial(load(method.integrator), **variant.keys)
+            settings = variant.settings or SETTINGS[method.knob]
+            found[label] = Ladder(method.knob, settings, variant.kind or label, make)
+    return found | {dop853.NAME: Ladder("rtol", dop853.TOLERANCES, dop853.NAME)}
+
+
+def label_of(solve):
+    """What the method of a `refweb.Dynamic` is called among the trials."""
+    for label, variant in _variants(solve.method).items():
+        if all(getattr(solve, key) == value for key, value in variant.keys.items()):
+            return label
+    return solve.method
+
+
+def trials_of(scene):
+    """The trials of each method from coarse to fine, a dict of lists of `Trial` by name."""
+    ladders = dynamic_ladders() if scene.solve.kind == "dynamic" else STATIC_LADDERS
+    found = {
+        name: [Trial(name, ladder.key, value, kind=ladder.kind, make=ladder.make) for value in ladder.settings]
+        for name, ladder in ladders.items()
+    }
     if scene.solve.kind == "static":
         cable = scene.cable
         if cable.law == "linear" or any(group.smoothing is not None for group in cable.groups.values()):
@@ -122,49 +187,25 @@ class Dynamics:
     """
 
     def __init__(self, scene, system, observable):
-        from ..dynamics.simulation import row_times
+        from ..dynamics.initial_state import start_of
+        from ..dynamics.schedule import row_times
 
         self.system, self.observable, self.times = system, observable, row_times(scene)
-        self.probes = [observable.probe(system)._replace(sign=0.0)]
-        self._price, self.begin = 0.0, (None, None)
+        self.probes, self.begin = [observable.probe(system)._replace(sign=0.0)], start_of(scene, system)
         self._linear = system.rows - system.net.spins  # the others are angles
-        if scene.start_folder is not None:
-            from ..dynamics.initial_state import stored
-
-            self.begin = stored(system, scene.start_folder)
-        elif scene.solve.start == "equilibrium":
-            from ..dynamics.initial_state import equilibrium
-
-            self.begin = equilibrium(system).x, None
-
-    def _solver(self, trial):
-        """A solver of refweb's at the setting of a trial."""
-        name, _, detail = trial.method.partition("-")
-        setting = {trial.key: trial.value}
-        if name == "explicit":
-            from ..dynamics.integrators.splitting import Splitting
-
-            return Splitting(self.system, self.probes, order=int(detail), **setting)
-        if name == "cvode":
-            from ..dynamics.integrators.cvode import Cvode
-
-            return Cvode(self.system, self.probes, family=detail, **setting)
-        if name == "ida":
-            from ..dynamics.integrators.ida import Ida
-
-            return Ida(self.system, self.probes, **setting)
-        from ..dynamics.integrators.central_difference import CentralDifference
-
-        return CentralDifference(self.system, self.probes, **setting)
+        self._per_evaluation = self._fewest = None  # of forces by explicit steps: CPU time [s], and least number
 
     def compile(self, trial):
-        """Take a step with the solver of a trial; raises an `InputError` where it does not take the scene."""
-        if trial.method == "dop853":
-            self._refuse(trial.method)
+        """Take a step with the integrator of a trial; raises an `InputError` where it does not take the scene."""
+        if trial.make is None:
+            dop853.Dop853(self.system, self.begin)
             return
-        solver = self._solver(trial)
+        integrator = self._integrator(trial)
         with contextlib.suppress(SolverError):  # energies of a first moment may be too small for their book
-            solver.advance(solver.start(*self.begin), [1e-9 * self.times[-1]])
+            integrator.advance(integrator.start(*self.begin), [1e-9 * self.times[-1]])
+
+    def _integrator(self, trial):
+        return trial.make(self.system, self.probes, **{trial.key: trial.value})
 
     def expected(self, trial):
         """Estimate of the CPU time of a trial before any of its method has run [s].
@@ -174,103 +215,43 @@ class Dynamics:
         """
         from ..dynamics.method_choice import step_price
 
-        one = step_price(self.system)
-        if trial.key == "safety":
-            solver = self._solver(trial)
-            self._price = self._price or one * self.times[-1] / solver.bound()
-            return self._price * _stages(solver) / trial.value
-        longest = self._price / SAFETIES[0]
-        return OUTSIDE * longest * (1.0 + CALL / one) if trial.method == "dop853" else UNKNOWN * longest
-
-    def _refuse(self, method):
-        """Refuse for DOP853 what has no mass, or lengths that are held."""
-        from ..dynamics.integrators.step_observer import refuse_massless
-
-        refuse_massless(self.system, method)
-        if self.system.constraints:
-            raise InputError(f'[[link]] needs method = "ida": {method} does not hold lengths')
+        one = self._per_evaluation or step_price(self.system)
+        if trial.make is not None and (ahead := _evaluations(self._integrator(trial), self.times[-1])):
+            self._fewest = min(ahead, self._fewest or ahead)
+            return one * ahead
+        longest = one * (self._fewest or 0.0)
+        return OUTSIDE * longest * (1.0 + CALL / one) if trial.make is None else UNKNOWN * longest
 
     def run(self, trial, deadline):
-        """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the clock."""
-        if trial.method == "dop853":
-            self._outside(trial, deadline)
+        """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the `clock`."""
+        if trial.make is None:
+            self._run_outside(trial, deadline)
             return
-        from ..dynamics.simulation import blocks
+        from ..dynamics.schedule import Schedule, blocks
 
-        solver, times, split = self._solver(trial), self.times, 1
-        if trial.key == "rtol":  # steps are the solver's own and may be looked into; explicit ones follow from the rows
+        integrator, times, split = self._integrator(trial), self.times, 1
+        ahead = _evaluations(integrator, times[-1])
+        if ahead is None:  # steps are its own and may be looked into; explicit ones follow from the rows
             split = -(-PIECES // (len(times) - 1))
             times = np.interp(np.arange(split * (len(times) - 1) + 1) / split, np.arange(len(times)), times)
-        run, table = solver.start(*self.begin), []
-        began = time.process_time()
-        for _, history in blocks(solver, run, times, [len(times) - 1]):
-            table.append(history.probes[:, 0])
+        course, values = integrator.start(*self.begin), []
+        began = clock()
+        for block in blocks(integrator, course, Schedule(times, np.array([len(times) - 1]))):
+            values.append(block.history.probes[:, 0])
             _check(deadline)
-        trial.cpu_s = time.process_time() - began
-        if trial.key == "safety":
-            self._price = trial.cpu_s * trial.value / _stages(solver)
-        trial.values, trial.x = np.concatenate(table)[::split], run.x[: self._linear].copy()
-        trial.work = {**{key: solver.spent(run)[key] for key in ("nfev", "njev", "nlu")}, "nsteps": run.nsteps}
+        trial.cpu_s = clock() - began
+        if ahead is not None:
+            self._per_evaluation = trial.cpu_s / ahead
+        trial.values, trial.x = np.concatenate(values)[::split], course.x[: self._linear].copy()
+        spent = integrator.spent(course)
+        trial.work = {**{key: spent[key] for key in ("nfev", "njev", "nlu")}, "nsteps": course.nsteps}
 
-    def _outside(self, trial, deadline):
-        """Run scipy's DOP853 with the forces of the system."""
-        from scipy.integrate import DOP853
-
-        from ..dynamics.integrators.step_limits import TRAVEL
-        from ..dynamics.integrators.tolerances import scales
-
-        system, free, n = self.system, self.system.free, len(self.system.free)
-        x = np.zeros((system.rows, 3)) if self.begin[0] is None else self.begin[0].copy()
-        v = system.initial_velocity() if self.begin[1] is None else self.begin[1].copy()
-        v[system.supported] = 0.0
-        system.drive(0.0, x, v)
-        mass, held = np.repeat(system.net.mass, 3)[free], np.where(system.supported, x, 0.0)
-        consistent = system.net.consistent_minus_lumped is not None
-        over_mass = system.mass.factor.solve if consistent else lambda f: f / mass
-
-        def rows(t, y):
-            x, v = held.copy(), np.zeros((system.rows, 3))
-            x.ravel()[free], v.ravel()[free] = y[:n], y[n:]
-            system.drive(t, x, v)
-            return x, v
-
-        def rate(t, y):
-            return np.concatenate([y[n:], over_mass(system.force(t, *rows(t, y)).ravel()[free])])
-
-        near, fast = scales(system)
-        y, end, rtol = np.concatenate([x.ravel()[free], v.ravel()[free]]), self.times[-1], trial.value
-        breaks = [t for part in (*system.families, *system.drives, *system.line_drives) for t in part.times]
-        thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
-        values, row, steps, spent = np.empty(len(self.times)), 0, 0, -time.process_time()
-        solver = DOP853(rate, 0.0, y, end, rtol=rtol, atol=rtol * np.repeat([near, fast], n))
-        while row < len(values):
-            ahead = min((t for t in breaks if t > solver.t * (1.0 + 1e-12)), default=end)
-            speed = 2.0 * np.abs(solver.y[n:]).max(initial=0.0)
-            travel = TRAVEL * thickness / speed if speed > 0.0 else np.inf
-            solver.max_step = max(min(ahead - solver.t, travel), 1e-12 * end)
-            if steps or row:
-                message = solver.step()
-                steps += 1
-                if solver.status == "failed":
-                    raise SolverError(f"dop853 stopped at t = {solver.t:.6g} s: {message}")
-            inside = None
-            while row < len(values) and self.times[row] <= solver.t:
-                if row:
-                    inside = inside or solver.dense_output()
-                    y = inside(self.times[row])
-                spent += time.process_time()
-                trial_x, trial_v = rows(self.times[row], y)
-                values[row] = self.observable.value(State(system, self.times[row], trial_x, trial_v)).value
-                spent -= time.process_time()
-                row += 1
-            if consistent and steps and ahead < end and solver.t > ahead * (1.0 - 1e-12):  # a corner of a motion
-                sides = (rows(t, solver.y)[1] for t in (ahead * (1.0 + 1e-12), 0.5 * (solver.t_old + ahead)))
-                jump = np.where(system.supported, np.subtract(*sides), 0.0)
-                solver.y[n:] += system.mass.kick(jump).ravel()[free]
-                solver.f = rate(solver.t, solver.y)
-            _check(deadline)
-        trial.cpu_s, trial.values, trial.x = spent + time.process_time(), values, trial_x[: self._linear]
-        trial.work = {"nfev": solver.nfev, "njev": 0, "nlu": 0, "nsteps": steps}
+    def _run_outside(self, trial, deadline):
+        """Run DOP853."""
+        outside, began = dop853.Dop853(self.system, self.begin), clock()
+        found = outside.follow(self.times, trial.value, self.observable, clock, lambda: _check(deadline))
+        trial.cpu_s, trial.values, trial.x = clock() - began - found.looking, found.values, found.x[: self._linear]
+        trial.work = {"nfev": found.nfev, "njev": 0, "nlu": 0, "nsteps": found.nsteps}
 
 
 class Statics:
@@ -302,26 +283,14 @@ class Statics:
 
     def _solved(self, trial, steps, deadline):
         """States of a trial, and what each took; notes the CPU time."""
-        system, options = self._system(trial), {}
-        if trial.method == "relaxation":
-            from ..statics.dynamic_relaxation import solve
-
-            options = {"tolerance": trial.value}
-        else:
-            from ..statics.load_steps import solve
-        began, found = time.process_time(), []
-        for equilibrium in solve(system, steps, lambda text: _check(deadline), **options):
+        system, began, found = self._system(trial), clock(), []
+        for equilibrium in trial.make(trial, system, steps, lambda text: _check(deadline)):
             found.append(equilibrium)
             _check(deadline)
-        trial.cpu_s = time.process_time() - began
+        trial.cpu_s = clock() - began
         return [State(system, one.step, one.x) for one in found], [one.stats for one in found]
 
 
-def _stages(solver):
-    """Evaluations of forces of explicit steps in the time in which central differences at the bound take one."""
-    return len(solver.drifts) / solver.stretch
-
-
 def _check(deadline):
-    if time.perf_counter() > deadline:
+    if clock() > deadline:
         raise OverBudget

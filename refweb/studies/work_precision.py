@@ -6,9 +6,9 @@ how far any error can be trusted. Where all finest runs are about as far apart, 
 the best agreement may be luck, and the median difference counts. Where there are runs of one kind alone, the two finest
 of one method stand in, and that is said.
 
-The budget is kept by looking at the clock: what is expected to be the cheapest comes first, and of a method that has
-had its turns later; a run may take a third of what is left, is left out where it is expected to take more, and is ended
-where it does.
+The budget is kept by looking at the clock of `refweb.studies.trials`: what is expected to be the cheapest comes first,
+and of a method that has had its turns later; a run may take a third of what is left, is left out where it is expected
+to take more, and is ended where it does. The coarsest run of a method may always take a twentieth of the budget.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from __future__ import annotations
 import json
 import math
 import pathlib
-import time
 from dataclasses import dataclass, field
 from itertools import combinations, takewhile
 
@@ -32,10 +31,12 @@ from ..results.provenance import versions, web_of
 from ..results.run_status import Clock, recorded
 from ..scene import Scene
 from ..tables import checked, real
-from .trials import Dynamics, OverBudget, Statics, trials
+from . import dop853, trials
 
 SHARE = 1.0 / 3.0
 """Largest share of what is left of the budget that a run may take."""
+TURN = 0.05
+"""Share of the budget that the coarsest run of each method may take, however little is left."""
 FAIR = 1.5
 """Factor of an expected price for each rung that the method has behind it."""
 CHEAP, REPEATS = 0.2, 3
@@ -112,7 +113,7 @@ class Cost:
         if not self.trust[0] <= limit:
             return None
         methods = {t.method for t in self.trials if t.key != "smoothing"}
-        for name in methods - {"dop853"} if method is None else methods & {method}:
+        for name in methods - {dop853.NAME} if method is None else methods & {method}:
             ladder = [t for t in self.trials if t.method == name and t.status == "solved"]
             best += takewhile(lambda t: t.error_observable <= limit, reversed(ladder))
         return min(best, key=lambda t: t.cpu_s, default=None)
@@ -181,7 +182,7 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
         Name of the observable that errors are of: a nodal quantity, one of lines, or the slack fraction; by default
         the first of the scene that is one.
     budget : float
-        Time that all of it may take [s]; runs have at least half of it, however long kernels take to compile.
+        CPU time that all of it may take [s]; runs have at least half of it, however long kernels take to compile.
     out : path-like, optional
         Result folder; without it nothing touches the disk.
     force : bool
@@ -202,7 +203,7 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     SolverError
         Where no method solves the scene.
     """
-    clock, began = Clock(), time.perf_counter()
+    clock, began = Clock(), trials.clock()
     budget = checked("budget", budget, real(above=0, unit="s"))
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
@@ -214,13 +215,13 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
         observable = _observable(scene, observe)
     if announce is not None:
         announce(scene, system)
-    runner = (Dynamics if scene.solve.kind == "dynamic" else Statics)(scene, system, observable)
-    ladders = trials(scene)
+    runner = (trials.Dynamics if scene.solve.kind == "dynamic" else trials.Statics)(scene, system, observable)
+    ladders = trials.trials_of(scene)
     found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
     try:
         with recorded(found, clock):
             _compile(ladders, runner)
-            deadline = max(began + 0.9 * budget, time.perf_counter() + 0.5 * budget)  # the rest is for the diagram
+            deadline = max(began + 0.9 * budget, trials.clock() + 0.5 * budget)  # the rest is for the diagram
             _climb(ladders, runner, deadline, budget, progress or (lambda text, share: None))
             if not any(t.status == "solved" for t in found.trials):
                 found.status = "failed"
@@ -269,9 +270,9 @@ def _climb(ladders, runner, deadline, budget, tell):
     while ahead:
         prices = {name: _expected(ladders[name], rung, runner) for name, rung in ahead.items()}
         name = min(prices, key=lambda name: prices[name] * FAIR ** ahead[name])
-        ladder, now = ladders[name], time.perf_counter()
+        ladder, now = ladders[name], trials.clock()
         trial, rest = ladder[ahead[name]], ladder[ahead[name] :]
-        share = SHARE * (deadline - now)
+        share = SHARE * (deadline - now) if ahead[name] else max(SHARE * (deadline - now), TURN * budget)
         tell(f"{name}, {trial.setting}", min(1.0 - (deadline - now) / budget, 1.0))
         if prices[name] > share and (ahead[name] or trial.key == "safety"):
             trial.message = "would take more than its share of the budget"
@@ -302,19 +303,19 @@ def _try(trial, runner, until):
     """Run a trial, several times where it is cheap, and note how it ended."""
     least = np.inf
     for _ in range(REPEATS):
-        began, spent = time.perf_counter(), time.process_time()
+        began = trials.clock()
         try:
             runner.run(trial, until)
-        except OverBudget:
+        except trials.OverBudget:
             if least < np.inf:
                 break
             trial.message = "took more than its share of the budget"
             return
         except SolverError as error:
-            trial.status, trial.message, trial.cpu_s = "failed", str(error), time.process_time() - spent
+            trial.status, trial.message, trial.cpu_s = "failed", str(error), trials.clock() - began
             return
         trial.status, least = "solved", min(least, trial.cpu_s)
-        if trial.cpu_s > CHEAP or 2.0 * time.perf_counter() - began > until:
+        if trial.cpu_s > CHEAP or 2.0 * trials.clock() - began > until:
             break
     trial.cpu_s = least
 

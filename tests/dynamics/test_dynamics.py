@@ -16,10 +16,10 @@ from scipy.integrate import DOP853
 
 import refweb
 from refweb.__main__ import main
-from refweb.dynamics import simulation as dynamics
+from refweb.dynamics import schedule, simulation
 from refweb.dynamics.integrators import central_difference
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
-from refweb.dynamics.simulation import SPREAD
+from refweb.dynamics.twin_error import SPREAD
 from refweb.results.state import State
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
@@ -262,8 +262,7 @@ def whole():
 
 def full_solver():
     system = impact_system()
-    motion = dynamics.Motion(scene(), system, refweb.Solution(scene()))
-    return motion.solver(0.5)
+    return simulation.Simulation(scene(), system, refweb.Solution(scene())).integrator
 
 
 @pytest.mark.parametrize("sizes", [[1] * 21, [2, 3, 5, 11], [20, 1]])
@@ -299,7 +298,7 @@ def test_a_run_is_its_whole_state(whole):
 
 @pytest.mark.parametrize("duration, interval, last", [(0.01, 3e-3, 4), (0.01, 0.01, 1), (0.7, 0.1, 7)])
 def test_rows_are_multiples_of_the_interval_and_the_end(duration, interval, last):
-    times = dynamics.row_times(scene(duration, interval))
+    times = schedule.row_times(scene(duration, interval))
     np.testing.assert_allclose(times[:-1], interval * np.arange(last), rtol=1e-15)
     assert times[-1] == duration and len(times) == last + 1
 
@@ -560,12 +559,12 @@ def test_memory_does_not_grow_with_duration(tmp_path, monkeypatch):
     """A run with a folder keeps one state and no row, however long it lasts; its history is read from the folder."""
     followers = []
 
-    class Noted(dynamics.Motion):
+    class Noted(simulation.Simulation):
         def __init__(self, *arguments):
             super().__init__(*arguments)
             followers.append(self)
 
-    monkeypatch.setattr(dynamics, "Motion", Noted)
+    monkeypatch.setattr(simulation, "Simulation", Noted)
     for name, duration in (("short", 0.01), ("long", 0.08)):
         solution = refweb.run(scene(duration, 1e-4, 2), out=tmp_path / name)
         assert len(read_history(tmp_path / name)[1]) == round(duration / 1e-4) + 1

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import time
 
 import numpy as np
 import pytest
@@ -11,10 +10,14 @@ import pytest
 import refweb
 from refweb import scene as scenes
 from refweb.__main__ import main
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.integrators.integrator import Variant
 from refweb.dynamics.method_choice import decided
-from refweb.dynamics.simulation import Motion
-from refweb.studies.trials import DYNAMIC, KIND, Trial
-from refweb.studies.work_precision import COLUMNS, Cost, _compare
+from refweb.dynamics.simulation import Simulation
+from refweb.registry import INTEGRATORS
+from refweb.studies import trials
+from refweb.studies.trials import OverBudget, Trial, dynamic_ladders
+from refweb.studies.work_precision import COLUMNS, TURN, Cost, _climb, _compare
 
 TAUT = dict(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=1e-2)
 THROWN = refweb.Velocity(node="centre", value=(0.5, 0.2, 2.0))
@@ -42,13 +45,23 @@ def scene(effects=(THROWN,), duration=0.01, web=None, interval=None, accuracy=No
     )
 
 
+METHODS = set(dynamic_ladders())
+ENOUGH = 1e4
+"""A budget that nothing comes near [s], whatever else the machine has to do."""
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """BDF, of thousands of steps at fine tolerances, only to 1e-5."""
+    monkeypatch.setitem(trials.SETTINGS, "rtol", (1e-3, 1e-4, 1e-5))
+
+
 @pytest.fixture(scope="module")
 def found():
-    """All runs of a small scene; BDF, of thousands of steps at fine tolerances, only to 1e-5."""
+    """All runs of a small scene, BDF as above."""
     with pytest.MonkeyPatch.context() as patch:
-        for method in ("cvode-bdf", "ida"):
-            patch.setitem(DYNAMIC, method, ("rtol", (1e-3, 1e-4, 1e-5)))
-        return refweb.cost(scene(), budget=60.0)
+        patch.setitem(trials.SETTINGS, "rtol", (1e-3, 1e-4, 1e-5))
+        return refweb.cost(scene(), budget=ENOUGH)
 
 
 def ladder(found, method):
@@ -58,7 +71,7 @@ def ladder(found, method):
 def test_what_is_compared(found):
     """The first observable that a state alone determines, by every method at every setting."""
     assert found.observable.name == "centre" and found.status == "solved"
-    assert {t.method for t in found.trials} == set(DYNAMIC)
+    assert {t.method for t in found.trials} == METHODS
     assert all(t.status == "solved" for t in found.trials)
 
 
@@ -126,33 +139,105 @@ def test_folder(found, tmp_path):
     assert refweb.Scene.load(tmp_path / "cost" / "scene.toml").title == "Small"
 
 
-def test_budget():
-    """A stiff cable in a single row, millions of steps at the finest: what there is no time for is left out."""
-    cable = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=50)
-    given = scene([refweb.Gravity(acceleration=(0, 0, -9.81))], 1.0, web=cable, modulus=1e9, interval=1.0)
-    refweb.cost(scene(duration=1e-3), budget=60.0)  # compiles
-    began = time.perf_counter()
-    found = refweb.cost(given, budget=3.0)
-    assert time.perf_counter() - began < 2.0 * 3.0  # a run ends with the block it is in, of about a tenth of a second
-    left = [t for t in found.trials if t.status == "budget"]
-    assert left and all(math.isnan(t.cpu_s) and "budget" in t.message for t in left)
+class Clock:
+    """A clock that goes on by what is done, and by ``tick`` each time it is looked at."""
+
+    def __init__(self, monkeypatch, tick=0.0):
+        self.now, self.tick = 0.0, tick
+        monkeypatch.setattr(trials, "clock", self)
+
+    def __call__(self):
+        self.now += self.tick
+        return self.now
 
 
-def test_massless_nodes_are_for_ida_alone():
+class Priced:
+    """Runs that take what they cost by a clock: the coarsest of a method, at 1, its price, at 1/2 a growth times that.
+
+    ``allowed`` lists what each may take.
+    """
+
+    def __init__(self, clock, prices, growth):
+        self.clock, self.prices, self.growth, self.allowed = clock, prices, growth, []
+
+    def expected(self, trial):
+        return 0.0
+
+    def run(self, trial, deadline):
+        price = self.prices[trial.method] * self.growth ** -math.log2(trial.value)
+        self.allowed.append(deadline - self.clock.now)
+        if price > deadline - self.clock.now:
+            self.clock.now = max(deadline, self.clock.now)
+            raise OverBudget
+        self.clock.now += price
+        trial.cpu_s = price
+
+
+def climbed(monkeypatch, prices, growth=3.0, budget=100.0):
+    """Trials of methods of known prices, by method, and what has run them; a tenth of the budget is kept."""
+    clock = Clock(monkeypatch)
+    ladders = {name: [Trial(name, "rtol", 2.0**-rung) for rung in range(8)] for name in prices}
+    runner = Priced(clock, prices, growth)
+    _climb(ladders, runner, 0.9 * budget, budget, lambda text, share: None)
+    return ladders, runner
+
+
+def test_budget(monkeypatch):
+    """What there is no time for is left out, of each method all that is finer; all kinds have come to some digits."""
+    ladders, runner = climbed(monkeypatch, {"cheap": 0.5, "dear": 2.0, "dearest": 8.0})
+    assert runner.clock.now <= 90.0
+    for ladder in ladders.values():
+        solved = [t.status == "solved" for t in ladder]
+        assert solved[0] and not solved[-1] and solved == sorted(solved, reverse=True)
+        assert all("budget" in t.message for t in ladder if t.status == "budget")
+    assert 0.0 < max(runner.allowed) <= 30.0
+    counts = [sum(t.status == "solved" for t in ladder) for ladder in ladders.values()]
+    assert counts == sorted(counts, reverse=True) and counts[0] > counts[-1]
+
+
+def test_every_method_has_its_turn(monkeypatch):
+    """However little the others have left, the coarsest run may take `TURN` of the budget."""
+    greedy = {f"greedy {i}": 0.3 * 90.0 * 0.7**i for i in range(7)}
+    late = {"small": 99.0 * TURN, "large": 101.0 * TURN}
+    ladders, runner = climbed(monkeypatch, {**greedy, **late})
+    left = 90.0 * 0.7**7
+    assert left / 3.0 < late["small"] and [t.status for t in ladders["small"][:2]] == ["solved", "budget"]
+    assert ladders["large"][0].status == "budget" and "took more than its share" in ladders["large"][0].message
+    assert runner.clock.now <= 90.0 + 2 * 100.0 * TURN
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_run_is_ended_at_its_deadline(monkeypatch, method):
+    """The clock is looked at within it, of explicit steps after blocks of rows."""
+    given, clock = scene(), Clock(monkeypatch, tick=1.0)
+    runner = trials.Dynamics(given, given.build(), given.observables[1])
+    first = trials.trials_of(given)[method][0]
+    runner.compile(first)
+    with pytest.raises(OverBudget):
+        runner.run(first, clock.now + 3.5)
+    assert clock.now < 10.0 and math.isnan(first.cpu_s)
+    runner.run(first, math.inf)
+    assert first.cpu_s > 3.5
+
+
+def test_massless_nodes_are_for_ida_alone(coarse):
     """The other methods are listed as refused, with their reasons, and that no other kind confirms it is said."""
-    found = refweb.cost(scene([refweb.PointMass(node="centre", mass=1.0), THROWN], **MASSLESS), budget=8.0)
+    found = refweb.cost(scene([refweb.PointMass(node="centre", mass=1.0), THROWN], **MASSLESS), budget=ENOUGH)
     refused = {t.method for t in found.trials if t.status == "refused"}
-    assert refused == set(DYNAMIC) - {"ida"}
+    assert refused == METHODS - {"ida"}
     assert all("has no mass" in t.message for t in found.trials if t.status == "refused")
     assert not found.independent and "one kind of method alone" in found.sentence
     assert {t.method for t in found.references} == {"ida"}
 
 
-def test_failures_are_listed():
+def test_failures_are_listed(monkeypatch):
     """A run whose book of energy is open has failed, and has no error: BDF of a coarse tolerance loses energy."""
     web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=10, length=1.05)
     given = scene([refweb.PointMass(node="centre", mass=0.1), THROWN], 0.3, web, cable=SLACK)
-    found = refweb.cost(given, budget=4.0)
+    monkeypatch.setitem(trials.SETTINGS, "rtol", (1e-3, 1e-4))
+    few = {name: dynamic_ladders()[name] for name in ("central-difference", "cvode-bdf")}
+    monkeypatch.setattr(trials, "dynamic_ladders", lambda: few)
+    found = refweb.cost(given, budget=ENOUGH)
     failed = [t for t in found.trials if t.status == "failed"]
     assert failed and all(math.isnan(t.error_state) and "energy" in t.message for t in failed)
 
@@ -162,7 +247,7 @@ def test_statics():
     load = refweb.Load(node="centre", force=(0.0, 0.0, 1.0))
     given = scene([load], solve=refweb.Static(load_steps=[1, 2]), cable=SLACK)
     given = given.replace(observe=given.observe[1:])
-    found = refweb.cost(given, budget=10.0)
+    found = refweb.cost(given, budget=ENOUGH)
     assert found.independent and {t.method for t in found.references} == {"newton", "relaxation"}
     assert found.trust[0] < 1e-7 * found.scale
     smooth = [t.error_observable for t in found.trials if t.method == "newton-smooth"]
@@ -174,7 +259,9 @@ def finest(values):
     found = Cost(scene(), scene().observables[1], [], {})
     for method, value in values.items():
         x = np.full((1, 3), value)
-        found.trials.append(Trial(method, "rtol", 1e-6, "solved", cpu_s=1.0, values=np.array([value]), x=x))
+        found.trials.append(
+            Trial(method, "rtol", 1e-6, "solved", kind=method, cpu_s=1.0, values=np.array([value]), x=x)
+        )
     _compare(found)
     return found
 
@@ -191,7 +278,37 @@ def test_agreement_by_luck():
 
 def test_kinds():
     """Splittings converge alike, and so do BDF of CVODE and IDA with the same tolerance: they confirm nothing."""
-    assert KIND["explicit-6"] == KIND["central-difference"] and KIND["ida"] == KIND["cvode-bdf"]
+    kinds = {name: ladder.kind for name, ladder in dynamic_ladders().items()}
+    assert kinds["explicit-6"] == kinds["central-difference"] and kinds["ida"] == kinds["cvode-bdf"]
+    assert len(set(kinds.values())) == 4
+
+
+def test_a_method_of_the_table_is_compared(coarse, monkeypatch):
+    """A line in the table of integrators is all that it takes to run a scene with it, and to have it compared."""
+    line = INTEGRATORS["central-difference"]._replace(integrator=f"{__name__}:Halved")
+    monkeypatch.setitem(INTEGRATORS, "halved", line)
+    given = scene(solve=refweb.Dynamic(duration=0.01, method="halved", safety=0.8))
+    solution = refweb.run(given)
+    assert solution.solver["method"] == "halved"
+    plain = refweb.run(scene(solve=refweb.Dynamic(duration=0.01, safety=0.4)))
+    assert solution.results["centre"].value == plain.results["centre"].value
+    assert trials.label_of(given.solve) == "halved"
+    few = {name: ladder for name, ladder in dynamic_ladders().items() if name in ("halved", "explicit-6")}
+    assert few["halved"].kind == "halved"
+    monkeypatch.setattr(trials, "dynamic_ladders", lambda: few)
+    found = refweb.cost(given, budget=ENOUGH)
+    assert {t.status for t in found.trials} == {"solved"} and found.independent
+    with pytest.raises(refweb.InputError, match='rtol = 0.1 has no meaning with method = "halved"'):
+        refweb.Dynamic(duration=0.01, method="halved", rtol=0.1)
+
+
+class Halved(CentralDifference):
+    """Central differences with half the safety that is asked for."""
+
+    method, variants = "halved", {"halved": Variant()}
+
+    def __init__(self, *arguments, safety=0.5, **keys):
+        super().__init__(*arguments, safety=0.5 * safety, **keys)
 
 
 @pytest.mark.parametrize(
@@ -293,8 +410,8 @@ def test_auto_takes_every_shipped_scene(name, digits):
     given = refweb.Scene.load(name)
     solve = refweb.Dynamic(method="auto", duration=given.solve.duration, start=given.solve.start, mass=given.solve.mass)
     given = given.replace(solve=solve, accuracy=refweb.Accuracy(digits=digits))
-    motion = Motion(given, given.build(), refweb.Solution(given))
-    assert motion.scene.solve.method in ("central-difference", "explicit", "cvode", "ida")
+    simulation = Simulation(given, given.build(), refweb.Solution(given))
+    assert simulation.scene.solve.method in INTEGRATORS
 
 
 def test_auto_runs_and_says_why(tmp_path, capsys):

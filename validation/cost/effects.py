@@ -24,7 +24,7 @@ import tempfile
 import time
 
 import refweb
-from refweb.dynamics.simulation import Motion
+from refweb.dynamics.simulation import Simulation
 from refweb.scene import Scene
 from refweb.solution import Solution
 
@@ -61,11 +61,12 @@ AGREEMENT = 1e-3
 COUNTED = """
 import ctypes, gc, json, sys
 import refweb
-from refweb.dynamics.simulation import Motion, row_times
+from refweb.dynamics.schedule import row_times
+from refweb.dynamics.simulation import Simulation
 
 scene = refweb.Scene.from_dict(json.loads(sys.argv[1]))
 refweb.run(scene)
-solver = Motion(scene, scene.build(), refweb.Solution(scene)).solver(scene.solve.safety)
+solver = Simulation(scene, scene.build(), refweb.Solution(scene)).integrator
 run, times = solver.start(), row_times(scene)
 gc.disable()  # it would come when it likes
 toggle = ctypes.CDLL(sys.argv[2]) if len(sys.argv) > 2 else None
@@ -91,11 +92,13 @@ def scenes():
 
 def timed(scene, system):
     """CPU time of a run and its follower per element and step [ns]."""
-    motion = Motion(scene, system, Solution(scene))
+    simulation = Simulation(scene, system, Solution(scene))
     began = time.process_time()
-    motion.follow(None, lambda text, share: None)
+    simulation.follow(None, lambda text, share: None)
     seconds = time.process_time() - began
-    return 1e9 * seconds / (motion.solution.solver["nsteps"] * len(system.net.cells)), motion.solution.solver["nsteps"]
+    return 1e9 * seconds / (simulation.solution.solver["nsteps"] * len(system.net.cells)), simulation.solution.solver[
+        "nsteps"
+    ]
 
 
 def measure(repeats=7):

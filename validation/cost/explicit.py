@@ -20,7 +20,7 @@ import time
 
 import numpy as np
 
-from refweb.dynamics.simulation import Motion
+from refweb.dynamics.simulation import Simulation
 from refweb.effects.contact.nearest_point import AWAY, PENALTY, RADIUS
 from refweb.net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from refweb.scene import Scene
@@ -155,16 +155,16 @@ def scenes():
 
 def whole_run(scene, system):
     """CPU time of a run and its follower, with the steps it took in each row."""
-    motion = Motion(scene, system, Solution(scene))
+    simulation = Simulation(scene, system, Solution(scene))
     began = time.process_time()
-    motion.follow(None, lambda text, share: None)
-    return time.process_time() - began, motion
+    simulation.follow(None, lambda text, share: None)
+    return time.process_time() - began, simulation
 
 
 def steps_of(scene, system):
     """Step counts and sizes of every history row."""
-    motion = Motion(scene, system, Solution(scene))
-    solver, times = motion.solver(scene.solve.safety), motion._times()[0]
+    simulation = Simulation(scene, system, Solution(scene))
+    solver, times = simulation.integrator, simulation.schedule.times
     run, counts, sizes = solver.start(), [], []
     for end in times[1:]:
         before = run.nsteps

@@ -10,7 +10,9 @@ cheap. A run that fails, is refused or would take more than a third of what is l
 A method costs what the coarsest run costs from which on it keeps the digits, interpolated on logarithmic scales between
 that run and the one before. ``method = "auto"`` names a method before anything has run; it has to be one that costs at
 most 1.5 times the best at three digits, or at as many as the references allow: in the mean of that, half a digit and a
-digit less, as the errors of an impact fall by leaps and a single price is luck.
+digit less, as the errors of an impact fall by leaps and a single price is luck. The quick variant runs in tests, on
+machines that have other things to do: there all runs are taken in turns, several times over, each counts with the least
+CPU time that it has shown, and the bound is 3 times the best.
 
 Last, refweb's explicit steps of order 2, 4 and 6 against DOP853 on the square web of the paper whose centre is thrown:
 the ratio of CPU times at equal errors of displacement, with the smooth law, whose forces have the derivatives that high
@@ -25,16 +27,17 @@ import numpy as np
 
 import refweb
 from refweb.dynamics.method_choice import decided
+from refweb.studies import trials
 from refweb.studies.work_precision import cost
 
 from ..harness.case import Case, Figure, Table, Verdict
 
-NEAR = 1.5
-"""Largest price of the method that "auto" names over the best."""
+NEAR, NEAR_QUICK = 1.5, 3.0
+"""Largest price of the method that "auto" names over the best; in the quick variant."""
+ROUNDS, LONG = 5, 0.2
+"""Turns of the quick variant, in which runs of less CPU time [s] take part."""
 SECONDS = 55.0
 """Budget of a scene [s]."""
-EXPLICIT = ("central-difference", "explicit-4", "explicit-6")
-"""refweb's own explicit methods, in the ladders' words."""
 ERRORS = 10.0 ** -np.arange(6.0, 11.1)
 """Errors of displacement at which explicit steps and DOP853 are compared [m]."""
 
@@ -162,15 +165,23 @@ def price(found, method, limit, key="error_observable"):
     return math.exp((1.0 - share) * math.log(before.cpu_s) + share * math.log(here.cpu_s))
 
 
-def name_of(solve):
-    """How the ladders call the method of a `refweb.Dynamic`."""
-    return {"explicit": f"explicit-{solve.order}", "cvode": f"cvode-{solve.family}"}.get(solve.method, solve.method)
+def in_turns(found):
+    """Run all that was solved again in turns: what slows the machine down for a while slows them all."""
+    scene = found.scene
+    runner = trials.Dynamics(scene, scene.build(), found.observable)
+    short = [t for t in found.trials if t.status == "solved" and t.cpu_s < LONG]
+    for _ in range(ROUNDS):
+        for trial in short:
+            before = trial.cpu_s
+            runner.run(trial, math.inf)
+            trial.cpu_s = min(trial.cpu_s, before)
+    return found
 
 
 def judged(found):
     """What "auto" names, its price over the best in the mean, and in words, at how many digits and why."""
     solve, reason = decided(found.scene, found.scene.build())
-    own, methods = name_of(solve), dict.fromkeys(t.method for t in found.trials)
+    own, methods = trials.label_of(solve), dict.fromkeys(t.method for t in found.trials)
     digits = next((d for d in (3, 2, 1) if found.price(d) is not None), None)
     if digits is None:
         return own, math.nan, f"nothing is known of digits; {reason}"
@@ -188,9 +199,10 @@ def against_dop853(quick):
     web = window("square", 6, 6, 0.1) if quick else refweb.Paper(mesh="square", cable_length=201.4)
     cable = dict(law="smooth", smoothing=1e-4, modulus=7e7, area=1e-4, density=200.0)
     found = cost(scene("Thrown mass", web, cable, thrown((0.0, 0.0, 1.0), 1.0), 0.05), budget=8.0 if quick else 100.0)
-    ratios = []
+    found, ratios = in_turns(found) if quick else found, []
+    explicit = dict.fromkeys(t.method for t in found.trials if t.key == "safety")
     for error in ERRORS:
-        own = min(price(found, method, error, "error_state") for method in EXPLICIT)
+        own = min(price(found, method, error, "error_state") for method in explicit)
         ratios.append(price(found, "dop853", error, "error_state") / own)
     return found, np.array(ratios)
 
@@ -203,11 +215,12 @@ def drawn(found):
 def case(quick):
     """All diagrams, and whether "auto" is near the best."""
     verdicts, figures, rows = [], [], []
+    near = NEAR_QUICK if quick else NEAR
     for given, words in quick_scenes() if quick else scenes():
-        found = cost(given, budget=10.0 if quick else SECONDS)
+        found = in_turns(cost(given, budget=10.0)) if quick else cost(given, budget=SECONDS)
         method, ratio, because = judged(found)
         verdicts.append(
-            Verdict(f'{given.title}: "auto" is within {NEAR:g} × of the best', "holds", because, checked=ratio <= NEAR)
+            Verdict(f'{given.title}: "auto" is within {near:g} × of the best', "holds", because, checked=ratio <= near)
         )
         figures.append(Figure(f"{given.title}. {words} {found.sentence}", found.draw))
         rows.append([given.title, found.sentence, method, f"{ratio:.2f}", because])

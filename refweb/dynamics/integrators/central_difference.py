@@ -24,7 +24,7 @@ from .energy_book import DRIFT, book_energies, no_energy, refuse_open
 from .events import event_rows, starts_above
 from .explicit_loop import BREATH, LOOKS, advance, rows_ahead, set_lengths
 from .extremes import Extremes
-from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator
+from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .step_bound import no_bound, step_bound
 
 TWIN_STEPS = math.sqrt(2.0)
@@ -83,6 +83,7 @@ class CentralDifference(Integrator):
     method, order, stretch = "central-difference", 2, 1.0
     knob, retry, beside = "safety", 0.5, True
     breathe = staticmethod(lambda t: None)
+    variants = {"central-difference": Variant(kind="splitting")}
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
     def __init__(self, system, probes=(), sums=(), events=(), safety=0.5, step_size=None, finer=1.0):
@@ -177,6 +178,11 @@ class CentralDifference(Integrator):
             self._set_lengths(max(corner, 0.0))
             limit = min(limit, step_bound(reach, 0.0, x, self._masses[0], self._moving, *rest))
         return limit
+
+    def evaluations(self, duration):
+        """Evaluations of forces that a duration [s] takes, by the bound of its start."""
+        step = self.step_size or self.safety * self.stretch * self.bound()
+        return len(self.drifts) * self.finer * duration / step
 
     def _set_lengths(self, t):
         if self.system.line_drives:

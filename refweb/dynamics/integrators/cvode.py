@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
+from .integrator import Variant
 from .sundials import Sundials, Symmetric
 
 SHORT = 1.0
@@ -50,6 +51,10 @@ class Cvode(Sundials):
     """
 
     method = "cvode"
+    variants = {
+        "cvode-bdf": Variant({"family": "bdf"}, kind="bdf"),
+        "cvode-adams": Variant({"family": "adams"}, (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)),
+    }
 
     def __init__(self, system, *observed, family="bdf", max_order=None, linear_solver="auto", **tolerances):
         super().__init__(system, *observed, **tolerances)

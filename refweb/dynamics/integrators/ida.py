@@ -32,6 +32,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, SolverError
+from .integrator import Variant
 from .step_observer import ObservedCourse, Stopped
 from .sundials import Sundials, Symmetric
 from .tolerances import scales
@@ -73,6 +74,7 @@ class Ida(Sundials):
     """
 
     method = "ida"
+    variants = {"ida": Variant(kind="bdf")}
     takes_massless = takes_links = True
     course_type = LinkedCourse
 
@@ -90,6 +92,10 @@ class Ida(Sundials):
         if system.constraints:
             self._links = system.links
         self._count = len(self._links) if self._links else 0
+        if linear_solver == "fixed-point":
+            raise InputError(
+                '[solve] linear_solver = "fixed-point" must be one of "auto", "block", "sparse", "dense" with ida'
+            )
         if self._links and linear_solver == "block":
             raise InputError('[solve] linear_solver = "block" must be "sparse" or "dense" with [[link]]')
         self._choose(linear_solver, *(("sparse", ", and links") if self._links else ("block",)))

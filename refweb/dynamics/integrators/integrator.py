@@ -185,6 +185,26 @@ class History:
         return self.values[:, -len(AXES) :]
 
 
+class Variant(NamedTuple):
+    """A way to run a method, which ``refweb cost`` compares with others.
+
+    Attributes
+    ----------
+    keys : dict
+        Keys of ``[solve]`` that make it.
+    settings : tuple of float
+        Values of the knob at which it is run, from coarse to fine; by default those of
+        `refweb.studies.trials.SETTINGS`.
+    kind : str
+        What it has in common with others whose errors may be alike, so that they confirm nothing of each other; empty
+        for what is alone of its kind.
+    """
+
+    keys: dict = {}
+    settings: tuple = ()
+    kind: str = ""
+
+
 class Integrator(Protocol):
     """A method of dynamics on one system.
 
@@ -207,6 +227,12 @@ class Integrator(Protocol):
     breathe : callable
         Called with the time [s] some times a second of ``advance``; it may raise, and then the run is as it was at the
         row before.
+
+    Notes
+    -----
+    What it has to say besides, it may: ``takes_links = True`` where it holds the lengths of ``[[link]]``; ``variants``,
+    a dict of `Variant` s by name, where ``refweb cost`` is to compare several of them or in other settings; and a
+    method ``evaluations(duration)``, how many evaluations of forces a time [s] takes, where that is known before a run.
     """
 
     method: str

@@ -33,6 +33,7 @@ import numpy as np
 
 from ...errors import InputError
 from .central_difference import CentralDifference
+from .integrator import Variant
 
 KICKS = {
     4: (0.0829844064174052, 0.396309801498368, -0.0390563049223486),
@@ -90,6 +91,9 @@ class Splitting(CentralDifference):
     """
 
     method = "explicit"
+    variants = {
+        f"explicit-{order}": Variant({"order": order}, (0.9, 0.6, 0.4, 0.25, 0.15), "splitting") for order in KICKS
+    }
 
     def __init__(self, system, *observed, order=6, **steps):
         for family in system.families:

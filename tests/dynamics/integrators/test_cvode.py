@@ -18,11 +18,11 @@ from scipy.sparse.linalg import splu
 
 import refweb
 from refweb.__main__ import main
-from refweb.dynamics import simulation as dynamics
 from refweb.dynamics.integrators import simpson_book, sundials
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
+from refweb.dynamics.simulation import Simulation
 from refweb.effects.elasticity import Elasticity
 from refweb.net import discretisation
 from refweb.results.state import State
@@ -572,19 +572,19 @@ def test_a_body_does_not_pass_between_two_steps(family, speed):
 def test_rows_change_nothing():
     """The same motion bit for bit whatever the rows after the first, and however many are asked for at once."""
     system = scene(everything()).build()
-    motion = dynamics.Motion(scene(everything()), system, refweb.Solution(scene(everything())))
+    simulation = Simulation(scene(everything()), system, refweb.Solution(scene(everything())))
     times = np.linspace(0.0, 0.02, 21)
-    solver = motion.solver(1e-6)
+    solver = simulation.integrator_at(1e-6)
     run = solver.start()
     rows = solver.advance(run, times).values
     for sizes in ([1] * 21, [1, 2, 7, 11]):
-        other = motion.solver(1e-6)
+        other = simulation.integrator_at(1e-6)
         again = other.start()
         parts = [other.advance(again, part).values for part in np.split(times, np.cumsum(sizes)[:-1])]
         np.testing.assert_array_equal(np.vstack(parts), rows)
         assert (again.nsteps, again.drift) == (run.nsteps, run.drift)
         np.testing.assert_array_equal(again.extremes.values, run.extremes.values)
-    coarse = motion.solver(1e-6)
+    coarse = simulation.integrator_at(1e-6)
     end = coarse.start()
     coarse.advance(end, [0.0, times[1], 0.02])
     assert end.nsteps == run.nsteps

@@ -1,0 +1,145 @@
+"""A scene run as often as its results need: until the book of energies closes, and until digits asked for are there.
+
+The knob of an integrator, ``safety`` or ``rtol``, trades accuracy for time; each run has a value of it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import OpenBook
+
+ATTEMPTS = 3
+"""Number of runs in which the book of energies has to close."""
+CLIMBS = 8
+"""Number of times that accuracy is raised for digits that are missing."""
+STAYS = "a higher accuracy changes it as much: it is zero, or not determined, or a peak that needs a shorter interval"
+STUCK = 1.5
+"""Factor by which an error has to fall where half the step, or a tenth of rtol, is meant to quarter it."""
+
+
+@dataclass
+class Standing:
+    """Where the loop stands, which a checkpoint keeps.
+
+    Attributes
+    ----------
+    first : float
+        Value of the integrator's knob that the scene begins with.
+    knob : float
+        Its value in the run.
+    repeated : int
+        How often a run was repeated since digits were last looked at, as its book stayed open.
+    missing : dict of str to float
+        ± over what digits allow, by result, when they were last looked at.
+    """
+
+    first: float
+    knob: float
+    repeated: int = 0
+    missing: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, first, kept=None):
+        """At the beginning, or as a checkpoint has it."""
+        if kept is None:
+            return cls(first, first)
+        missing = dict(zip(kept["missing"].tolist(), kept["shares"].tolist(), strict=True))
+        return cls(first, float(kept["accuracy"]), int(kept["repeated"]), missing)
+
+    def arrays(self):
+        """What a checkpoint keeps of it."""
+        names, shares = np.array(list(self.missing), dtype=str), np.array(list(self.missing.values()))
+        return {"accuracy": self.knob, "repeated": self.repeated, "missing": names, "shares": shares}
+
+
+def follow(simulation, folder, tell):
+    """Run, and run again at a higher accuracy as long as digits are asked for that are missing.
+
+    Parameters
+    ----------
+    simulation : refweb.dynamics.simulation.Simulation
+        What is run; its solution is filled in.
+    folder : refweb.results.folder.Folder or None
+        Where rows and frames are written.
+    tell : callable
+        Called with a text and the share that is done.
+    """
+    run_within_drift(simulation, folder, tell)
+    if simulation.scene.accuracy.digits is not None:
+        reach_digits(simulation, simulation.scene.accuracy.digits, folder, tell)
+
+
+def run_within_drift(simulation, folder, tell):
+    """Run with errors; one whose energy book stays open is repeated with a smaller knob, `ATTEMPTS` runs at most."""
+    scene, solution, standing = simulation.scene, simulation.solution, simulation.standing
+    while True:
+        name = simulation.integrator.knob
+        text = "running" if standing.knob == standing.first else f"running with {name} = {standing.knob:g}"
+        with _twin_of(simulation) as twin:
+            try:
+                run = simulation.run(folder, functools.partial(tell, text))
+            except OpenBook as error:
+                if standing.repeated == ATTEMPTS - 1 or scene.solve.step_size is not None:
+                    raise
+                standing.repeated += 1
+                standing.knob *= simulation.integrator.retry
+                solution.warnings.append(f"{error}; repeated with {name} = {standing.knob:g}")
+                simulation.again(folder)
+                continue
+            tell("finding errors by a twin run", 1.0)
+            ended = twin.ended() if twin else None
+        break
+    solution.reduced, standing.repeated = run.results, 0
+    if ended is not None:
+        from .twin_error import add_errors
+
+        rows = simulation.watch.of_observables(np.array(simulation.rows) if folder is None else folder.rows())
+        add_errors(solution, run, ended, rows, simulation.integrator.error_share(run.course, ended.course))
+    elif twin:
+        solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
+
+
+def _twin_of(simulation):
+    """A twin beside the run, where the scene wants one."""
+    if simulation.scene.accuracy.error == "none":
+        return contextlib.nullcontext()
+    from .twin_error import Twin
+
+    return Twin(simulation)
+
+
+def missing_digits(results, digits):
+    """±, over what so many significant digits allow, of each result that has not got them."""
+    allowed = {name: 0.5 * 10.0**-digits * abs(result.value) for name, result in results.items()}
+    shares = {n: np.inf if r.error is None else r.error / max(allowed[n], 5e-324) for n, r in results.items()}
+    return {name: share for name, share in shares.items() if share > 1.0}
+
+
+def reach_digits(simulation, digits, folder, tell):
+    """Raise accuracy until every result has its digits, or has shown that it cannot have them; say which have not."""
+    solution, standing = simulation.solution, simulation.standing
+    before = standing.missing
+    for _ in range(CLIMBS):
+        missing = missing_digits(solution.reduced, digits)
+        falling = [share for name, share in missing.items() if before.get(name, np.inf) > STUCK * share]
+        if not falling:
+            break
+        before, steps = missing, solution.solver["nsteps"]
+        standing.missing = before
+        standing.knob *= simulation.integrator.next_knob(max(falling))
+        simulation.again(folder)
+        run_within_drift(simulation, folder, tell)
+        if solution.solver["nsteps"] < 1.1 * steps:  # something else limits them: nothing was changed
+            before = standing.missing = {}
+    setting = f"{simulation.integrator.knob} = {standing.knob:g}"
+    for name, share in missing_digits(solution.reduced, digits).items():
+        falls = before.get(name, np.inf) > STUCK * share
+        why = "it would take more still" if falls else STAYS
+        known = f"its ± is {share:.3g} times what they allow with {setting}; {why}"
+        known = known if np.isfinite(share) else "its ± is not known"
+        solution.warnings.append(f"{name} has not the {digits} digits asked for: {known}")

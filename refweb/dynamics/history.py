@@ -1,0 +1,155 @@
+"""What an integrator looks at for a scene, and how its `History` becomes rows of ``history.csv`` and results.
+
+Observables of a state are probes, those of energies, work and step size weighted sums of the integrator's books. Behind
+the scene's own probes stand those of what refweb warns of, and those of events that no observable tells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..net.tension_laws import SMOOTH
+from ..results import probes
+from ..results.observables.book import weights
+from ..results.observables.observe import SIGN, Observe
+from ..results.solution import Result
+from ..results.state import State
+from .integrators.events import Event
+from .integrators.integrator import AXES, History, Sum
+
+VECTORS = ("momentum", "support_impulse")
+"""Last columns of ``history.csv``, each with its axes."""
+
+
+def _scales_of_warnings(net):
+    """What refweb warns of, by name: tension times a scale of each element, of which the largest value counts."""
+    scales = {}
+    if net.law.number == SMOOTH:
+        scales["stress"] = 1.0 / net.area
+    if np.isfinite(net.strength).any():
+        scales["utilisation"] = 1.0 / (net.area * net.strength)
+    return scales
+
+
+def _event_of(event, system):
+    """(probe, event) of an event of a scene, the probe None where it is an observable's; its slot is not known yet."""
+    if event.kind == "contact":
+        from ..results.observables.reaction import push_on
+
+        rows = [body.row for body in system.net.bodies if event.body in (None, body.name)]
+        return push_on(system, rows), Event(-1, 0.0, True, event.stop, at_once=True)
+    if event.kind == "taut":
+        probe = Observe(name="_", quantity="strain", line=event.line).probe(system)
+        return probe, Event(-1, float(system.net.slackness[probe.rows[1]]), True, event.stop)
+    return None, Event(-1, event.value, False, event.stop)
+
+
+class Watch:
+    """What an integrator looks at for a scene, and what becomes of it.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        Its observables and events.
+    system : refweb.system.system.System
+        What acts.
+
+    Attributes
+    ----------
+    probes : list of refweb.results.probes.Probe
+        Of observables, of warnings and of events, in this order.
+    sums : list of refweb.dynamics.integrators.integrator.Sum
+        Of the observables that are followed in every step.
+    events : list of refweb.dynamics.integrators.events.Event
+        In the order of the scene.
+    columns : list of str
+        Names of the columns of ``history.csv``, with units.
+    """
+
+    def __init__(self, scene, system):
+        self.system, self._observables = system, scene.observables
+        self._probed = [o for o in self._observables if not o.observable.booked]
+        awaited = {event.observe for event in scene.event}
+        booked = [o for o in self._observables if o.observable.booked]
+        self._followed = [o for o in booked if o.reduce != "final" or o.name in awaited]
+        self._warned = _scales_of_warnings(system.net)
+        self.probes = [o.probe(system) for o in self._probed]
+        self.probes += [probes.Probe(probes.line, [0, 0, len(s)], s[:, None], 1) for s in self._warned.values()]
+        self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
+        self.events = self._add_events(scene.event)
+        own = dict.fromkeys(f.book for f in system.families if f.book != "work")
+        work = ["work"] if "work" in [f.book for f in system.families] or system.drives or system.line_drives else []
+        energies = ["kinetic_energy", *own, *work, "total_energy"]
+        self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in self._observables)]
+        self.columns += [f"{name} [J]" for name in energies]
+        self.columns += [f"{name}_{axis} [N s]" for name in VECTORS for axis in AXES]
+        self._weights = self._weights_of_columns(energies)
+
+    def _add_events(self, events):
+        """The scene's events as `Event`; probes of those that no observable tells come behind the others."""
+        slots = {o.name: i for i, o in enumerate(self._probed)}
+        made = [_event_of(event, self.system) for event in events]
+        for event, (probe, _) in zip(events, made, strict=True):
+            if probe is not None:
+                slots[event] = len(self.probes)
+                self.probes.append(probe)
+        slots |= {o.name: len(self.probes) + i for i, o in enumerate(self._followed)}
+        return [
+            one._replace(slot=slots[event.observe if probe is None else event])
+            for event, (probe, one) in zip(events, made, strict=True)
+        ]
+
+    def _weights_of_columns(self, energies):
+        """What each column of ``history.csv`` is of the columns of a `History`, shape (columns there, columns)."""
+        unit = History.empty(0, len(self.probes), self.system.families)
+        unit = History(unit.names, np.eye(len(unit.names)), unit.probed)
+        columns = [unit.time]
+        for o in self._observables:
+            if o in self._probed:
+                columns.append(unit.probes[:, self._probed.index(o)])
+            else:
+                columns.append(unit.sums @ o.observable.weights(self.system))
+        columns += [unit.sums @ weights(self.system, name) for name in energies]
+        return np.column_stack([*columns, unit.momentum, unit.impulse])
+
+    def table(self, history):
+        """Rows of a `History` as rows of ``history.csv``, shape (rows, columns)."""
+        return history.values @ self._weights
+
+    def of_observables(self, table):
+        """Time and observables alone of rows of ``history.csv``."""
+        return table[:, : 1 + len(self._observables)]
+
+    def results(self, course, last):
+        """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
+        results, extremes = {}, course.extremes
+        state = State(self.system, course.time, course.x, course.v)
+        for i, o in enumerate(self._observables):
+            value, when, where, at = float(last[1 + i]), course.time, None, None
+            if o in self._probed:
+                at = self._probed.index(o)
+            elif o in self._followed:
+                at = len(self.probes) + self._followed.index(o)
+            if at is not None and o.reduce != "final":
+                value, when = float(extremes.values[at]), float(extremes.times[at])
+            if o in self._probed:
+                final = o.reduce == "final"
+                where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[at]))
+            results[o.name] = Result(value, None, o.unit, when, where)
+        return results
+
+    def largest_stress(self, course):
+        """Largest stress of all steps [Pa], None where nothing is warned of by it."""
+        at = self._of_warning("stress")
+        return None if at is None else float(course.extremes.values[at])
+
+    def utilisation(self, course):
+        """Largest stress over strength of all steps and its line, None where no line has a strength."""
+        at = self._of_warning("utilisation")
+        if at is None:
+            return None
+        return float(course.extremes.values[at]), int(self.system.net.line[course.extremes.places[at]])
+
+    def _of_warning(self, name):
+        """Number of the probe of a warning, None where there is none."""
+        return len(self._probed) + list(self._warned).index(name) if name in self._warned else None
