@@ -175,9 +175,9 @@ def simulation_of(scene, system, solution, kept=None):
 def _notices(scene, system):
     if system.net.bodies and not system.contact:
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
-    if scene.solve.kind == "static" and (loose := system.unsupported_parts):
-        axes = ", ".join(sorted({"xyz"[axis] for _, axis in loose}))
-        nodes = np.unique(np.concatenate([rows for rows, _ in loose]))
+    if scene.solve.kind == "static" and (parts := system.unsupported_parts):
+        axes = ", ".join(sorted({"xyz"[part.axis] for part in parts}))
+        nodes = np.unique(np.concatenate([part.rows for part in parts]))
         yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
 
 

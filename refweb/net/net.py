@@ -136,6 +136,12 @@ class Net:
         return csr_array((entries, columns.ravel(), starts), shape=(points * len(self.cells), len(self.points)))
 
     @property
+    def unit_tension(self):
+        """Stiffness of an element of unit length under unit tension and nothing else, shape (3 nodes, 3 nodes)."""
+        unit = np.einsum("q,qa,qb->ab", self.weights, self.gradients, self.gradients)
+        return np.kron(unit, np.eye(3))
+
+    @property
     def along(self):
         """Places in a cell's nodes from its first end to its second: ``cells[:, along]`` follows the line."""
         return np.argsort(self.places)

@@ -31,15 +31,10 @@ def drifting(system):
     if not system.unsupported_parts:
         return 0
     moves = np.zeros((len(system.free), len(system.unsupported_parts)))
-    for k, places in enumerate(_translations(system)):
-        moves[places, k] = 1.0
+    for k, part in enumerate(system.unsupported_parts):
+        moves[part.unknowns, k] = 1.0
     values = np.linalg.eigvalsh(moves.T @ (system.pattern.matrix(_centrifugal(system)) @ moves))
     return int(np.count_nonzero(values < -1e-12 * np.abs(values).max()))
-
-
-def _translations(system):
-    """Unknowns of each translation of an unsupported part."""
-    return [np.searchsorted(system.free, 3 * rows + axis) for rows, axis in system.unsupported_parts]
 
 
 def _centrifugal(system):
@@ -51,11 +46,10 @@ def check_speed(system, t):
     """Refuse a frame that turns at the limit or above it, with that limit."""
     net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
-    unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
     axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
-    held = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
-    for places in _translations(system):
-        held[system.pattern.diagonal[places]] += ANCHOR * axial.max()
+    held = system.assemble_lines(net.unit_tension * axial[:, None, None])
+    for part in system.unsupported_parts:
+        held[system.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
 
     def stands(share):
         factor.update(held + share * share * taken)

@@ -65,7 +65,7 @@ def check_supported(system, t):
     if system.constraints:
         raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
     outer = system.outer_force(t)
-    for rows, axis in system.unsupported_parts:
+    for rows, axis, _ in system.unsupported_parts:
         resultant = np.sum(outer[rows, axis])
         if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")

@@ -60,9 +60,7 @@ class Newton:
         self.system = system
         self.progress = progress or (lambda text: None)
         net = system.net if first is None else system.at(first).net
-        unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
-        blocks = np.kron(unit, np.eye(3))[None] / net.natural_length[:, None, None]
-        self.geometric = system.assemble_lines(blocks)
+        self.geometric = system.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
         self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
         self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
         self.follows, self.turns, self.drifting = not system.conservative, bool(system.rotating), 0
@@ -71,9 +69,7 @@ class Newton:
             from .critical_speed import drifting
 
             self.drifting = drifting(system)
-        number = np.full(3 * system.rows, -1)
-        number[system.free] = np.arange(len(system.free))
-        held = np.concatenate([[], *(number[3 * rows + axis] for rows, axis in system.unsupported_parts)]).astype(int)
+        held = np.concatenate([np.zeros(0, dtype=int), *(part.unknowns for part in system.unsupported_parts)])
         self.anchors = system.pattern.diagonal[held]
         self.scale = 0.0
 

@@ -61,9 +61,8 @@ class Pencil:
         self.massive, self.massless = np.flatnonzero(own > 0.0), np.flatnonzero(own == 0.0)
         if not len(self.massive):
             raise SolverError("no mode: no free node has mass; give the cable a density, or nodes a [[point_mass]]")
-        unit = np.einsum("q,qa,qb->ab", net.weights, net.gradients, net.gradients)
         axial = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
-        strained = system.assemble_lines(np.kron(unit, np.eye(3)) * axial[:, None, None])
+        strained = system.assemble_lines(net.unit_tension * axial[:, None, None])
         self.strained = pattern.matrix(strained)
         taut = strained[pattern.diagonal]
         taut = np.where(taut > 0.0, taut, axial.max())

@@ -8,10 +8,11 @@ import numpy as np
 
 
 class Part(NamedTuple):
-    """A connected part and an axis, 0 … 2, along which no row of it is supported."""
+    """A connected part and an axis, 0 … 2, along which no row of it is supported; its unknowns along that axis."""
 
     rows: np.ndarray
     axis: int
+    unknowns: np.ndarray
 
 
 def found(system):
@@ -25,4 +26,5 @@ def found(system):
     count, part = connected_components(graph, directed=False)
     held = np.zeros((count, 3), dtype=bool)
     np.logical_or.at(held, part, system.supported)
-    return [Part(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
+    free_along = [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
+    return [Part(rows, axis, np.searchsorted(system.free, 3 * rows + axis)) for rows, axis in free_along]
