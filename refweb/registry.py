@@ -112,7 +112,7 @@ EXPORTS = (
     "refweb.studies.modes:modes",
     "refweb.studies.modes:Modes",
     "refweb.studies.work_precision:cost",
-    "refweb.studies.work_precision:Cost",
+    "refweb.studies.cost:Cost",
     "refweb.scene:Scene",
     "refweb.settings:Static",
     "refweb.settings:Dynamic",

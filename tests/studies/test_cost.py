@@ -16,8 +16,10 @@ from refweb.dynamics.method_choice import decided
 from refweb.dynamics.simulation import Simulation
 from refweb.registry import INTEGRATORS
 from refweb.studies import trials
+from refweb.studies.budget import TURN, climb
+from refweb.studies.cost import COLUMNS, Cost
+from refweb.studies.references import compare
 from refweb.studies.trials import OverBudget, Trial, dynamic_ladders
-from refweb.studies.work_precision import COLUMNS, TURN, Cost, _climb, _compare
 
 TAUT = dict(law="smooth", smoothing=1e-3, modulus=7e7, area=1e-4, density=200.0, prestrain=1e-2)
 THROWN = refweb.Velocity(node="centre", value=(0.5, 0.2, 2.0))
@@ -178,7 +180,7 @@ def climbed(monkeypatch, prices, growth=3.0, budget=100.0):
     clock = Clock(monkeypatch)
     ladders = {name: [Trial(name, "rtol", 2.0**-rung) for rung in range(8)] for name in prices}
     runner = Priced(clock, prices, growth)
-    _climb(ladders, runner, 0.9 * budget, budget, lambda text, share: None)
+    climb(ladders, runner, 0.9 * budget, budget, lambda text, share: None)
     return ladders, runner
 
 
@@ -262,7 +264,7 @@ def finest(values):
         found.trials.append(
             Trial(method, "rtol", 1e-6, "solved", kind=method, cpu_s=1.0, values=np.array([value]), x=x)
         )
-    _compare(found)
+    compare(found)
     return found
 
 

@@ -1,0 +1,93 @@
+"""Trials within a budget of time: what is expected to be the cheapest comes first.
+
+The budget is kept by looking at the clock of `refweb.studies.trials`. Of a method that has had its turns the next comes
+later; a run may take a third of what is left, is left out where it is expected to take more, and is ended where it
+does. The coarsest run of a method may always take a twentieth of the budget.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from . import trials
+
+SHARE = 1.0 / 3.0
+"""Largest share of what is left of the budget that a run may take."""
+TURN = 0.05
+"""Share of the budget that the coarsest run of each method may take, however little is left."""
+FAIR = 1.5
+"""Factor of an expected price for each rung that the method has behind it."""
+CHEAP, REPEATS = 0.2, 3
+"""Runs of less CPU time [s] are repeated; their smallest time counts."""
+
+
+def compile_all(ladders, runner):
+    """Compile the kernels of each method, and find those that refuse the scene."""
+    for ladder in ladders.values():
+        try:
+            runner.compile(ladder[0])
+        except InputError as error:
+            for trial in ladder:
+                trial.status, trial.message = "refused", str(error)
+
+
+def climb(ladders, runner, deadline, budget, tell):
+    """Run all ladders at once, always the rung that is expected to be the cheapest, while there is time.
+
+    Expected prices count `FAIR` times for each rung that a method has behind it, so that all kinds have a turn.
+    """
+    ahead = {name: 0 for name, ladder in ladders.items() if ladder and ladder[0].status != "refused"}
+    while ahead:
+        prices = {name: _expected(ladders[name], rung, runner) for name, rung in ahead.items()}
+        name = min(prices, key=lambda name: prices[name] * FAIR ** ahead[name])
+        ladder, now = ladders[name], trials.clock()
+        trial, rest = ladder[ahead[name]], ladder[ahead[name] :]
+        share = SHARE * (deadline - now) if ahead[name] else max(SHARE * (deadline - now), TURN * budget)
+        tell(f"{name}, {trial.setting}", min(1.0 - (deadline - now) / budget, 1.0))
+        if prices[name] > share and (ahead[name] or trial.key == "safety"):
+            trial.message = "would take more than its share of the budget"
+        else:
+            _try(trial, runner, now + share)
+        if trial.status == "budget":
+            for left in rest:
+                left.message = trial.message
+        ahead[name] += 1
+        if trial.status == "budget" or ahead[name] == len(ladder):
+            del ahead[name]
+
+
+def _expected(ladder, rung, runner):
+    """CPU time to expect of a rung [s]: growing as it did before, or as explicit steps and tolerances do."""
+    trial = ladder[rung]
+    spent = [(t.value, t.cpu_s) for t in ladder[:rung] if t.status == "solved"]
+    if not spent:
+        return runner.expected(trial)
+    power = 1.0 if trial.key == "safety" else 0.2
+    if len(spent) > 1:
+        (first, one), (last, other) = spent[-2:]
+        power = max(power, math.log(other / one) / math.log(first / last))
+    return spent[-1][1] * (spent[-1][0] / trial.value) ** power
+
+
+def _try(trial, runner, until):
+    """Run a trial, several times where it is cheap, and note how it ended."""
+    least = np.inf
+    for _ in range(REPEATS):
+        began = trials.clock()
+        try:
+            runner.run(trial, until)
+        except trials.OverBudget:
+            if least < np.inf:
+                break
+            trial.message = "took more than its share of the budget"
+            return
+        except SolverError as error:
+            trial.status, trial.message, trial.cpu_s = "failed", str(error), trials.clock() - began
+            return
+        trial.status, least = "solved", min(least, trial.cpu_s)
+        if trial.cpu_s > CHEAP or 2.0 * trials.clock() - began > until:
+            break
+    trial.cpu_s = least

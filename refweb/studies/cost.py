@@ -1,0 +1,187 @@
+"""What digits cost, as a value: all runs, their references, the price of digits in words, and the result folder."""
+
+from __future__ import annotations
+
+import json
+import math
+import pathlib
+from dataclasses import dataclass, field
+from itertools import takewhile
+
+import numpy as np
+
+from ..results.files import as_toml, write_atomically, write_text
+from ..results.folder import check_folder, clear
+from ..results.provenance import versions
+from . import dop853
+
+COLUMNS = "method setting error_observable error_state cpu_s nfev njev nlu nsteps status".split()
+"""Columns of ``cost.csv``."""
+DIGITS = (1, 2, 3, 6, 9, 12)
+"""Digits whose price is told."""
+
+
+@dataclass(eq=False)
+class Cost:
+    """Work and precision of every method on one scene.
+
+    Attributes
+    ----------
+    scene : refweb.Scene
+        The scene.
+    observable : refweb.Observe
+        What is compared, at every history row or load step.
+    trials : list of refweb.studies.trials.Trial
+        All runs; ``error_observable`` [unit of the observable] is the largest difference over the rows, and
+        ``error_state`` [m] that of the displacements at the end. Of each ``values`` is the observable, shape (rows,),
+        and ``x`` the displacement at the end [m], shape (rows of the system, 3).
+    web : dict
+        What is written of the web to ``run.json``: numbers of ``nodes``, ``lines`` and ``cells``, ``cable_length`` [m],
+        ``area`` [m²] and ``mass`` [kg].
+    references : tuple of refweb.studies.trials.Trial
+        The two runs that errors are measured with; empty where there are no two.
+    independent : bool
+        Whether they are of different kinds.
+    apart : tuple of float
+        How far they are apart: in the observable, and in displacement [m].
+    trust : tuple of float
+        What is known of errors: the same, or the median of such differences where that is of the same size. An error
+        below that means nothing.
+    scale : float
+        Largest value of the observable over time, which digits are relative to.
+    status : {"running", "solved", "failed", "interrupted"}
+        How it ended: "solved" where one run at least is.
+    message : str
+        Why it failed, else empty.
+    cost : dict of str to float
+        ``cpu_s`` and ``wall_s`` of all of it [s].
+    """
+
+    scene: object
+    observable: object
+    trials: list
+    web: dict
+    references: tuple = ()
+    independent: bool = False
+    apart: tuple = (np.nan, np.nan)
+    trust: tuple = (np.nan, np.nan)
+    scale: float = np.nan
+    status: str = "running"
+    message: str = ""
+    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0})
+
+    @property
+    def sentence(self):
+        """What digits cost, in words."""
+        return " ".join(_sentence(self))
+
+    def price(self, digits, method=None):
+        """The cheapest `Trial` from which on a method keeps so many digits of the observable, None where none does.
+
+        Of one method, or of all but DOP853, which no scene can ask for. What the references cannot tell counts as none;
+        other smoothings than the scene's are other laws, and not among the methods.
+        """
+        limit, best = self.scale * 10.0**-digits, []
+        if not self.trust[0] <= limit:
+            return None
+        methods = {t.method for t in self.trials if t.key != "smoothing"}
+        for name in methods - {dop853.NAME} if method is None else methods & {method}:
+            ladder = [t for t in self.trials if t.method == name and t.status == "solved"]
+            best += takewhile(lambda t: t.error_observable <= limit, reversed(ladder))
+        return min(best, key=lambda t: t.cpu_s, default=None)
+
+    def rows(self):
+        """Rows of ``cost.csv`` below its header, `COLUMNS`."""
+        for t in self.trials:
+            work = [t.work[key] for key in ("nfev", "njev", "nlu", "nsteps")]
+            yield [t.method, t.setting, t.error_observable, t.error_state, t.cpu_s, *work, t.status]
+
+    def summary(self):
+        """The content of ``run.json``, a dict of plain values; ``kind`` is "cost"."""
+        none = lambda value: value if math.isfinite(value) else None  # noqa: E731
+        runs = [dict(zip(COLUMNS, row, strict=True)) for row in self.rows()]
+        runs = [{key: none(v) if isinstance(v, float) else v for key, v in run.items()} for run in runs]
+        return {
+            "kind": "cost",
+            "status": self.status,
+            "message": self.message,
+            "scene": self.scene.title,
+            "web": self.web,
+            "sentence": self.sentence,
+            "observable": {"name": self.observable.name, "unit": self.observable.unit, "largest": none(self.scale)},
+            "references": [f"{t.method}, {t.setting}" for t in self.references],
+            "independent": self.independent,
+            "apart": {"observable": none(self.apart[0]), "state": none(self.apart[1])},
+            "trust": {"observable": none(self.trust[0]), "state": none(self.trust[1])},
+            "runs": [{**run, "message": t.message} for run, t in zip(runs, self.trials, strict=True)],
+            "cost": self.cost,
+            "versions": versions(),
+        }
+
+    def draw(self):
+        """The work-precision diagram, a `matplotlib.figure.Figure`."""
+        from .diagram import diagram
+
+        return diagram(self)
+
+    def save(self, folder, force=False):
+        """Write ``cost.csv``, ``cost.png``, ``scene.toml`` and ``run.json``.
+
+        Raises
+        ------
+        InputError
+            Where the folder is not empty or cannot be written.
+        """
+        check_folder(folder, force)
+        folder = pathlib.Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        write_text(folder / "run.json", json.dumps(self.summary(), indent=1, ensure_ascii=False) + "\n")
+        clear(folder)
+        write_text(folder / "scene.toml", as_toml(self.scene.to_dict()))
+        lines = [",".join(map(str, row)) for row in (COLUMNS, *self.rows())]
+        write_text(folder / "cost.csv", "\n".join(lines) + "\n")
+        write_atomically(folder / "cost.png", self.draw().savefig)
+
+
+def _sentence(found):
+    if found.references:
+        yield _prices(found)
+        yield _agreement(found)
+    else:
+        yield "No two runs can be compared, so nothing is known of errors."
+
+
+def _prices(found):
+    """What digits cost."""
+    best = {}
+    for digits in DIGITS:
+        if (trial := found.price(digits)) is not None:
+            best[trial] = digits
+    best = {trial: digits for trial, digits in best.items() if digits >= min(3, max(best.values()))}
+    told = [
+        f"{digits} digit{'s' if digits > 1 else ''}{' cost' if not i else ''} {trial.cpu_s:.2g} s with {trial.method}, "
+        f"{trial.setting}"
+        for i, (trial, digits) in enumerate(sorted(best.items(), key=lambda item: item[1]))
+    ]
+    name = found.observable.name
+    return f"{name}: {'; '.join(told)}." if told else f"No run has a digit of {name} that can be trusted."
+
+
+def _agreement(found):
+    """How far the references agree, and what that is worth."""
+    one, other = (f"{t.method} ({t.setting})" for t in found.references)
+    agreed, known = (
+        max(-math.log10(max(off / found.scale, 1e-16)), 0.0) if found.scale else 0.0
+        for off in (found.apart[0], found.trust[0])
+    )
+    if not found.independent:
+        return (
+            f"There are runs of one kind of method alone: {one} and {other} are {agreed:.1f} digits apart, which says "
+            "how it converges, and no more."
+        )
+    if f"{known:.1f}" == f"{agreed:.1f}":
+        return f"The references, {one} and {other}, agree to {agreed:.1f} digits."
+    return (
+        f"The references, {one} and {other}, agree to {agreed:.1f} digits, which may be luck: {known:.1f} digits are "
+        "usual between the finest runs of different kinds."
+    )

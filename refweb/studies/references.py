@@ -1,0 +1,48 @@
+"""What errors are measured with: of the finest runs of all methods, the two of different kinds that agree best.
+
+No method alone can set a reference. With one of the two all others are compared, and their difference is how far any
+error can be trusted. Where all finest runs are about as far apart, as they are where motions are chaotic, the best
+agreement may be luck, and the median difference counts. Where there are runs of one kind alone, the two finest of one
+method stand in.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+LUCK = 10.0
+"""Factor between the median difference of the finest runs and the least one, below which the least may be luck."""
+
+
+def compare(found):
+    """Find the references, and the errors of all runs."""
+    solved = [t for t in found.trials if t.status == "solved"]
+    able = [t for t in solved if t.key != "smoothing"]
+    finest = {t.method: t for t in able}.values()
+    pairs = [pair for pair in combinations(finest, 2) if pair[0].kind != pair[1].kind]
+    found.independent = bool(pairs)
+    pairs = pairs or [pair for pair in zip(able[:-1], able[1:], strict=True) if pair[1] in finest]
+    pairs = [pair for pair in pairs if found.independent or pair[0].method == pair[1].method]
+    if not pairs:
+        return
+    scale = max(np.abs(able[-1].values).max(), 1e-300), max(np.linalg.norm(able[-1].x, axis=1).max(), 1e-300)
+
+    def relative(pair):
+        return max(off / size for off, size in zip(_apart(*pair), scale, strict=True))
+
+    first, second = found.references = min(pairs, key=relative)
+    found.apart, found.scale = _apart(first, second), float(np.abs(first.values).max())
+    usual = np.median([_apart(*pair) for pair in pairs], axis=0).tolist()
+    found.trust = tuple(max(u, off) if u < LUCK * off else off for u, off in zip(usual, found.apart, strict=True))
+    for trial in solved:
+        trial.error_observable, trial.error_state = found.trust if trial is first else _apart(trial, first)
+
+
+def _apart(one, other):
+    """Largest differences of the observable and of displacement at the end."""
+    return (
+        float(np.abs(one.values - other.values).max()),
+        float(np.linalg.norm(one.x - other.x, axis=1).max(initial=0.0)),
+    )
