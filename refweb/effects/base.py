@@ -7,7 +7,8 @@ matrix and knows no other effect.
     A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
     `Drive`, a `LineDrive` or a `Constraint`.
 ``extend(net)``
-    The `refweb.net.net.Net` with more rows or mass; comes before any ``on``, of what has no ``on`` first.
+    The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
+    has no ``on`` first.
 ``start(net, supported, v)``
     Writes initial velocities.
 """
@@ -118,6 +119,8 @@ class Drive:
 @dataclass(frozen=True, eq=False)
 class Constraint:
     """Pairs of rows whose distance is kept: g(x) = (|d|² − L²)/(2L) = 0 with d from the first to the second.
+
+    It says what is kept, as kernels say what a force is; `refweb.system.links` finds the forces that keep it.
 
     Attributes
     ----------
