@@ -17,7 +17,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..dynamics.initial_state import start_of
 from ..dynamics.integrators.integrator import Variant
+from ..dynamics.method_choice import step_price
+from ..dynamics.schedule import Schedule, blocks, row_times
 from ..errors import SolverError
 from ..registry import INTEGRATORS, STATICS, load
 from ..results.state import State
@@ -128,11 +131,6 @@ STATIC_LADDERS = {
 scene's own."""
 
 
-def _evaluations(integrator, duration):
-    """Evaluations of forces that a duration takes, None where only a run can tell."""
-    return integrator.evaluations(duration) if hasattr(integrator, "evaluations") else None
-
-
 def _variants(name):
     """The `Variant` s of a method of the table by what they are called; one, of its own name, where it lists none."""
     return getattr(load(INTEGRATORS[name].integrator), "variants", {name: Variant()})
@@ -187,13 +185,11 @@ class Dynamics:
     """
 
     def __init__(self, scene, system, observable):
-        from ..dynamics.initial_state import start_of
-        from ..dynamics.schedule import row_times
-
         self.system, self.observable, self.times = system, observable, row_times(scene)
         self.probes, self.begin = [observable.probe(system)._replace(sign=0.0)], start_of(scene, system)
         self._linear = system.rows - system.net.spins  # the others are angles
         self._per_evaluation = self._fewest = None  # of forces by explicit steps: CPU time [s], and least number
+        self._ahead = {}  # evaluations of each trial
 
     def compile(self, trial):
         """Take a step with the integrator of a trial; raises an `InputError` where it does not take the scene."""
@@ -213,24 +209,27 @@ class Dynamics:
         That of explicit steps, by the last of them that have run; of implicit ones, whose number nobody knows before, a
         guess that gives them their turn.
         """
-        from ..dynamics.method_choice import step_price
-
         one = self._per_evaluation or step_price(self.system)
-        if trial.make is not None and (ahead := _evaluations(self._integrator(trial), self.times[-1])):
+        if ahead := self._evaluations(trial):
             self._fewest = min(ahead, self._fewest or ahead)
             return one * ahead
         longest = one * (self._fewest or 0.0)
         return OUTSIDE * longest * (1.0 + CALL / one) if trial.make is None else UNKNOWN * longest
+
+    def _evaluations(self, trial):
+        """Evaluations of forces of a trial, None where only a run can tell."""
+        if trial not in self._ahead:
+            integrator = None if trial.make is None else self._integrator(trial)
+            known = hasattr(integrator, "evaluations")
+            self._ahead[trial] = integrator.evaluations(self.times[-1]) if known else None
+        return self._ahead[trial]
 
     def run(self, trial, deadline):
         """Run a trial; raises what its method raises, and `OverBudget` at the ``deadline`` of the `clock`."""
         if trial.make is None:
             self._run_outside(trial, deadline)
             return
-        from ..dynamics.schedule import Schedule, blocks
-
-        integrator, times, split = self._integrator(trial), self.times, 1
-        ahead = _evaluations(integrator, times[-1])
+        integrator, times, split, ahead = self._integrator(trial), self.times, 1, self._evaluations(trial)
         if ahead is None:  # steps are its own and may be looked into; explicit ones follow from the rows
             split = -(-PIECES // (len(times) - 1))
             times = np.interp(np.arange(split * (len(times) - 1) + 1) / split, np.arange(len(times)), times)

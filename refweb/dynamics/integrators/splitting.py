@@ -29,6 +29,8 @@ References
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ...errors import InputError
@@ -73,6 +75,12 @@ def stability(kicks, drifts):
     raise ArithmeticError("no bound of stability below 8")
 
 
+@functools.cache
+def _stretch(order):
+    """Bound of stability of an order over that of central differences."""
+    return 0.5 * stability(*splitting(order))
+
+
 class Splitting(CentralDifference):
     """Runge–Kutta–Nyström splittings on one system.
 
@@ -107,7 +115,7 @@ class Splitting(CentralDifference):
                 '[solve] method = "explicit" takes nothing that is moved or reeled: use "central-difference" or "cvode"'
             )
         self.order, (self.kicks, self.drifts) = order, splitting(order)
-        self.stretch = 0.5 * stability(self.kicks, self.drifts)
+        self.stretch = _stretch(order)
         super().__init__(system, *observed, **steps)
 
     @property
