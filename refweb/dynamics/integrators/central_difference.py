@@ -18,19 +18,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, OpenBook, SolverError
-from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
-from ...results.probes import INTEGERS, PLACE, PROBE
-from .energy_book import DRIFT, book_energies, no_energy, refuse_open
+from .energy_book import DRIFT, refuse_open
 from .events import event_rows, starts_above
-from .explicit_loop import BREATH, LOOKS, advance, rows_ahead, set_lengths
+from .explicit_loop import BREATH, LOOKS, advance_rows, begin, first_wrong
 from .extremes import Extremes
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
-from .step_bound import no_bound, step_bound
+from .records import CLOCK, Model, Observed, Running, Scheme
+from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
-STATE = ("time", "nsteps", "step", "energy", "largest", "worst", "share")
-"""Numbers of a course that the loop writes."""
+SHARED = CLOCK.names[:-2]
+"""Numbers that a course and the loop's clock have in common."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -108,92 +107,28 @@ class CentralDifference(Integrator):
             raise InputError(
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
-        families, drives = system.families, system.drives
-        self._outs = system.per_cell()
-        self._lines = net.line_data.copy() if system.line_drives else net.line_data  # lengths change in this run's own
-        numbers = [self._lines if f.lines else f.data for f in families]
-        inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
-        reeled = np.unique(np.concatenate([[], *(d.cells[:, 0] for d in system.line_drives)])).astype(np.int64)
-        driven = np.concatenate([[], *(d.cells[:, 0] for d in drives)]).astype(np.int64)
-        viscous = [i for i, f in enumerate(families) if f.damping is not None]
-        still = [i for i in range(1, len(families)) if i not in viscous]
-        powered = [(i, f.power, i in viscous) for i, f in enumerate(families) if f.power is not None]
-        self._working = system.working
-        self._masses = (net.mass, inverse)
-        self._moving = np.flatnonzero(free.any(axis=1))
-        self._ends = (
-            np.flatnonzero(system.supported),
-            driven,
-            self._working,
-            np.array(powered, dtype=np.int64).reshape(len(powered), 3),
-            np.array(still, dtype=np.int64),
-            np.array(viscous, dtype=np.int64),
-        )
-        self._cells = typed_list(INDICES, [f.cells for f in families])
-        self._data = typed_list(MATRIX, numbers)
-        self._forces = (typed_list(FORCE, [f.force for f in families]), self._cells, self._data)
-        self._seen = typed_list(MATRIX, self._outs)
-        self._energies = (
-            typed_list(ENERGY, [f.energy or no_energy for f in families]),
-            typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
-        )
-        self._bounds = typed_list(BOUND, [f.bound or no_bound for f in families])
-        self._dampings = typed_list(BOUND, [families[i].damping_bound or no_bound for i in viscous])
-        self._drives = (
-            typed_list(FORCE, [d.kernel for d in drives]),
-            typed_list(INDICES, [d.cells for d in drives]),
-            typed_list(MATRIX, [d.data for d in drives]),
-            typed_list(MATRIX, [np.zeros((len(d.cells), 0)) for d in drives]),
-            net.natural_length[reeled],
-            reeled,
-            net.line_data[reeled],
-            typed_list(LINES, [d.kernel for d in system.line_drives]),
-            typed_list(INDICES, [np.searchsorted(reeled, d.cells).astype(np.int32) for d in system.line_drives]),
-            typed_list(MATRIX, [d.data for d in system.line_drives]),
-            net.cells[reeled],
-            typed_list(ENERGY, [system.length_force_kernel] if system.line_drives else []),
-        )
-        corners = {t for d in system.line_drives for t in d.times}
-        self._corners = np.array([*sorted(corners), *([np.inf] if system.line_drives else []), -np.inf])
-        signs = np.array([float(one.sign) for one in (*probes, *sums)])
-        weights = [one.weights for one in sums]
-        self._watch = np.array(weights, dtype=float).reshape(len(sums), len(families) + 3)
+        self._model = Model.of(system)
+        self._observed = Observed.of(probes, sums, len(system.families))
         self._events = event_rows(events)
-        self._probes = (
-            typed_list(PROBE, [probe.kernel for probe in probes]),
-            typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
-            typed_list(MATRIX, [np.ascontiguousarray(probe.data, dtype=float) for probe in probes]),
-            signs,
-            np.flatnonzero(signs[: len(probes)]),
-        )
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m], at any time."""
         x = np.zeros((self.system.rows, 3)) if x is None else x
-        rest = np.empty(self.system.rows), self._bounds, self._ends[5], self._dampings, self._cells, self._data
-        limit = np.inf
-        for corner in self._corners:
-            self._set_lengths(max(corner, 0.0))
-            limit = min(limit, step_bound(reach, 0.0, x, self._masses[0], self._moving, *rest))
-        return limit
+        return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, self._model)
 
     def evaluations(self, duration):
         """Evaluations of forces that a duration [s] takes, by the bound of its start."""
         step = self.step_size or self.safety * self.stretch * self.bound()
         return len(self.drifts) * self.finer * duration / step
 
-    def _set_lengths(self, t):
-        if self.system.line_drives:
-            set_lengths(t, *self._drives[4:10], self._lines)
-
     def spent(self, course):
         """What a course has spent, for ``run.json``.
 
         The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
         """
-        follows = len(self._probes[4]) + len(self._watch) > 0  # and evaluates forces where it looks
+        follows = len(self._observed.followed) + len(self._observed.sums) > 0  # and evaluates forces where it looks
         per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
         return dict(nfev=per_step * course.nsteps + 1, njev=0, nlu=0)
 
@@ -205,26 +140,20 @@ class CentralDifference(Integrator):
         v = system.initial_velocity() if v is None else np.array(v, dtype=float, order="C")
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        self._set_lengths(0.0)
-        for family, data, out in zip(system.families, self._data, self._outs, strict=True):
-            family.force(0.0, x, v, force, family.cells, data, out)
-        signs, probes = self._probes[3], self.observed[0]
-        values, where = np.zeros(len(signs)), np.full((len(signs), 2), PLACE)
-        for i, probe in enumerate(probes):
-            rows, data = np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float)
-            values[i] = probe.kernel(0.0, x, v, force, self._outs.lines, rows, data, where[i])
-        total, book = np.zeros(len(system.families) + 3), np.zeros(len(system.families) + 1)
-        numbers = (self._masses[0], self._cells, self._data, *self._energies, book, self._working)
-        book_energies(0.0, x, v, *numbers, total)
-        values[len(probes) :] = self._watch @ total
-        stepping = len(probes) + np.flatnonzero(self._watch[:, -1])
-        values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        signs, sums = self._observed.signs, self._observed.sums
+        extremes = Extremes.at_start(np.zeros(len(signs)), np.full(len(signs), -1))
+        work, total = np.zeros(len(system.families) + 1), np.zeros(len(system.families) + 3)
+        begin(x, v, force, self._model, self._observed, extremes, work, total)
+        first = len(signs) - len(sums)
+        extremes.values[first:] = sums @ total
         events = self._events.copy()
         for event in events:
-            starts_above(event, values[event["slot"]])
-        own = np.delete(total[:-2], np.flatnonzero(self._working > 0))
-        extremes = Extremes.at_start(values, where[:, 0].copy())
-        book = dict(work=book, energy=own.sum(), largest=np.abs(own).sum())
+            starts_above(event, extremes.values[event["slot"]])
+        stepping = first + np.flatnonzero(sums[:, -1])
+        extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        extremes.recent[:, 3] = extremes.values
+        own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
+        book = dict(work=work, energy=own.sum(), largest=np.abs(own).sum())
         return ExplicitCourse(time=0.0, x=x, v=v, force=force, extremes=extremes, events=events, **book)
 
     def save(self, course):
@@ -257,8 +186,20 @@ class CentralDifference(Integrator):
         """Factor on the safety for errors that are ``share`` times what they may be."""
         return min(max(0.8 * share ** (-1.0 / self.order), 0.125), 0.5)
 
-    def _seen_in(self, course):
-        return (*self._probes, course.extremes, course.work, course.impulse)
+    @property
+    def _scheme(self):
+        least, step = 1.0 if self.step_size else 0.5 / self.safety, self.step_size or 0.0
+        numbers = (self.safety * self.stretch, least, step, self.finer)
+        return Scheme(self.kicks, self.drifts, *map(float, numbers))
+
+    def _running(self, course):
+        clock = np.zeros(1, dtype=CLOCK)
+        for name in SHARED:
+            clock[name] = getattr(course, name)
+        families, changing = len(self.system.families), len(self._model.reels.lengths)
+        state = (course.x, course.v, course.force, course.before, course.work, course.impulse)
+        carried = np.zeros(families), np.zeros((2, changing))
+        return Running(clock, *state, course.extremes, course.events, *carried)
 
     def advance(self, course, times):
         """Take a course to each of some times; equal steps lead to each.
@@ -267,71 +208,53 @@ class CentralDifference(Integrator):
         names node, line and time.
         """
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        history = History.empty(len(times), len(self._probes[0]), self.system.families)
-        step, start, linear = self.step_size or 0.0, course.time, self.system.rows - self.system.net.spins
-        least = 1.0 if self.step_size else 0.5 / self.safety
+        history = History.empty(len(times), len(self.observed[0]), self.system.families)
         work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
-        done, part, breath = 0, np.zeros(2, dtype=np.int64), max(BREATH // max(work, 1), 1)
-        carried = self._carried()
-        state = np.array([getattr(course, name) for name in STATE], dtype=float)
+        start, done, breath = course.time, 0, max(BREATH // max(work, 1), 1)
+        records = self._scheme, self._model, self._observed, self._running(course)
+        clock = records[-1].clock
         try:
             while True:
-                more = rows_ahead(
-                    times[done:], breath, part, *carried, self.safety * self.stretch, least, step, self.finer, DRIFT,
-                    self.kicks, self.drifts, state, course.x, course.v, course.force, course.before, linear,
-                    *self._masses, self._moving, *self._ends, *self._forces, self._seen, *self._energies, self._bounds,
-                    self._dampings, *self._drives, self._corners, *self._seen_in(course), self._watch, course.events,
-                    history.values[done:],
-                )  # fmt: skip
+                more = advance_rows(times[done:], breath, DRIFT, *records, history.values[done:])
+                now = clock[0]
                 if more < 0:
                     raise SolverError(
-                        f"the step at t = {state[0]:.6g} s is {state[2]:.3g} s, more than {MAX_STEPS_PER_ROW:g} steps "
-                        "to the next row: ask for shorter rows, or lower the stiffness that asks for the step"
+                        f"the step at t = {now['time']:.6g} s is {now['step']:.3g} s, more than {MAX_STEPS_PER_ROW:g} "
+                        "steps to the next row: ask for shorter rows, or lower the stiffness that asks for the step"
                     )
                 done += more
-                if not part[0]:
+                if not now["begun"]:
                     break
-                self.breathe(state[0] + part[0] * state[2])
+                self.breathe(now["time"] + now["begun"] * now["step"])
         except BaseException:
-            if part[0]:  # back to the last row
+            if clock["begun"]:  # back to the last row
                 course.x[:], course.v[:], course.force[:] = course.before
             raise
         finally:
-            for name, value in zip(STATE, state.tolist(), strict=True):
-                setattr(course, name, value)
-            course.nsteps = int(course.nsteps)
+            for name in SHARED:
+                setattr(course, name, clock[name].item())
         if done and course.stopped and history.time[done - 1] == course.time:
             return history[:done]
         if done < len(times):
             before = times[done - 1] if done else start
             if not np.isfinite(history.values[done]).all():
-                self._name_blow_up(course, before)
+                self._name_blow_up(course, before, records[-1])
             self._name_drift(course, before)
         return history
 
-    def _carried(self):
-        return np.zeros(len(self.system.families)), np.zeros((2, len(self._drives[4])))
-
-    def _name_blow_up(self, course, before):
+    def _name_blow_up(self, course, before, running):
         """Replay the last row step by step and name the first number that is not finite."""
-        system, h = self.system, course.step
-        net = system.net
-        x, v, f = course.before.copy()
-        count, total = round((course.time - before) / h), np.zeros(len(system.families) + 3)
-        for step in range(1, count + 1):
-            advance(
-                1, 0, *self._carried(), h, before + (step - 1) * h, self.kicks, self.drifts, x, v, f, *self._masses,
-                *self._ends, *self._forces, self._seen, *self._drives, *self._seen_in(course), *self._energies,
-                self._watch, total, self._events[:0],
-            )  # fmt: skip
-            wrong = ~np.isfinite(x + v + f).all(axis=1)
-            if wrong.any():
-                row = int(np.flatnonzero(wrong)[0])
-                name = self.system.row_name(row)
-                lines = net.line[(net.cells == row).any(axis=1)]
-                name += f", line {lines[0]}," if len(lines) else ""
-                raise SolverError(f"number not finite at {name} t = {before + step * h:.6g} s: use a smaller safety")
-        raise SolverError(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
+        net, (x, v, f) = self.system.net, course.before.copy()
+        running.clock["time"] = before
+        running = running._replace(x=x, v=v, f=f, events=course.events[:0])
+        steps, row = first_wrong(self._scheme, self._model, self._observed, running)
+        if row < 0:
+            raise SolverError(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
+        name = self.system.row_name(row)
+        lines = net.line[(net.cells == row).any(axis=1)]
+        name += f", line {lines[0]}," if len(lines) else ""
+        t = before + steps * course.step
+        raise SolverError(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _name_drift(self, course, before):
         """Say where energy came in: the effect and cell whose energy grew most in the last row."""

@@ -5,8 +5,11 @@ A flag of success is not believed: at every history row ``|ΔE − work|`` is he
 
 from __future__ import annotations
 
+import math
+
 from ...errors import OpenBook
 from ...kernels import ENERGY, kernel
+from ...net.net import LENGTH
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -45,3 +48,72 @@ def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, worki
 @kernel(ENERGY)
 def no_energy(t, x, cells, data, out):
     out[:] = 0.0
+
+
+@kernel(inline="always")
+def begin_powers(t, x, v, extra, families, power):
+    """Write the power of each family that is booked by it [W]."""
+    for n in range(families.powers.shape[0]):
+        i, column = families.powers[n, 0], families.powers[n, 1]
+        families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
+        power[i] = families.outs[i][:, column].sum()
+
+
+@kernel(inline="always")
+def book_powers(t, h, x, v, extra, power, work, powers, forces, cells, data, outs):
+    """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
+    for n in range(powers.shape[0]):
+        i, column = powers[n, 0], powers[n, 1]
+        if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
+            forces[i](t, x, v, extra, cells[i], data[i], outs[i])
+        gained = outs[i][:, column].sum()
+        work[i] += 0.5 * h * (power[i] + gained)
+        power[i] = gained
+
+
+@kernel(inline="always")
+def note_motion(driven, mass, x, v, f, before):
+    """Note position, force and kinetic energy of the rows whose motion is prescribed, ahead of a step."""
+    for d in range(driven.size):
+        r = driven[d]
+        before[d, 6] = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+        for k in range(3):
+            before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
+
+
+@kernel(inline="always")
+def book_motion(driven, mass, x, v, f, before, work):
+    """Add the work of prescribed motion in a step: what the kinetic energy gained and the forces took."""
+    last = work.size - 1
+    for d in range(driven.size):
+        r = driven[d]
+        work[last] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
+        for k in range(3):
+            work[last] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
+
+
+@kernel(inline="always")
+def book_lengths(t, x, reels, was, length_force, work):
+    """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
+    reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
+    for c in range(reels.lengths.size):
+        work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
+    length_force[0] = length_force[1]
+
+
+@kernel()
+def drifts_away(clock, energy, stored, work, limit):
+    """Note energy, largest energy and drift of a row; whether the run is not to go on.
+
+    It is not where a number is not finite, or the drift exceeds ``limit`` and does not fall, see `CLOSING`.
+    """
+    clock.largest = max(clock.largest, stored)
+    drift = abs(energy - work - clock.energy)
+    clock.worst = max(clock.worst, drift)
+    if not math.isfinite(drift):
+        return True
+    if not clock.largest > 0.0:
+        return False
+    share, before = drift / clock.largest, clock.share
+    clock.share = share
+    return share > limit and share > CLOSING * before

@@ -75,6 +75,24 @@ def starts_above(event, value):
         event.time = 0.0
 
 
+@kernel(inline="always")
+def note_events(t, h, x, v, f, lines, events, where, probes, rows, data, sums, total):
+    """Note what happens at the end of a step of size h; whether that ends the run."""
+    ended = False
+    for e in range(events.shape[0]):
+        event = events[e]
+        if event.time == math.inf:
+            i = event.slot
+            if i < len(probes):
+                value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+            else:
+                value = np.dot(sums[i - len(probes)], total)
+            if crosses(event, value):
+                event.time, event.width = t, h
+                ended = ended or event.stop > 0
+    return ended
+
+
 @kernel()
 def ended_by(events):
     """Whether an event has ended the run."""

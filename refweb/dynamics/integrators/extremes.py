@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import kernel
+from ...results.probes import PLACE
+from .energy_book import book_energies
 
 
 class Extremes(NamedTuple):
@@ -50,3 +52,26 @@ def quadratic_peak(extremes, i, now, value, sign):
         if sign * top > sign * extremes.values[i]:
             extremes.values[i], extremes.times[i] = top, at - 0.5 * slope / curve
     recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3] = at, high, now, value
+
+
+@kernel(inline="always")
+def look(t, x, v, f, lines, long, where, probes, rows, data, signs, followed, extremes):
+    """Look at all that is followed, and take over what exceeds its extreme; after ``long`` steps parabolas as well."""
+    for i in followed:
+        value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+        if signs[i] * value > signs[i] * extremes.values[i]:
+            where[1] = PLACE
+            probes[i](t, x, v, f, lines, rows[i], data[i], where)
+            extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
+        if long:
+            quadratic_peak(extremes, i, t, value, signs[i])
+
+
+@kernel(inline="always")
+def look_at_sums(t, long, sums, total, first, signs, extremes):
+    for j in range(sums.shape[0]):
+        value, i = np.dot(sums[j], total), first + j
+        if signs[i] * value > signs[i] * extremes.values[i]:
+            extremes.values[i], extremes.times[i] = value, t
+        if long:
+            quadratic_peak(extremes, i, t, value, signs[i])

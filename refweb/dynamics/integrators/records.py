@@ -1,0 +1,307 @@
+"""Records of the compiled loop: what acts, what is looked at, and what moves, as named tuples that numba takes whole.
+
+Kernels of one signature, and arrays of one type, stand in typed lists, so that the loop is compiled once for any
+mixture of effects. What a scene does not have is an empty list or array.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba.typed import List
+
+from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
+from ...results.probes import INTEGERS, PROBE
+from .energy_book import no_energy
+from .extremes import Extremes
+from .step_bound import no_bound
+
+CLOCK = np.dtype(
+    [
+        ("time", float),
+        ("nsteps", np.int64),
+        ("step", float),
+        ("energy", float),
+        ("largest", float),
+        ("worst", float),
+        ("share", float),
+        ("begun", np.int64),
+        ("planned", np.int64),
+    ]
+)
+"""Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.Course` by their names, then the
+steps taken of a row, 0 between rows, and the steps of it."""
+
+
+class Scheme(NamedTuple):
+    """How steps are made.
+
+    Attributes
+    ----------
+    kicks, drifts : ndarray
+        Shares of a step by which velocities and positions go in turn, one kick more than drifts.
+    safety : float
+        Share of the bound of a kick, a drift and a kick that a step is.
+    least : float
+        Least number of steps of a row.
+    step_size : float
+        Largest step instead [s], 0 where the bound says.
+    finer : float
+        Factor on the number of steps of each row.
+    """
+
+    kicks: np.ndarray
+    drifts: np.ndarray
+    safety: float
+    least: float
+    step_size: float
+    finer: float
+
+
+class Inertia(NamedTuple):
+    """What resists.
+
+    Attributes
+    ----------
+    mass : ndarray, shape (rows,)
+        Mass of each row [kg], or inertia [kg m²] behind the first ``linear`` rows.
+    inverse : ndarray, shape (rows, 3)
+        Its inverse, 0 where a support holds.
+    moving, held, driven : ndarray of int
+        Rows that are free somewhere, supported components 3 · row + axis, and rows whose motion is prescribed.
+    linear : int
+        Number of rows that are places; the others are angles.
+    """
+
+    mass: np.ndarray
+    inverse: np.ndarray
+    moving: np.ndarray
+    held: np.ndarray
+    driven: np.ndarray
+    linear: int
+
+    @classmethod
+    def of(cls, system):
+        """That of a system with lumped mass."""
+        net, free = system.net, ~system.supported
+        inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
+        driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
+        moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.supported)
+        return cls(net.mass, inverse, moving, held, driven, system.rows - net.spins)
+
+
+class Families(NamedTuple):
+    """What acts; that of the lines is the first family.
+
+    Attributes
+    ----------
+    forces, cells, data, outs : List
+        Kernel of each family, its cells, its numbers, and what it writes per cell.
+    still, viscous : ndarray of int
+        Families behind the first whose forces follow from displacement and time alone, and those of velocity.
+    energies, stored : List
+        Kernel of the energy of each family, and what it writes per cell [J].
+    working : ndarray of int, shape (families,)
+        Whether what is booked of a family is work (1), its energy, which is lost (−1), or nothing (0).
+    powers : ndarray of int, shape (powered, 3)
+        Families booked by their power, the column of ``outs`` that has it, and whether they are viscous.
+    bounds, dampings : List
+        Kernel that bounds the stiffness of each family, and the damping of each viscous one.
+    """
+
+    forces: List
+    cells: List
+    data: List
+    outs: List
+    still: np.ndarray
+    viscous: np.ndarray
+    energies: List
+    stored: List
+    working: np.ndarray
+    powers: np.ndarray
+    bounds: List
+    dampings: List
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system; natural lengths that change do so in a copy of their own."""
+        families, net = system.families, system.net
+        lines = net.line_data.copy() if system.line_drives else net.line_data
+        numbers = [lines if family.lines else family.data for family in families]
+        viscous = [i for i, family in enumerate(families) if family.damping is not None]
+        still = [i for i in range(1, len(families)) if i not in viscous]
+        powers = [(i, f.power, i in viscous) for i, f in enumerate(families) if f.power is not None]
+        return cls(
+            forces=typed_list(FORCE, [family.force for family in families]),
+            cells=typed_list(INDICES, [family.cells for family in families]),
+            data=typed_list(MATRIX, numbers),
+            outs=typed_list(MATRIX, system.per_cell()),
+            still=np.array(still, dtype=np.int64),
+            viscous=np.array(viscous, dtype=np.int64),
+            energies=typed_list(ENERGY, [family.energy or no_energy for family in families]),
+            stored=typed_list(VECTOR, [np.zeros(len(family.cells)) for family in families]),
+            working=system.working,
+            powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
+            bounds=typed_list(BOUND, [family.bound or no_bound for family in families]),
+            dampings=typed_list(BOUND, [families[i].damping_bound or no_bound for i in viscous]),
+        )
+
+
+class Motions(NamedTuple):
+    """Prescribed motion: kernels, cells, numbers, and matrices of no columns for what they would write."""
+
+    kernels: List
+    cells: List
+    data: List
+    outs: List
+
+    @classmethod
+    def of(cls, system):
+        """That of a system."""
+        drives = system.drives
+        return cls(
+            kernels=typed_list(FORCE, [drive.kernel for drive in drives]),
+            cells=typed_list(INDICES, [drive.cells for drive in drives]),
+            data=typed_list(MATRIX, [drive.data for drive in drives]),
+            outs=typed_list(MATRIX, [np.zeros((len(drive.cells), 0)) for drive in drives]),
+        )
+
+
+class Reels(NamedTuple):
+    """Natural lengths that change.
+
+    Attributes
+    ----------
+    kernels, cells, data : List
+        What changes them, elements counted among those that change.
+    lengths : ndarray, shape (changing,)
+        Natural lengths that the kernels multiply [m].
+    elements : ndarray of int
+        Numbers of the elements that change.
+    lines : ndarray, shape (changing, columns)
+        Numbers of these elements as last set.
+    nodes : ndarray of int, shape (changing, 2)
+        Their nodes.
+    by_length : List
+        One kernel of ∂E/∂L [N], where any length changes.
+    corners : ndarray
+        Times at which a factor of natural lengths has a corner [s], increasing, then ∞ for the end of a row if there
+        are such factors, then −∞ for its start.
+    """
+
+    kernels: List
+    cells: List
+    data: List
+    lengths: np.ndarray
+    elements: np.ndarray
+    lines: np.ndarray
+    nodes: np.ndarray
+    by_length: List
+    corners: np.ndarray
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        drives, net = system.line_drives, system.net
+        elements = np.unique(np.concatenate([[], *(drive.cells[:, 0] for drive in drives)])).astype(np.int64)
+        corners = sorted({time for drive in drives for time in drive.times})
+        return cls(
+            kernels=typed_list(LINES, [drive.kernel for drive in drives]),
+            cells=typed_list(INDICES, [np.searchsorted(elements, drive.cells).astype(np.int32) for drive in drives]),
+            data=typed_list(MATRIX, [drive.data for drive in drives]),
+            lengths=net.natural_length[elements],
+            elements=elements,
+            lines=net.line_data[elements],
+            nodes=net.cells[elements],
+            by_length=typed_list(ENERGY, [system.length_force_kernel] if drives else []),
+            corners=np.array([*corners, *([np.inf] if drives else []), -np.inf]),
+        )
+
+
+class Model(NamedTuple):
+    """A system as the loop sees it."""
+
+    inertia: Inertia
+    families: Families
+    motions: Motions
+    reels: Reels
+
+    @classmethod
+    def of(cls, system):
+        """That of a `refweb.system.system.System`."""
+        return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system))
+
+
+class Observed(NamedTuple):
+    """What is looked at.
+
+    Attributes
+    ----------
+    probes, rows, data : List
+        Kernel of each probe and its numbers.
+    sums : ndarray, shape (sums, families + 3)
+        Weights of each sum.
+    signs : ndarray, shape (probes + sums,)
+        1 for the largest value, −1 for the smallest, 0 for neither.
+    followed : ndarray of int
+        Probes whose sign is not 0.
+    """
+
+    probes: List
+    rows: List
+    data: List
+    sums: np.ndarray
+    signs: np.ndarray
+    followed: np.ndarray
+
+    @classmethod
+    def of(cls, probes, sums, families):
+        """Probes and sums over a number of families."""
+        signs = np.array([float(one.sign) for one in (*probes, *sums)])
+        return cls(
+            probes=typed_list(PROBE, [probe.kernel for probe in probes]),
+            rows=typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
+            data=typed_list(MATRIX, [np.ascontiguousarray(probe.data, dtype=float) for probe in probes]),
+            sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3),
+            signs=signs,
+            followed=np.flatnonzero(signs[: len(probes)]),
+        )
+
+
+class Running(NamedTuple):
+    """What the loop writes; arrays of an explicit course, and numbers that pass from one part of a row to the next.
+
+    Attributes
+    ----------
+    clock : ndarray of `CLOCK`, shape (1,)
+        Numbers.
+    x, v, f : ndarray, shape (rows, 3)
+        Displacement [m], velocity [m/s] and force [N].
+    before : ndarray, shape (3, rows, 3)
+        The same at the row before.
+    work : ndarray, shape (families + 1,)
+        Work of each family and, last, of motion [J].
+    impulse : ndarray, shape (3,)
+        Impulse of the supports [N s].
+    extremes : refweb.dynamics.integrators.extremes.Extremes
+        Extremes of probes and sums.
+    events : ndarray of `refweb.dynamics.integrators.events.EVENT`
+        What each event has come to.
+    power : ndarray, shape (families,)
+        Power of each family at the last step [W].
+    length_force : ndarray, shape (2, changing)
+        ∂E/∂L of each length that changes [N], at the last step and at this one.
+    """
+
+    clock: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    f: np.ndarray
+    before: np.ndarray
+    work: np.ndarray
+    impulse: np.ndarray
+    extremes: Extremes
+    events: np.ndarray
+    power: np.ndarray
+    length_force: np.ndarray

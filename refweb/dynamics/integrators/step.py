@@ -1,0 +1,110 @@
+"""The pieces of an explicit step: kick and drift, forces, and the last kick where forces depend on velocity."""
+
+from __future__ import annotations
+
+import math
+
+from ...kernels import kernel
+from ...net.net import LENGTH
+
+ROUNDS = 100
+"""Largest number of rounds in which velocities at the end of a step are found."""
+
+
+@kernel(inline="always")
+def kick_and_drift(kick, drift, inverse, x, v, f):
+    """v ← v + kick f/m, x ← x + drift v, and no force, for all components in a row."""
+    for q in range(x.size):
+        speed = v[q] + kick * inverse[q] * f[q]
+        v[q] = speed
+        x[q] += drift * speed
+        f[q] = 0.0
+
+
+@kernel(inline="always")
+def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
+    """Add the force of the lines, and of all families that follow from displacement and time, to f."""
+    first[0](t, x, v, f, first[1], first[2], lines)
+    for i in still:
+        forces[i](t, x, v, f, cells[i], data[i], outs[i])
+
+
+@kernel(inline="always")
+def add_reaction(held, f, reaction):
+    """Add the force of the supports on the net, which takes that on them away, to ``reaction``."""
+    for q in held:
+        reaction[q % 3] -= f[q // 3, q % 3]
+
+
+@kernel(inline="always")
+def give_impulse(time, reaction, impulse):
+    """Add the impulse of a force over a time."""
+    for k in range(3):
+        impulse[k] += time * reaction[k]
+
+
+@kernel(inline="always")
+def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs):
+    """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
+
+    Forces that depend on velocity see that at the end of the step; the kick, thereby implicit, stays adjoint to the
+    first one, and the method of order 2. The iteration contracts with ½ h C/m, and ends at rounding; friction that has
+    grown may take more than 30 rounds, and what `ROUNDS` leave shows in the energy book.
+    """
+    half[:] = v
+    flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
+    flat_v, flat_f = v.reshape(-1), f.reshape(-1)
+    share, before_that = 1.0, math.inf
+    for _ in range(ROUNDS):
+        extra[:] = 0.0
+        for i in viscous:
+            forces[i](t, x, v, extra, cells[i], data[i], outs[i])
+        change = fastest = 0.0
+        for q in range(flat_v.size):
+            speed = flat_half[q] + 0.5 * h * flat_inverse[q] * (flat_f[q] + flat_extra[q])
+            change, fastest = max(change, abs(speed - flat_v[q])), max(fastest, abs(speed))
+            flat_v[q] = speed if share == 1.0 else flat_v[q] + share * (speed - flat_v[q])
+        if not change > 1e-14 * fastest:
+            break
+        if change > 0.75 * before_that and share > 0.02:  # friction that has grown since the last bound
+            share *= 0.5
+        before_that = change
+    for q in range(flat_v.size):
+        flat_f[q] += flat_extra[q]
+
+
+@kernel(inline="always")
+def move_supports(t, x, v, f, kernels, cells, data, outs):
+    """Write prescribed positions and velocities."""
+    for i in range(len(kernels)):
+        kernels[i](t, x, v, f, cells[i], data[i], outs[i])
+
+
+@kernel()
+def set_lengths(t, reels, lines):
+    """Give the elements that change their natural lengths at time t, in the numbers of all ``lines``."""
+    reels.lines[:, LENGTH] = reels.lengths
+    for i in range(len(reels.kernels)):
+        reels.kernels[i](t, reels.lines, reels.cells[i], reels.data[i])
+    for c in range(reels.elements.size):
+        lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
+
+
+@kernel(inline="always")
+def interpolate(s, h, old, x, v, inverse, f, here, speed):
+    """Write position and velocity at the share s of a step from ``old`` (position, velocity, acceleration).
+
+    They lie on the polynomial of degree 5 through these at either end.
+    """
+    r = 1.0 - s
+    way, more = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * r * r
+    b0, b1 = s * r**3 * (1.0 + 3.0 * s), -(s**3) * r * (4.0 - 3.0 * s)
+    c0, c1 = 0.5 * s * s * r**3, 0.5 * s**3 * r * r
+    db0, db1 = r * r * (1.0 - 3.0 * s) * (1.0 + 5.0 * s), -s * s * (2.0 - 3.0 * s) * (6.0 - 5.0 * s)
+    dc0, dc1 = 0.5 * s * r * r * (2.0 - 5.0 * s), 0.5 * s * s * r * (3.0 - 5.0 * s)
+    for q in range(x.shape[0]):
+        for k in range(3):
+            far, v0, v1 = x[q, k] - old[0, q, k], h * old[1, q, k], h * v[q, k]
+            a0, a1 = h * h * old[2, q, k], h * h * inverse[q, k] * f[q, k]
+            here[q, k] = old[0, q, k] + way * far + b0 * v0 + b1 * v1 + c0 * a0 + c1 * a1
+            speed[q, k] = (more * far + db0 * v0 + db1 * v1 + dc0 * a0 + dc1 * a1) / h
