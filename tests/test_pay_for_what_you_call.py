@@ -48,7 +48,8 @@ NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.e
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
-EXPLICIT = {f"dynamics.integrators.{name}" for name in ("central_difference", "explicit_loop", "step_bound")}
+LOOP = ("central_difference", "explicit_loop", "records", "step", "step_bound")
+EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP}
 AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
 SUNDIALS = TANGENT | {"system.mass"} | {f"dynamics.integrators.{name}" for name in ("sundials", *AROUND_STEPS)}
 METHOD = {
@@ -290,16 +291,25 @@ def test_entries_without_an_effect(name):
     assert entries(*rest) == expected(*rest)
 
 
+def typed_lists(given):
+    """Typed lists among what the loop is called with, in its records as well, one after another."""
+    if isinstance(given, numba.typed.List):
+        yield given
+    elif isinstance(given, tuple):
+        for one in given:
+            yield from typed_lists(one)
+
+
 @pytest.fixture
 def handed(monkeypatch):
     """Numbers of kernels in the lists that the compiled loop is handed for a scene with some effects."""
 
     def count(*effects):
         seen = []
-        monkeypatch.setattr(central_difference, "rows_ahead", lambda *given: seen.append(given) or 1)
+        monkeypatch.setattr(central_difference, "advance_rows", lambda *given: seen.append(given) or 1)
         solver = central_difference.CentralDifference(scene_of(*effects).build())
         solver.advance(solver.start(), [1e-3])
-        lists = [one for one in seen[0] if isinstance(one, numba.typed.List)]
+        lists = typed_lists(seen[0])
         counts = [len(one) for one in lists if isinstance(one._dtype, numba.types.FunctionType)]
         return dict(zip(LISTED, counts, strict=True))
 

@@ -17,12 +17,14 @@ from .energy_book import begin_powers, book_energies, book_lengths, book_motion,
 from .events import ended_by, note_events
 from .extremes import look, look_at_sums
 from .integrator import MAX_STEPS_PER_ROW
+from .records import Inside
 from .step import (
     add_forces,
     add_reaction,
     give_impulse,
     interpolate,
     kick_and_drift,
+    last_kick,
     move_supports,
     set_lengths,
     viscous_kick,
@@ -36,38 +38,70 @@ LOOKS = 4
 
 
 @kernel()
+def inner_stages(now, h, scheme, model, running, reaction):
+    """All kicks and drifts of a step of higher order but the last drift, with the impulse of the supports."""
+    families, inverse, held = model.families, model.inertia.inverse, model.inertia.held
+    x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
+    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    for n in range(scheme.drifts.size - 1):
+        kick, drift = scheme.kicks[n] * h, scheme.drifts[n] * h
+        give_impulse(kick, reaction, running.impulse)
+        reaction[:] = 0.0
+        kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
+        add_forces(now, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
+        add_reaction(held, f, reaction)
+
+
+@kernel()
+def look_inside(now, h, inside, where, total, model, observed, running):
+    """Look for extremes at `LOOKS` places of a long step that ends ``now``, but its end.
+
+    They are looked for on the polynomial of degree 5 through position, velocity and acceleration at its ends.
+    """
+    families, inertia, extremes, sums = model.families, model.inertia, running.extremes, observed.sums
+    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    first, (x, v, f) = (forces[0], cells[0], data[0]), (inside.state[0], inside.state[1], inside.state[2])
+    probes, rows, numbers, signs = observed.probes, observed.rows, observed.data, observed.signs
+    energies, stored, working = families.energies, families.stored, families.working
+    for n in range(1, LOOKS):
+        t = now - h + h * n / LOOKS
+        interpolate(n / LOOKS, h, inside.before, running.x, running.v, inertia.inverse, running.f, x, v)
+        f[:] = 0.0
+        add_forces(t, x, v, f, inside.lines, first, families.still, forces, cells, data, outs)
+        look(t, x, v, f, inside.lines, True, where, probes, rows, numbers, signs, observed.followed, extremes)
+        if sums.shape[0]:
+            book_energies(t, x, v, inertia.mass, cells, data, energies, stored, running.work, working, total)
+            look_at_sums(t, True, sums, total, len(probes), signs, extremes)
+
+
+@kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
     """``count`` steps of size h, behind those that are taken of the row.
 
     It writes x, v, f, extremes, events, the work and the supports' impulse; where ``changing`` natural lengths change.
 
     A step is a kick, a drift and a kick of h times ``kicks`` and ``drifts``; more of them are a method of higher order,
-    for forces that follow from displacement alone. Such steps are long: between their ends peaks, if any are followed,
-    are looked for on the polynomial of degree 5 through position, velocity and acceleration, and between what is seen
-    there on parabolas.
+    for forces that follow from displacement alone. Such steps are long, and looked at inside.
 
     Returns the steps taken: fewer than asked for where an event ends the run.
     """
-    clock, families, reels, inverse = running.clock[0], model.families, model.reels, model.inertia.inverse
-    mass, held, driven = model.inertia.mass, model.inertia.held, model.inertia.driven
+    clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
+    mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse = running.x, running.v, running.f, running.work, running.impulse
-    extremes, events, power, length_force = running.extremes, running.events, running.power, running.length_force
-    forces, cells, data, outs, still, viscous = families.forces, families.cells, families.data, families.outs, families.still, families.viscous
-    powers = families.powers
-    energies, stored, working = families.energies, families.stored, families.working
-    moves, moved, move_data, move_outs = model.motions.kernels, model.motions.cells, model.motions.data, model.motions.outs
-    probes, probe_rows, probe_data, signs, followed, sums = observed.probes, observed.rows, observed.data, observed.signs, observed.followed, observed.sums
-    kicks, drifts = scheme.kicks, scheme.drifts
+    extremes, power, length_force = running.extremes, running.power, running.length_force
+    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    still, viscous, powers = families.still, families.viscous, families.powers
+    probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
+    signs, followed, sums = observed.signs, observed.followed, observed.sums
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3)
-    lines, before = outs[0], np.empty((driven.size, 7))
-    first = forces[0], cells[0], data[0]
+    lines, before, first = outs[0], np.empty((driven.size, 7)), (forces[0], cells[0], data[0])
     half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(reels.lengths.size if changing else 0)
     extra = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
-    stages = drifts.size - 1
-    looks = LOOKS if stages and followed.size + sums.shape[0] else 0
-    old, inner = np.empty((3, rows if looks else 0, 3)), np.empty((3, rows if looks else 0, 3))
-    inner_lines = np.empty_like(lines) if looks else lines
+    stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
+    looks = stages > 0 and followed.size + sums.shape[0] > 0
+    space = np.empty((6, rows if looks else 0, 3))
+    inside = Inside(space[:3], space[3:], np.empty_like(lines) if looks else lines)
     begun, start = clock.begun, clock.time
     if begun == 0:
         begin_powers(start, x, v, extra, families, power)
@@ -77,16 +111,12 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     for step in range(1, count + 1):
         now = start + (begun + step) * h
         if looks:
-            old[0], old[1], old[2] = x, v, inverse * f
-        for n in range(stages):
-            give_impulse(kicks[n] * h, reaction, impulse)
-            reaction[:] = 0.0
-            kick_and_drift(kicks[n] * h, drifts[n] * h, flat_inverse, flat_x, flat_v, flat_f)
-            add_forces(now, x, v, f, lines, first, still, forces, cells, data, outs)
-            add_reaction(held, f, reaction)
+            inside.before[0], inside.before[1], inside.before[2] = x, v, inverse * f
+        if stages:
+            inner_stages(now, h, scheme, model, running, reaction)
         note_motion(driven, mass, x, v, f, before)
-        kick_and_drift(kicks[stages] * h, drifts[stages] * h, flat_inverse, flat_x, flat_v, flat_f)
-        move_supports(now, x, v, f, moves, moved, move_data, move_outs)
+        kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
+        move_supports(now, x, v, f, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
             was[:] = reels.lines[:, LENGTH]
             set_lengths(now, reels, data[0])
@@ -95,28 +125,21 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         if viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)
         else:
-            for q in range(flat_v.size):
-                flat_v[q] += kicks[stages + 1] * h * flat_inverse[q] * flat_f[q]
+            last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)
         book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
         book_motion(driven, mass, x, v, f, before, work)
-        give_impulse(kicks[stages] * h, reaction, impulse)
+        give_impulse(kicks[stages], reaction, impulse)
         reaction[:] = 0.0
         add_reaction(held, f, reaction)
-        give_impulse(kicks[stages + 1] * h, reaction, impulse)
-        for n in range(1, looks):
-            here = now - h + h * n / looks
-            interpolate(n / looks, h, old, x, v, inverse, f, inner[0], inner[1])
-            inner[2] = 0.0
-            add_forces(here, inner[0], inner[1], inner[2], inner_lines, first, still, forces, cells, data, outs)
-            look(here, inner[0], inner[1], inner[2], inner_lines, True, where, probes, probe_rows, probe_data, signs, followed, extremes)
-            if sums.shape[0]:
-                book_energies(here, inner[0], inner[1], mass, cells, data, energies, stored, work, working, total)
-                look_at_sums(here, True, sums, total, len(probes), signs, extremes)
+        give_impulse(kicks[stages + 1], reaction, impulse)
+        if looks:
+            look_inside(now, h, inside, where, total, model, observed, running)
         look(now, x, v, f, lines, stages > 0, where, probes, probe_rows, probe_data, signs, followed, extremes)
         if sums.shape[0]:
+            energies, stored, working = families.energies, families.stored, families.working
             book_energies(now, x, v, mass, cells, data, energies, stored, work, working, total)
             look_at_sums(now, stages > 0, sums, total, len(probes), signs, extremes)
-        if note_events(now, h, x, v, f, lines, events, where, probes, probe_rows, probe_data, sums, total):
+        if note_events(now, h, x, v, f, lines, running.events, where, probes, probe_rows, probe_data, sums, total):
             return step
     return count
 

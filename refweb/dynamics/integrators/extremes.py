@@ -8,7 +8,6 @@ import numpy as np
 
 from ...kernels import kernel
 from ...results.probes import PLACE
-from .energy_book import book_energies
 
 
 class Extremes(NamedTuple):
@@ -69,6 +68,7 @@ def look(t, x, v, f, lines, long, where, probes, rows, data, signs, followed, ex
 
 @kernel(inline="always")
 def look_at_sums(t, long, sums, total, first, signs, extremes):
+    """As `look`, at sums of the energies ``total``; their numbers follow from ``first``."""
     for j in range(sums.shape[0]):
         value, i = np.dot(sums[j], total), first + j
         if signs[i] * value > signs[i] * extremes.values[i]:

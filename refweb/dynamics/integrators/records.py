@@ -305,3 +305,19 @@ class Running(NamedTuple):
     events: np.ndarray
     power: np.ndarray
     length_force: np.ndarray
+
+
+class Inside(NamedTuple):
+    """Space to look at the inside of a long step with.
+
+    Attributes
+    ----------
+    before, state : ndarray, shape (3, rows, 3)
+        Position, velocity and acceleration at its start; position, velocity and force at a place within.
+    lines : ndarray, shape (cells, columns)
+        What lines show there.
+    """
+
+    before: np.ndarray
+    state: np.ndarray
+    lines: np.ndarray

@@ -22,6 +22,13 @@ def kick_and_drift(kick, drift, inverse, x, v, f):
 
 
 @kernel(inline="always")
+def last_kick(kick, inverse, v, f):
+    """v ← v + kick f/m, for all components in a row."""
+    for q in range(v.size):
+        v[q] += kick * inverse[q] * f[q]
+
+
+@kernel(inline="always")
 def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
     """Add the force of the lines, and of all families that follow from displacement and time, to f."""
     first[0](t, x, v, f, first[1], first[2], lines)
