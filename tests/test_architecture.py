@@ -211,6 +211,29 @@ def test_imports_from_outside(name):
     assert not head & {"pyvista", "matplotlib", "meshio", "sksundae", "PIL"}
 
 
+FUNCTIONS = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+def functions(name):
+    """Functions of a module, at any depth, and whether each is a factory: one that defines kernels inside of it."""
+    for node in ast.walk(MODULES[name]):
+        if isinstance(node, FUNCTIONS):
+            inner = [n for n in ast.walk(node) if isinstance(n, FUNCTIONS) and n is not node]
+            yield node, any("kernel" in ast.unparse(decorator) for n in inner for decorator in n.decorator_list)
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_functions_and_files_are_short(name):
+    """At most 14 parameters; 80 lines of code and docstring, but for factories of kernels; 400 lines a file."""
+    for node, factory in functions(name):
+        arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
+        assert len(arguments) <= 14, f"{node.name} takes {len(arguments)} parameters"
+        size = node.end_lineno - node.lineno + 1
+        assert factory or size <= 80, f"{node.name} has {size} lines"
+    last = max((node.end_lineno for node in MODULES[name].body), default=0)
+    assert last <= 400, f"{last} lines"
+
+
 def test_names_say_something():
     parts = {part for name in MODULES for part in name.split(".")}
     assert not parts & {"utils", "util", "helpers", "helper", "common", "manager", "misc"}

@@ -9,8 +9,11 @@ from validation.harness import case as cases
 from validation.harness import page, plots
 from validation.harness.case import Case, Figure, Row, Table, Verdict
 
+LONG = ("webs_hit", "webs_under_load")
+"""Cases that take more than half a minute with ``--quick``."""
 
-@pytest.mark.parametrize("name", cases.names())
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in cases.names()])
 def test_case(name):
     title, body = cases.text(name)
     assert title and body, f"{name} does not say what it is"
