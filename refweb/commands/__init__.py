@@ -2,7 +2,8 @@
 
 How to write a verb of the command line
 ---------------------------------------
-A verb is a module, and a line in the table of verbs. This one weighs the web of a scene, ``refweb weigh SCENE``::
+A verb is a module, and a line in the table of verbs. A whole file, ``refweb/commands/weigh.py``, which weighs the web
+of a scene, ``refweb weigh SCENE``::
 
     \"""Mass of a web.\"""
 
@@ -27,6 +28,9 @@ The first sentence of its docstring is its line in ``refweb --help``. ``add_argu
 message goes to the error stream; a verb catches none of them.
 
 Help loads all verbs, so whatever is heavy, scenes and numpy among them, is imported inside functions.
+
+``Scene.build()`` is what a scene comes to: ``net.cable_mass`` is that of the lines, ``net.mass`` that of each row, of
+the ``net.nodes`` nodes with point masses first, then of bodies.
 
 A verb that writes a result folder may have ``show(summary)``: ``refweb info`` calls it with the content of a
 ``run.json`` whose ``kind`` is the name of the verb.

@@ -78,10 +78,19 @@ A scene then has as many of it as it likes, ``several``, as tables of a list; wi
 
 ``x`` in a kernel is the displacement of all rows and ``net.points`` their reference; ``cells`` are the rows that each
 cell couples, ``data`` its numbers. A kernel adds to ``f`` and to ``rates``, and writes ``blocks`` and ``out``, both of
-which hold what was there before; signatures are in `refweb.kernels`. A force with a potential has an ``energy`` instead
-of a power, and a column of the book of its own. Bounds keep explicit steps stable; ``definite`` asks for a part of the
-stiffness that is positive semidefinite, such as none. A load with a factor over time is made by
-`refweb.effects.outer_load`; what changes natural lengths, `refweb.effects.length_factor`; rows, mass and columns of
-numbers of the lines are added by ``extend(net)``, which returns another net. ``tests/test_contract.py`` holds forces
-against energies and stiffness against forces, for every effect.
+which hold what was there before; signatures are in `refweb.kernels`.
+
+Nodes are found by ``net.web.find(self.node)``, lines by ``net.web.find_lines(self.lines)``; ``net.find`` has the nodes
+that order and subdivision add in "all" as well. `refweb.effects.base.column` makes cells of one row each. A field reads
+and checks its value: ``real(above=0.0, unit="N/m")``; the others are in `refweb.tables`.
+
+A force with a potential has ``energy=energy, book="spring_energy"`` instead of a power: that name heads a column of
+``history.csv`` and counts in the total energy. It is observed once it has a `refweb.results.observables.book.Booked`
+and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps stable, not accurate: something stiff may need a
+smaller ``safety``. ``definite`` asks for a part of the stiffness that is positive semidefinite, such as none.
+
+A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
+`refweb.effects.length_factor`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
+returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every
+effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README.
 """

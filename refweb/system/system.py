@@ -262,10 +262,6 @@ class System:
             force -= np.where(self.supported, self.mass.passed_on(self.mass.moved_by(force)), 0.0)
         return Forces(force, per_cell)
 
-    outs = per_cell  # until the explicit loop asks for what stands above
-    by_length = property(lambda self: self.length_force_kernel)
-    length = property(lambda self: self.net.natural_length)
-
     def row_name(self, row):
         """How a message calls a row: a node by its number, a body by its name."""
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
