@@ -20,7 +20,7 @@ all its digits, which it loses when positions are the unknowns.
 Machine code is kept on disk, in a folder named by the content of all sources with kernels: numba itself looks only at
 the file a function stands in, and would go on using a kernel whose law, in another file, has changed. It also finds the
 machine code of kernels in typed lists by name: kernels of one factory, which differ in the numbers and the kernels that
-they capture, are named after these, a captured kernel by the content of the files that it is made of.
+they capture, are named after these, a captured kernel by its name and the content of its file.
 """
 
 from __future__ import annotations
@@ -109,8 +109,12 @@ def _compile(decorator, function):
 
 
 @functools.cache
-def _content(path):
-    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+def _content(code):
+    """The content of the file that code stands in, or where there is none of the code itself."""
+    try:
+        return hashlib.sha256(pathlib.Path(code.co_filename).read_bytes()).hexdigest()
+    except OSError:
+        return repr((code.co_code, code.co_consts, code.co_names))
 
 
 def _told(value):
@@ -118,10 +122,7 @@ def _told(value):
     if not isinstance(value, Dispatcher):
         return repr(value)
     function = value.py_func
-    path, names = function.__code__.co_filename, function.__code__.co_names
-    called = [function.__globals__.get(name) for name in names]
-    elsewhere = [k for k in called if isinstance(k, Dispatcher) and k.py_func.__code__.co_filename != path]
-    return " ".join([function.__module__, function.__qualname__, _content(path), *map(_told, elsewhere)])
+    return f"{function.__module__}.{function.__qualname__} {_content(function.__code__)}"
 
 
 def _named(function):

@@ -1,11 +1,10 @@
 """Rigid bodies: rows of the unknowns after those of the web's nodes, and what a shape has to say.
 
-How to write a body shape: a file with a class, whose fields are the keys of ``[[body]]``, and one line in
-`refweb.registry.SHAPES`, here ``"wall": "refweb.net.shapes.wall:Wall"``. Its keys are then read, checked and written,
-and it is touched, rubbed and drawn, as any other shape. All that lies behind a plane:
+How to write a body shape
+-------------------------
+A shape is a file with a class, whose fields are its keys in ``[[body]]``. This one is all that lies behind a plane::
 
     from dataclasses import dataclass
-    from math import inf
 
     import numpy as np
 
@@ -14,34 +13,31 @@ and it is touched, rubbed and drawn, as any other shape. All that lies behind a 
     from refweb.tables import real, vector
 
     @kernel()
-    def depth(p, grown):  # of a point from the centre along the axes [m]; its gradient; its Hessian 00 01 02 11 12 22
+    def depth(p, grown):  # at a point along the axes [m]; its gradient; its Hessian [1/m], 00 01 02 11 12 22
         return -p[2], (0.0, 0.0, -1.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     @dataclass(frozen=True, kw_only=True)
     class Wall(Shape):
         normal: tuple = vector()  # a key that it needs
-        drawn: float = real(1.0, above=0, unit="m")  # a key that it may have: the edge of the square that is drawn
-
-        def check(self):  # raises refweb.errors.InputError for what cannot be: here a normal that is zero
+        drawn: float = real(2.0, above=0, unit="m")  # one with a default: edge of the square that is drawn
+        def check(self):  # raises `refweb.errors.InputError` for what cannot be, here a normal that is zero
             self.frame()
-
-        def grown(self):  # radius of growth and half sizes of the core: the least box around both is out of reach
-            return Grown(0.0, (inf, inf, inf))
-
-        def frame(self):  # unit vectors of the axes; x, y and z where there is none
+        def frame(self):  # unit vectors of the axes; x, y and z where it is left out
             return axes_about("normal", self.normal)
-
+        def grown(self):  # radius of growth, and half sizes of the core: of the box that it fills
+            return Grown(0.0, (np.inf, np.inf, np.inf))
         def depth(self):
             return depth
+        def surface(self):  # points and triangles, along the axes
+            corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+            return 0.5 * self.drawn * corners, np.array([[0, 1, 2], [0, 2, 3]])
 
-        def surface(self):  # points and triangles about the centre, along the axes
-            corners = 0.5 * self.drawn * np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
-            return corners, np.array([(0, 1, 2), (0, 2, 3)])
+A body is convex, and its depth the distance from its surface: concave, with a gradient of length 1 that does not jump
+as far as contact goes. That is why edges are rounded, and a body is a core and the radius by which it has grown on all
+sides. If the core is a box, or round about its axis, ``depth`` and ``surface`` are those of `Shape`; otherwise
+``farthest`` may bring the surface. The line in ``SHAPES`` of ``refweb/registry.py``::
 
-A body is convex. Its depth is the distance from its surface, negative outside: concave, of a gradient of length 1 that
-does not jump as far as contact may go, which is why edges are rounded: ``grown`` is a core, and the radius by which it
-has grown on all sides. Where the core is a box, or round about the third axis, ``grown`` is enough: its depth and its
-surface are those of `Shape`, which says what else there is.
+    "wall": "refweb.net.shapes.wall:Wall",
 """
 
 from __future__ import annotations

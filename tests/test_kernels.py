@@ -1,0 +1,88 @@
+"""Kernels that capture kernels: names that are theirs alone, and machine code that the next process finds."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+FACTORY = """
+import sys
+import numpy as np
+from refweb.kernels import VECTOR, kernel
+from numba import types
+
+def doubled(inner):
+    @kernel(types.void(VECTOR))
+    def outer(values):
+        for i in range(len(values)):
+            values[i] = 2.0 * inner(values[i])
+    return outer
+
+def show(inner):
+    values, outer = np.ones(1), doubled(inner)
+    outer(values)
+    print(values[0], sum(outer.stats.cache_hits.values()), outer.py_func.__qualname__.rpartition("_")[2])
+"""
+INNER = """
+from refweb.kernels import kernel
+
+@kernel()
+def inner(value):
+    return {number} * value
+"""
+MADE = """
+from refweb.kernels import kernel
+
+def of(number):
+    @kernel()
+    def inner(value):
+        return number * value
+    return inner
+
+made = of({number}), of({number} + 1.0)
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Writes a package and runs lines of it in a process; result, hits and name of each kernel that is shown."""
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / "__init__.py").touch()
+    (tmp_path / "own" / "factory.py").write_text(FACTORY)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    environment["NUMBA_CACHE_DIR"] = str(tmp_path / "cache")
+
+    def write(name, text, number):
+        (tmp_path / "own" / f"{name}.py").write_text(text.format(number=number))
+
+    def start(lines):
+        command = [sys.executable, "-c", lines]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        found = [line.split() for line in done.stdout.splitlines()]
+        return [(float(value), int(hits), name) for value, hits, name in found]
+
+    start.write = write
+    return start
+
+
+def test_machine_code_is_found_again_until_what_is_captured_changes(run):
+    run.write("one", INNER, 3.0)
+    lines = "from own import factory, one; factory.show(one.inner)"
+    ((first, hits, name),) = run(lines)
+    assert (first, hits) == (6.0, 0) and run(lines) == [(6.0, 1, name)]
+    run.write("one", INNER, 4.0)
+    ((second, hits, other),) = run(lines)
+    assert (second, hits) == (8.0, 0) and other != name
+
+
+def test_kernels_that_capture_different_kernels_never_share_a_name(run):
+    """Those of one name in two files, and two that a factory has made."""
+    run.write("one", INNER, 3.0)
+    run.write("two", INNER, 4.0)
+    run.write("three", MADE, 5.0)
+    found = run(
+        "from own import factory, one, two, three; [factory.show(k) for k in (one.inner, two.inner, *three.made)]"
+    )
+    assert [value for value, _, _ in found] == [6.0, 8.0, 10.0, 12.0]
+    assert len({name for _, _, name in found}) == 4
