@@ -208,7 +208,7 @@ def test_every_method_has_its_turn(monkeypatch):
     assert runner.clock.now <= 90.0 + 2 * 100.0 * TURN
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", sorted(METHODS))
 def test_a_run_is_ended_at_its_deadline(monkeypatch, method):
     """The clock is looked at within it, of explicit steps after blocks of rows."""
     given, clock = scene(), Clock(monkeypatch, tick=1.0)
