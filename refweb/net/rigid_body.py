@@ -34,8 +34,10 @@ A shape is a file with a class, whose fields are its keys in ``[[body]]``. This 
 
 A body is convex, and its depth the distance from its surface: concave, with a gradient of length 1 that does not jump
 as far as contact goes. That is why edges are rounded, and a body is a core and the radius by which it has grown on all
-sides. If the core is a box, or round about its axis, ``depth`` and ``surface`` are those of `Shape`; otherwise
-``farthest`` may bring the surface. The line in ``SHAPES`` of ``refweb/registry.py``::
+sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or round about
+its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a capsule;
+otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move sets ``free = True``
+and brings ``inertia``. The line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
 """

@@ -45,11 +45,13 @@ A line in `refweb.registry.INTEGRATORS` makes it a ``method`` of scenes, with th
 
 ``x`` and ``v`` are displacement and velocity of all that is free, vectors; ``begin`` is also called in the middle of a
 run, where velocities jump. No step passes ``stop``, where tables have corners and bodies might pass through lines; the
-next row, ``end``, may be passed. A step that is not found raises `Stopped` of the same module with the reason.
+next row, ``end``, may be passed. ``over_tolerance(error_x, error_v, x, v)`` is an error over what the tolerances allow,
+1 at their limit. A step that is not found raises `Stopped` of the same module with the reason.
 
 An implicit method finds K = −∂f/∂x and C = −∂f/∂v by ``self.system.stiffness(t, *self.state(t, x, v))`` and
 ``damping``, None without any: values of which ``self.system.pattern.matrix`` makes a sparse matrix, as M is in
-``self.system.mass.matrix``. ``self.force`` is f, and ``self.acceleration`` M⁻¹f. A method says by ``takes_massless``
+``self.system.mass.matrix``, all over the free unknowns. Tangents and factorizations of its own it counts in
+``self.stats``, as ``njev`` and ``nlu``. ``self.force`` is f, and ``self.acceleration`` M⁻¹f. A method says by ``takes_massless``
 and ``takes_links`` that its equations have a place for nodes without mass and rigid links. What else there is to say
 about an integrator, also one that takes steps by another key than rtol, is in
 `refweb.dynamics.integrators.integrator.Integrator`.

@@ -50,7 +50,7 @@ def no_energy(t, x, cells, data, out):
     out[:] = 0.0
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def begin_powers(t, x, v, extra, families, power):
     """Write the power of each family that is booked by it [W]."""
     for n in range(families.powers.shape[0]):
@@ -59,7 +59,7 @@ def begin_powers(t, x, v, extra, families, power):
         power[i] = families.outs[i][:, column].sum()
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def book_powers(t, h, x, v, extra, power, work, powers, forces, cells, data, outs):
     """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
     for n in range(powers.shape[0]):
@@ -71,7 +71,7 @@ def book_powers(t, h, x, v, extra, power, work, powers, forces, cells, data, out
         power[i] = gained
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def note_motion(driven, mass, x, v, f, before):
     """Note position, force and kinetic energy of the rows whose motion is prescribed, ahead of a step."""
     for d in range(driven.size):
@@ -81,7 +81,7 @@ def note_motion(driven, mass, x, v, f, before):
             before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def book_motion(driven, mass, x, v, f, before, work):
     """Add the work of prescribed motion in a step: what the kinetic energy gained and the forces took."""
     last = work.size - 1
@@ -92,7 +92,7 @@ def book_motion(driven, mass, x, v, f, before, work):
             work[last] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def book_lengths(t, x, reels, was, length_force, work):
     """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
     reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])

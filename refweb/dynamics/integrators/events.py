@@ -75,7 +75,7 @@ def starts_above(event, value):
         event.time = 0.0
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def note_events(t, h, x, v, f, lines, events, where, probes, rows, data, sums, total):
     """Note what happens at the end of a step of size h; whether that ends the run."""
     ended = False

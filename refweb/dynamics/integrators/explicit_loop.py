@@ -20,13 +20,13 @@ from .integrator import MAX_STEPS_PER_ROW
 from .records import Inside
 from .step import (
     add_forces,
-    add_reaction,
     give_impulse,
     interpolate,
     kick_and_drift,
     last_kick,
     move_supports,
     set_lengths,
+    set_reaction,
     viscous_kick,
 )
 from .step_bound import safe_step
@@ -46,10 +46,9 @@ def inner_stages(now, h, scheme, model, running, reaction):
     for n in range(scheme.drifts.size - 1):
         kick, drift = scheme.kicks[n] * h, scheme.drifts[n] * h
         give_impulse(kick, reaction, running.impulse)
-        reaction[:] = 0.0
         kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
         add_forces(now, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
-        add_reaction(held, f, reaction)
+        set_reaction(held, f, reaction)
 
 
 @kernel()
@@ -102,21 +101,23 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     looks = stages > 0 and followed.size + sums.shape[0] > 0
     space = np.empty((6, rows if looks else 0, 3))
     inside = Inside(space[:3], space[3:], np.empty_like(lines) if looks else lines)
-    begun, start = clock.begun, clock.time
+    begun, start, moved, awaited = clock.begun, clock.time, driven.size > 0, running.events.shape[0] > 0
     if begun == 0:
         begin_powers(start, x, v, extra, families, power)
         if changing:
             reels.by_length[0](start, x, reels.nodes, reels.lines, length_force[0])
-    add_reaction(held, f, reaction)
+    set_reaction(held, f, reaction)
     for step in range(1, count + 1):
         now = start + (begun + step) * h
         if looks:
             inside.before[0], inside.before[1], inside.before[2] = x, v, inverse * f
         if stages:
             inner_stages(now, h, scheme, model, running, reaction)
-        note_motion(driven, mass, x, v, f, before)
+        if moved:
+            note_motion(driven, mass, x, v, f, before)
         kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
-        move_supports(now, x, v, f, motions.kernels, motions.cells, motions.data, motions.outs)
+        if moved:
+            move_supports(now, x, v, f, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
             was[:] = reels.lines[:, LENGTH]
             set_lengths(now, reels, data[0])
@@ -126,11 +127,12 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)
         else:
             last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)
-        book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
-        book_motion(driven, mass, x, v, f, before, work)
+        if powers.shape[0]:
+            book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
+        if moved:
+            book_motion(driven, mass, x, v, f, before, work)
         give_impulse(kicks[stages], reaction, impulse)
-        reaction[:] = 0.0
-        add_reaction(held, f, reaction)
+        set_reaction(held, f, reaction)
         give_impulse(kicks[stages + 1], reaction, impulse)
         if looks:
             look_inside(now, h, inside, where, total, model, observed, running)
@@ -139,8 +141,9 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             energies, stored, working = families.energies, families.stored, families.working
             book_energies(now, x, v, mass, cells, data, energies, stored, work, working, total)
             look_at_sums(now, stages > 0, sums, total, len(probes), signs, extremes)
-        if note_events(now, h, x, v, f, lines, running.events, where, probes, probe_rows, probe_data, sums, total):
-            return step
+        if awaited:
+            if note_events(now, h, x, v, f, lines, running.events, where, probes, probe_rows, probe_data, sums, total):
+                return step
     return count
 
 

@@ -53,7 +53,7 @@ def quadratic_peak(extremes, i, now, value, sign):
     recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3] = at, high, now, value
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def look(t, x, v, f, lines, long, where, probes, rows, data, signs, followed, extremes):
     """Look at all that is followed, and take over what exceeds its extreme; after ``long`` steps parabolas as well."""
     for i in followed:
@@ -66,7 +66,7 @@ def look(t, x, v, f, lines, long, where, probes, rows, data, signs, followed, ex
             quadratic_peak(extremes, i, t, value, signs[i])
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def look_at_sums(t, long, sums, total, first, signs, extremes):
     """As `look`, at sums of the energies ``total``; their numbers follow from ``first``."""
     for j in range(sums.shape[0]):

@@ -11,7 +11,7 @@ ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def kick_and_drift(kick, drift, inverse, x, v, f):
     """v ← v + kick f/m, x ← x + drift v, and no force, for all components in a row."""
     for q in range(x.size):
@@ -21,14 +21,14 @@ def kick_and_drift(kick, drift, inverse, x, v, f):
         f[q] = 0.0
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def last_kick(kick, inverse, v, f):
     """v ← v + kick f/m, for all components in a row."""
     for q in range(v.size):
         v[q] += kick * inverse[q] * f[q]
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
     """Add the force of the lines, and of all families that follow from displacement and time, to f."""
     first[0](t, x, v, f, first[1], first[2], lines)
@@ -36,21 +36,23 @@ def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
 
 
-@kernel(inline="always")
-def add_reaction(held, f, reaction):
-    """Add the force of the supports on the net, which takes that on them away, to ``reaction``."""
+@kernel(forceinline=True)
+def set_reaction(held, f, reaction):
+    """Write the force of the supports on the net, which takes that on them away, to ``reaction``."""
+    for k in range(3):
+        reaction[k] = 0.0
     for q in held:
         reaction[q % 3] -= f[q // 3, q % 3]
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def give_impulse(time, reaction, impulse):
     """Add the impulse of a force over a time."""
     for k in range(3):
         impulse[k] += time * reaction[k]
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs):
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
 
@@ -80,7 +82,7 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
         flat_f[q] += flat_extra[q]
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def move_supports(t, x, v, f, kernels, cells, data, outs):
     """Write prescribed positions and velocities."""
     for i in range(len(kernels)):
@@ -97,7 +99,7 @@ def set_lengths(t, reels, lines):
         lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
 
 
-@kernel(inline="always")
+@kernel(forceinline=True)
 def interpolate(s, h, old, x, v, inverse, f, here, speed):
     """Write position and velocity at the share s of a step from ``old`` (position, velocity, acceleration).
 
