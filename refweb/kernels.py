@@ -142,6 +142,22 @@ def kernel(signature=None, **options):
     return lambda function: _compile(lambda named: _njit(named, signature, options), _named(function))
 
 
+def record(cls):
+    """Let numba type the first instance of a class of named tuples alone: all have fields of the same types.
+
+    numba would look at every field at every call, which takes 0.8 ms for what the explicit loop takes.
+    """
+    known = []
+
+    def kind(self):
+        if not known:
+            known.append(numba.typeof(self))
+        return known[0]
+
+    cls._numba_type_ = property(kind)
+    return cls
+
+
 def ufunc(signatures):
     """Compile a scalar function into a numpy ufunc and keep its machine code on disk."""
     return lambda function: _compile(numba.vectorize(signatures, cache=True), function)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.typed import List
 
-from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, typed_list
+from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, record, typed_list
 from ...results.probes import INTEGERS, PROBE
 from .energy_book import no_energy
 from .extremes import Extremes
@@ -34,6 +34,7 @@ CLOCK = np.dtype(
 steps taken of a row, 0 between rows, and the steps of it."""
 
 
+@record
 class Scheme(NamedTuple):
     """How steps are made.
 
@@ -219,6 +220,7 @@ class Reels(NamedTuple):
         )
 
 
+@record
 class Model(NamedTuple):
     """A system as the loop sees it."""
 
@@ -233,6 +235,7 @@ class Model(NamedTuple):
         return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system))
 
 
+@record
 class Observed(NamedTuple):
     """What is looked at.
 
@@ -269,6 +272,7 @@ class Observed(NamedTuple):
         )
 
 
+@record
 class Running(NamedTuple):
     """What the loop writes; arrays of an explicit course, and numbers that pass from one part of a row to the next.
 
