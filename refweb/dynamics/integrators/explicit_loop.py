@@ -1,7 +1,9 @@
 """The compiled loop of explicit dynamics: steps of kicks and drifts, and history rows.
 
 Its pieces stand beside their equations: `refweb.dynamics.integrators.step` moves, ``energy_book`` books work,
-``extremes`` and ``events`` look, ``step_bound`` says how long a step may be.
+``extremes`` and ``events`` look, ``step_bound`` says how long a step may be. A piece that calls kernels counts
+references to all its arrays, some 0.1 µs a call, as much as two lines take: forces and looks of a plain step, which
+every scene has, stand in the loop itself.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from ...net.net import LENGTH
 from ...results.probes import PLACE
 from .energy_book import begin_powers, book_energies, book_lengths, book_motion, book_powers, drifts_away, note_motion
 from .events import ended_by, note_events
-from .extremes import look, look_at_sums
+from .extremes import look, look_at_sums, quadratic_peak, take_over
 from .integrator import MAX_STEPS_PER_ROW
 from .records import Inside
 from .step import (
@@ -88,13 +90,15 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse = running.x, running.v, running.f, running.work, running.impulse
     extremes, power, length_force = running.extremes, running.power, running.length_force
+    values = extremes.values
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers = families.still, families.viscous, families.powers
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
     signs, followed, sums = observed.signs, observed.followed, observed.sums
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3)
-    lines, before, first = outs[0], np.empty((driven.size, 7)), (forces[0], cells[0], data[0])
+    lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
+    before = np.empty((driven.size, 7))
     half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(reels.lengths.size if changing else 0)
     extra = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
@@ -122,7 +126,9 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             was[:] = reels.lines[:, LENGTH]
             set_lengths(now, reels, data[0])
             book_lengths(now, x, reels, was, length_force, work)
-        add_forces(now, x, v, f, lines, first, still, forces, cells, data, outs)
+        first(now, x, v, f, cells_of_lines, data_of_lines, lines)
+        for i in still:
+            forces[i](now, x, v, f, cells[i], data[i], outs[i])
         if viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)
         else:
@@ -136,7 +142,12 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         give_impulse(kicks[stages + 1], reaction, impulse)
         if looks:
             look_inside(now, h, inside, where, total, model, observed, running)
-        look(now, x, v, f, lines, stages > 0, where, probes, probe_rows, probe_data, signs, followed, extremes)
+        for i in followed:
+            value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
+            if signs[i] * value > signs[i] * values[i]:
+                take_over(i, value, now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
+            if stages:
+                quadratic_peak(extremes, i, now, value, signs[i])
         if sums.shape[0]:
             energies, stored, working = families.energies, families.stored, families.working
             book_energies(now, x, v, mass, cells, data, energies, stored, work, working, total)

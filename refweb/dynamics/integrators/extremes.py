@@ -53,15 +53,21 @@ def quadratic_peak(extremes, i, now, value, sign):
     recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3] = at, high, now, value
 
 
-@kernel(forceinline=True)
+@kernel()
+def take_over(i, value, t, x, v, f, lines, where, probe, rows, data, extremes):
+    """Take over a value of a probe that exceeds its extreme, with its time and place."""
+    where[1] = PLACE
+    probe(t, x, v, f, lines, rows, data, where)
+    extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
+
+
+@kernel()
 def look(t, x, v, f, lines, long, where, probes, rows, data, signs, followed, extremes):
     """Look at all that is followed, and take over what exceeds its extreme; after ``long`` steps parabolas as well."""
     for i in followed:
         value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
         if signs[i] * value > signs[i] * extremes.values[i]:
-            where[1] = PLACE
-            probes[i](t, x, v, f, lines, rows[i], data[i], where)
-            extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
+            take_over(i, value, t, x, v, f, lines, where, probes[i], rows[i], data[i], extremes)
         if long:
             quadratic_peak(extremes, i, t, value, signs[i])
 
