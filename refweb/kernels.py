@@ -163,6 +163,14 @@ def ufunc(signatures):
     return lambda function: _compile(numba.vectorize(signatures, cache=True), function)
 
 
+@kernel()
+def copy_rows(source, target):
+    """Copy rows of three numbers; numba's ``target[:] = source`` takes seconds to compile, for its errors."""
+    for r in range(source.shape[0]):
+        for k in range(3):
+            target[r, k] = source[r, k]
+
+
 @functools.cache
 def _list_of(item):
     @kernel()

@@ -98,7 +98,7 @@ def book_lengths(t, x, reels, was, length_force, work):
     reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
     for c in range(reels.lengths.size):
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
-    length_force[0] = length_force[1]
+        length_force[0, c] = length_force[1, c]
 
 
 @kernel()

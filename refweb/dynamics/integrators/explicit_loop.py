@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ...kernels import kernel
+from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...results.probes import PLACE
 from .energy_book import begin_powers, book_energies, book_lengths, book_motion, book_powers, drifts_away, note_motion
@@ -27,6 +27,7 @@ from .step import (
     kick_and_drift,
     last_kick,
     move_supports,
+    note_state,
     set_lengths,
     set_reaction,
     viscous_kick,
@@ -89,22 +90,21 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse = running.x, running.v, running.f, running.work, running.impulse
-    extremes, power, length_force = running.extremes, running.power, running.length_force
-    values = extremes.values
+    extremes, values = running.extremes, running.extremes.values
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers = families.still, families.viscous, families.powers
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
     signs, followed, sums = observed.signs, observed.followed, observed.sums
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    rows, where, reaction = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3)
+    rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
-    before = np.empty((driven.size, 7))
     half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(reels.lengths.size if changing else 0)
     extra = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looks = stages > 0 and followed.size + sums.shape[0] > 0
     space = np.empty((6, rows if looks else 0, 3))
     inside = Inside(space[:3], space[3:], np.empty_like(lines) if looks else lines)
+    power, length_force = running.power, running.length_force
     begun, start, moved, awaited = clock.begun, clock.time, driven.size > 0, running.events.shape[0] > 0
     if begun == 0:
         begin_powers(start, x, v, extra, families, power)
@@ -114,7 +114,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     for step in range(1, count + 1):
         now = start + (begun + step) * h
         if looks:
-            inside.before[0], inside.before[1], inside.before[2] = x, v, inverse * f
+            note_state(x, v, f, inverse, inside.before)
         if stages:
             inner_stages(now, h, scheme, model, running, reaction)
         if moved:
@@ -123,7 +123,8 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         if moved:
             move_supports(now, x, v, f, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            was[:] = reels.lines[:, LENGTH]
+            for c in range(was.size):
+                was[c] = reels.lines[c, LENGTH]
             set_lengths(now, reels, data[0])
             book_lengths(now, x, reels, was, length_force, work)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
@@ -194,13 +195,16 @@ def write_row(row, model, observed, running, total):
         running.work, families.working, total,
     )  # fmt: skip
     total[-1] = clock.step
-    stored, energy = np.abs(total[:-2]).sum(), total[:-2].sum()
+    stored = energy = 0.0
+    for i in range(total.size - 2):
+        stored, energy = stored + abs(total[i]), energy + total[i]
     for i in range(families.working.size):
         if families.working[i] > 0:
             stored -= abs(total[i])
             energy -= total[i]
-    row[at : at + total.size] = total
-    at += total.size
+    for i in range(total.size):
+        row[at] = total[i]
+        at += 1
     for k in range(3):
         row[at + k], row[at + 3 + k] = 0.0, running.impulse[k]
         for r in range(inertia.linear):
@@ -227,7 +231,9 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
         changing = corners.size > 2 and corners[0] < times[n] and corners[-3] > clock.time
         if interval > 0.0:
             if not begun:
-                before[0], before[1], before[2] = running.x, running.v, running.f
+                copy_rows(running.x, before[0])
+                copy_rows(running.v, before[1])
+                copy_rows(running.f, before[2])
                 steps = steps_of_row(times[n], changing, scheme, model, running)
                 if steps > MAX_STEPS_PER_ROW:
                     clock.step = interval / steps

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...kernels import kernel
+from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 
 ROUNDS = 100
@@ -60,7 +60,7 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
     first one, and the method of order 2. The iteration contracts with ½ h C/m, and ends at rounding; friction that has
     grown may take more than 30 rounds, and what `ROUNDS` leave shows in the energy book.
     """
-    half[:] = v
+    copy_rows(v, half)
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
     flat_v, flat_f = v.reshape(-1), f.reshape(-1)
     share, before_that = 1.0, math.inf
@@ -92,11 +92,20 @@ def move_supports(t, x, v, f, kernels, cells, data, outs):
 @kernel()
 def set_lengths(t, reels, lines):
     """Give the elements that change their natural lengths at time t, in the numbers of all ``lines``."""
-    reels.lines[:, LENGTH] = reels.lengths
+    for c in range(reels.lengths.size):
+        reels.lines[c, LENGTH] = reels.lengths[c]
     for i in range(len(reels.kernels)):
         reels.kernels[i](t, reels.lines, reels.cells[i], reels.data[i])
     for c in range(reels.elements.size):
         lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
+
+
+@kernel()
+def note_state(x, v, f, inverse, old):
+    """Write position, velocity and acceleration, of which a long step begins."""
+    for r in range(x.shape[0]):
+        for k in range(3):
+            old[0, r, k], old[1, r, k], old[2, r, k] = x[r, k], v[r, k], inverse[r, k] * f[r, k]
 
 
 @kernel(forceinline=True)
