@@ -113,8 +113,15 @@ class Watch:
         return np.column_stack([*columns, unit.momentum, unit.impulse])
 
     def table(self, history):
-        """Rows of a `History` as rows of ``history.csv``, shape (rows, columns)."""
-        return history.values @ self._weights
+        """Rows of a `History` as rows of ``history.csv``, shape (rows, columns).
+
+        Each row is summed in one order, however many rows there are; a product of matrices is not.
+        """
+        table = np.zeros((len(history.values), len(self.columns)))
+        for column, shares in zip(history.values.T, self._weights, strict=True):
+            used = np.flatnonzero(shares)
+            table[:, used] += column[:, None] * shares[used]
+        return table
 
     def of_observables(self, table):
         """Time and observables alone of rows of ``history.csv``."""

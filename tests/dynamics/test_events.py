@@ -65,7 +65,7 @@ def test_first_touch_of_a_flying_ball(solve):
         [refweb.Event(name="touch", kind="contact"), refweb.Event(name="same", kind="contact", body="ball")],
         solve,
         duration=0.05,
-        web=refweb.Window(mesh="square", rows=4, columns=4, side=0.2),
+        web=refweb.Window(mesh="square", rows=2, columns=2, side=0.2),
         cable=cable(density=200.0),
         effects=[ball(), refweb.Contact(stiffness=1e5)],
     )

@@ -23,6 +23,9 @@ def paper(mesh, law, **changes):
     return nets.system(web, cable(law, **changes), [LOAD])
 
 
+MESHES = ["triangle", "square", pytest.param("hexagon", marks=pytest.mark.slow)]
+
+
 def both(system, steps=(1.0,)):
     return list(load_steps.solve(system, steps)), list(relaxation.solve(system, steps))
 
@@ -33,7 +36,7 @@ def residual(system, state):
     return np.linalg.norm(force, axis=1).max() / max(1.0, state.tension.max())
 
 
-@pytest.mark.parametrize("mesh", ["triangle", "square", "hexagon"])
+@pytest.mark.parametrize("mesh", MESHES)
 def test_tensions_agree_within_both_certificates(mesh):
     """Each certificate bounds the distance to the one exact tension, so that their sum bounds the difference."""
     system = paper(mesh, "tension-only")
@@ -45,7 +48,7 @@ def test_tensions_agree_within_both_certificates(mesh):
     assert bound.max() < 1e-3 * newton.tension.max()
 
 
-@pytest.mark.parametrize("mesh", ["triangle", "square", "hexagon"])
+@pytest.mark.parametrize("mesh", MESHES)
 def test_the_smooth_law_has_one_minimum(mesh):
     """Where all pivots of the tangent are positive the equilibrium is isolated, and both find it."""
     system = paper(mesh, "smooth", smoothing=1e-4)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, OpenBook, SolverError
-from .energy_book import DRIFT, refuse_open
+from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
 from .explicit_loop import BREATH, LOOKS, advance_rows, begin, first_wrong
 from .extremes import Extremes
@@ -28,7 +28,7 @@ from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
-SHARED = CLOCK.names[:-2]
+SHARED = CLOCK.names[:-3]
 """Numbers that a course and the loop's clock have in common."""
 
 
@@ -153,7 +153,7 @@ class CentralDifference(Integrator):
         extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         extremes.recent[:, 3] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
-        book = dict(work=work, energy=own.sum(), largest=np.abs(own).sum())
+        book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), least_energy(system.net)))
         return ExplicitCourse(time=0.0, x=x, v=v, force=force, extremes=extremes, events=events, **book)
 
     def save(self, course):
@@ -210,7 +210,7 @@ class CentralDifference(Integrator):
         times = np.atleast_1d(np.asarray(times, dtype=float))
         history = History.empty(len(times), len(self.observed[0]), self.system.families)
         work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
-        start, done, breath = course.time, 0, max(BREATH // max(work, 1), 1)
+        done, breath = 0, max(BREATH // max(work, 1), 1)
         records = self._scheme, self._model, self._observed, self._running(course)
         clock = records[-1].clock
         try:
@@ -236,10 +236,10 @@ class CentralDifference(Integrator):
         if done and course.stopped and history.time[done - 1] == course.time:
             return history[:done]
         if done < len(times):
-            before = times[done - 1] if done else start
+            since = float(clock[0]["since"])
             if not np.isfinite(history.values[done]).all():
-                self._name_blow_up(course, before, records[-1])
-            self._name_drift(course, before)
+                self._name_blow_up(course, since, records[-1])
+            self._name_drift(course, since)
         return history
 
     def _name_blow_up(self, course, before, running):

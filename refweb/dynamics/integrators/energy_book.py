@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...errors import OpenBook
 from ...kernels import ENERGY, kernel
-from ...net.net import LENGTH
+from ...net.net import AXIAL_STIFFNESS, LENGTH
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -17,6 +19,15 @@ CLOSING = 0.9
 """Factor by which a drift above `DRIFT` has to fall from row to row, over the largest energy until then, for the run to
 go on: where a load rises from zero on a web at rest, the first rows hold a few steps' errors against next to nothing.
 """
+
+
+def least_energy(net):
+    """The energy that a drift is held against at least [J]: what strains of a few roundings are worth, over `DRIFT`.
+
+    A web at rest whose lines have exactly their natural length moves by its rounding alone, and books nothing else.
+    """
+    lines = net.line_data
+    return float(0.5 * (lines[:, AXIAL_STIFFNESS] * lines[:, LENGTH]).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
 
 
 def refuse_open(course, limit, remedy):

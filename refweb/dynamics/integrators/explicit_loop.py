@@ -30,12 +30,15 @@ from .step import (
     note_state,
     set_lengths,
     set_reaction,
+    turn_supports,
     viscous_kick,
 )
 from .step_bound import safe_step
 
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
+ROUNDING = 1e-12
+"""Share of a time within which another is the same."""
 LOOKS = 4
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
 
@@ -91,6 +94,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse = running.x, running.v, running.f, running.work, running.impulse
     extremes, values = running.extremes, running.extremes.values
+    power, length_force, moved = running.power, running.length_force, driven.size > 0
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers = families.still, families.viscous, families.powers
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
@@ -102,10 +106,9 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     extra = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looks = stages > 0 and followed.size + sums.shape[0] > 0
-    space = np.empty((6, rows if looks else 0, 3))
+    space, aside = np.empty((6, rows if looks else 0, 3)), np.empty((rows if moved else 0, 3))
     inside = Inside(space[:3], space[3:], np.empty_like(lines) if looks else lines)
-    power, length_force = running.power, running.length_force
-    begun, start, moved, awaited = clock.begun, clock.time, driven.size > 0, running.events.shape[0] > 0
+    begun, start, awaited = clock.begun, clock.time, running.events.shape[0] > 0
     if begun == 0:
         begin_powers(start, x, v, extra, families, power)
         if changing:
@@ -121,7 +124,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_motion(driven, mass, x, v, f, before)
         kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
         if moved:
-            move_supports(now, x, v, f, motions.kernels, motions.cells, motions.data, motions.outs)
+            move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
             for c in range(was.size):
                 was[c] = reels.lines[c, LENGTH]
@@ -160,7 +163,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
 
 
 @kernel()
-def steps_of_row(end, changing, scheme, model, running):
+def steps_until(end, changing, scheme, model, running):
     """Number of steps that the bound, or the step size, asks for until ``end``, not yet rounded."""
     interval, time = end - running.clock[0].time, running.clock[0].time
     if scheme.step_size > 0.0:
@@ -177,6 +180,24 @@ def steps_of_row(end, changing, scheme, model, running):
 
 
 @kernel()
+def energies_now(model, running, total):
+    """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
+    clock, families = running.clock[0], model.families
+    book_energies(
+        clock.time, running.x, running.v, model.inertia.mass, families.cells, families.data, families.energies,
+        families.stored, running.work, families.working, total,
+    )  # fmt: skip
+    stored = energy = 0.0
+    for i in range(total.size - 2):
+        stored, energy = stored + abs(total[i]), energy + total[i]
+    for i in range(families.working.size):
+        if families.working[i] > 0:
+            stored -= abs(total[i])
+            energy -= total[i]
+    return energy, stored
+
+
+@kernel()
 def write_row(row, model, observed, running, total):
     """Write time, probes, energies, work, step size, momentum and impulse of the supports.
 
@@ -190,18 +211,8 @@ def write_row(row, model, observed, running, total):
             clock.time, running.x, v, running.f, families.outs[0], observed.rows[i], observed.data[i], where
         )  # fmt: skip
         at += 1
-    book_energies(
-        clock.time, running.x, v, inertia.mass, families.cells, families.data, families.energies, families.stored,
-        running.work, families.working, total,
-    )  # fmt: skip
+    energy, stored = energies_now(model, running, total)
     total[-1] = clock.step
-    stored = energy = 0.0
-    for i in range(total.size - 2):
-        stored, energy = stored + abs(total[i]), energy + total[i]
-    for i in range(families.working.size):
-        if families.working[i] > 0:
-            stored -= abs(total[i])
-            energy -= total[i]
     for i in range(total.size):
         row[at] = total[i]
         at += 1
@@ -214,46 +225,72 @@ def write_row(row, model, observed, running, total):
 
 
 @kernel()
+def plan(end, changing, scheme, model, running):
+    """Begin the way to ``end``: note the state there, and plan its steps; whether they are few enough."""
+    clock, before, span = running.clock[0], running.before, end - running.clock[0].time
+    copy_rows(running.x, before[0])
+    copy_rows(running.v, before[1])
+    copy_rows(running.f, before[2])
+    steps = steps_until(end, changing, scheme, model, running)
+    if steps > MAX_STEPS_PER_ROW:
+        clock.step = span / steps
+        return False
+    clock.planned = max(int(math.ceil(max(steps, scheme.least) * (1.0 - 1e-9))), 1)
+    if scheme.finer > 1.0:
+        clock.planned = int(math.ceil(scheme.finer * clock.planned))
+    return True
+
+
+@kernel()
+def end_of_steps(corners, time, row):
+    """The next corner of a table behind a time, not beyond ``row``; either is met within rounding."""
+    for n in range(corners.size):
+        if corners[n] > time * (1.0 + ROUNDING):
+            return corners[n] if corners[n] < row * (1.0 - ROUNDING) else row
+    return row
+
+
+@kernel()
 def advance_rows(times, breath, limit, scheme, model, observed, running, history):
-    """Advance to each of some times, in equal steps, and write a row of ``history`` there.
+    """Advance to each of some times, and write a row of ``history`` there.
+
+    Equal steps lead to each, or to each corner of a table on the way: no step passes one.
 
     Returns the rows that are done: fewer than asked for where a number is not finite, or the drift is above ``limit``
-    and does not fall; then ``before`` holds x, v and f at the row before; −1 where a row takes more than
-    `MAX_STEPS_PER_ROW` steps. Where an event ends the run, that row is the last, and its time that of the event. After
-    ``breath`` steps it returns as well, so that an interruption is felt, and goes on in that row.
+    and does not fall; then ``before`` holds x, v and f at the last corner or row before, of the time ``since``; −1
+    where it takes more than `MAX_STEPS_PER_ROW` steps from there. Where an event ends the run, that row is the last,
+    and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is felt, and goes
+    on in that row.
     """
-    clock, events, before, left = running.clock[0], running.events, running.before, breath
-    corners, total, stopped = model.reels.corners, np.zeros(running.work.size + 2), ended_by(events)
+    clock, events, reels, left = running.clock[0], running.events, model.reels, breath
+    total, stopped = np.zeros(running.work.size + 2), ended_by(events)
     for n in range(times.size):
-        interval, begun = times[n] - clock.time, clock.begun
-        if model.reels.lengths.size and not begun:
-            set_lengths(clock.time, model.reels, model.families.data[0])
-        changing = corners.size > 2 and corners[0] < times[n] and corners[-3] > clock.time
-        if interval > 0.0:
+        while clock.time < times[n] and not stopped:
+            end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
+            if reels.lengths.size and not begun:
+                set_lengths(clock.time, reels, model.families.data[0])
+            changing = reels.corners.size > 2 and reels.corners[0] < end and reels.corners[-3] > clock.time
             if not begun:
-                copy_rows(running.x, before[0])
-                copy_rows(running.v, before[1])
-                copy_rows(running.f, before[2])
-                steps = steps_of_row(times[n], changing, scheme, model, running)
-                if steps > MAX_STEPS_PER_ROW:
-                    clock.step = interval / steps
+                clock.since = clock.time
+                if not plan(end, changing, scheme, model, running):
                     return -1
-                clock.planned = max(int(math.ceil(max(steps, scheme.least) * (1.0 - 1e-9))), 1)
-                if scheme.finer > 1.0:
-                    clock.planned = int(math.ceil(scheme.finer * clock.planned))
-            clock.step = total[-1] = interval / clock.planned
+            clock.step = total[-1] = (end - clock.time) / clock.planned
             count = min(clock.planned - begun, max(left, 1))
             taken = take_steps(count, clock.step, changing, scheme, model, observed, running, total)
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
-            if clock.begun < clock.planned:
-                if not stopped:
-                    return n
-                clock.time += clock.begun * clock.step
-            else:
-                clock.time = times[n]
+            if clock.begun < clock.planned and not stopped:
+                return n
+            clock.time = end if clock.begun == clock.planned else clock.time + clock.begun * clock.step
             clock.begun = 0
+            if model.inertia.driven.size:
+                turn_supports(clock.time, model, running)
+            if clock.time < times[n]:  # a corner: what is stored may be gone again at the row
+                largest = energies_now(model, running, total)[1]
+                if not math.isfinite(largest):
+                    break
+                clock.largest = max(clock.largest, largest)
         energy, stored = write_row(history[n], model, observed, running, total)
         if drifts_away(clock, energy, stored, total[-2], limit):
             return n
@@ -284,9 +321,9 @@ def begin(x, v, f, model, observed, extremes, work, total):
 
 @kernel()
 def first_wrong(scheme, model, observed, running):
-    """Replay the last row from ``before`` step by step: (steps, row) of the first number that is not finite.
+    """Replay steps from ``before``: how many, and the row, until the first number is not finite.
 
-    The row is −1 where there is none. The clock stands at the start of the row, with its step and the steps planned.
+    The row is −1 where there is none. The clock stands where they begin, with their size and the number planned.
     """
     clock, total, changing = running.clock[0], np.zeros(running.work.size + 2), model.reels.lengths.size > 0
     if changing:

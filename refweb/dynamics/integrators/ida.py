@@ -75,7 +75,7 @@ class Ida(Sundials):
 
     method = "ida"
     variants = {"ida": Variant(kind="bdf")}
-    takes_massless = takes_links = True
+    takes_massless = takes_links = restarts = True
     course_type = LinkedCourse
 
     def __init__(self, system, *observed, max_order=2, linear_solver="auto", **tolerances):

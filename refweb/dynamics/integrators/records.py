@@ -16,6 +16,7 @@ from ...results.probes import INTEGERS, PROBE
 from .energy_book import no_energy
 from .extremes import Extremes
 from .step_bound import no_bound
+from .step_limits import corners
 
 CLOCK = np.dtype(
     [
@@ -26,12 +27,13 @@ CLOCK = np.dtype(
         ("largest", float),
         ("worst", float),
         ("share", float),
+        ("since", float),
         ("begun", np.int64),
         ("planned", np.int64),
     ]
 )
 """Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.Course` by their names, then the
-steps taken of a row, 0 between rows, and the steps of it."""
+time from which steps are equal, the number of these that are taken, 0 where none are, and that of all."""
 
 
 @record
@@ -222,17 +224,18 @@ class Reels(NamedTuple):
 
 @record
 class Model(NamedTuple):
-    """A system as the loop sees it."""
+    """A system as the loop sees it; ``corners`` are the times at which a table has one [s], increasing."""
 
     inertia: Inertia
     families: Families
     motions: Motions
     reels: Reels
+    corners: np.ndarray
 
     @classmethod
     def of(cls, system):
         """That of a `refweb.system.system.System`."""
-        return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system))
+        return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system), corners(system))
 
 
 @record

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import OpenBook, SolverError
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
-from .energy_book import CLOSING, DRIFT, book_energies, no_energy
+from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
 
 UNEVEN = 1e-3
 """Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
@@ -221,12 +221,16 @@ class SimpsonBook:
     def open(self, course, energies):
         """Note the energy at the start of a course."""
         own = self._own(energies)
-        course.energy, course.largest = own.sum(), np.abs(own).sum()
+        course.energy, course.largest = own.sum(), max(np.abs(own).sum(), least_energy(self.system.net))
+
+    def note_largest(self, course, energies):
+        """Note the largest energy of a course."""
+        course.largest = max(course.largest, np.abs(self._own(energies)).sum())
 
     def close(self, course, energies, before, remedy):
         """Hold the energies at a row against the work; `OpenBook` where the drift is large and does not fall."""
         own, work = self._own(energies), energies[-2]
-        course.largest = max(course.largest, np.abs(own).sum())
+        self.note_largest(course, energies)
         drift = abs(own.sum() - work - course.energy)
         course.worst = max(course.worst, drift)
         share = drift / course.largest if course.largest > 0.0 else drift

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 
@@ -83,10 +85,36 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
 
 
 @kernel(forceinline=True)
-def move_supports(t, x, v, f, kernels, cells, data, outs):
-    """Write prescribed positions and velocities."""
+def move_supports(t, h, x, v, f, aside, kernels, cells, data, outs):
+    """Write prescribed positions at the end of a step, and velocities in it: at its end they may jump."""
     for i in range(len(kernels)):
         kernels[i](t, x, v, f, cells[i], data[i], outs[i])
+        kernels[i](t - 0.5 * h, aside, v, f, cells[i], data[i], outs[i])
+
+
+@kernel()
+def turn_supports(t, model, running):
+    """Write prescribed velocities behind a corner at time t, with the forces that follow from velocity.
+
+    What the kinetic energy of the supports gains is work of their motion; the rows of a history show what is behind.
+    """
+    driven, mass, families, motions = model.inertia.driven, model.inertia.mass, model.families, model.motions
+    x, v, f, forces, cells, data = running.x, running.v, running.f, families.forces, families.cells, families.data
+    was, turned = np.empty((driven.size, 3)), False
+    for d in range(driven.size):
+        for k in range(3):
+            was[d, k] = v[driven[d], k]
+    for i in range(len(motions.kernels)):
+        motions.kernels[i](t, x, v, f, motions.cells[i], motions.data[i], motions.outs[i])
+    for d in range(driven.size):
+        for k in range(3):
+            now = v[driven[d], k]
+            running.work[running.work.size - 1] += 0.5 * mass[driven[d]] * (now + was[d, k]) * (now - was[d, k])
+            turned = turned or now != was[d, k]
+    if turned and families.viscous.size:
+        f[:] = 0.0
+        for i in range(len(forces)):
+            forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
 
 
 @kernel()

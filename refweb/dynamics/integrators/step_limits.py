@@ -9,6 +9,12 @@ TRAVEL = 0.2
 are further away, half of that distance."""
 
 
+def corners(system):
+    """Times at which a table of a `refweb.system.system.System` has a corner [s], increasing."""
+    times = [t for part in (*system.families, *system.drives, *system.line_drives) for t in part.times]
+    return np.unique(np.array(times, dtype=float))
+
+
 class StepLimits:
     """The limits of steps of one system.
 
@@ -20,11 +26,14 @@ class StepLimits:
 
     def __init__(self, system):
         self._net, self._moving = system.net, system.rows - system.net.spins
-        times = [t for part in (*system.families, *system.drives, *system.line_drives) for t in part.times]
-        self._corners = np.unique(np.array(times, dtype=float))
+        self._corners = corners(system)
         bodies = system.net.bodies
         self._thickness = min((body.thickness for body in bodies), default=np.inf)
         self._outreach = np.array([body.radius + np.linalg.norm(body.core) for body in bodies])
+
+    def at_corner(self, t):
+        """Whether a table has a corner at a time [s]."""
+        return bool((np.abs(self._corners - t) <= 1e-12 * t).any())
 
     def stop(self, t, x, v, end):
         """Time that a step from a state must not pass, on the way to ``end`` [s]; infinite where nothing limits it."""

@@ -88,7 +88,7 @@ class StepObserver(Integrator):
     knob, retry, beside = "rtol", 0.1, False
     breathe = staticmethod(lambda t: None)
     course_type = ObservedCourse
-    takes_massless = takes_links = False
+    takes_massless = takes_links = restarts = False
     """Whether nodes without mass have a place in the method's equations, and rigid links."""
 
     def __new__(cls, *observed, **keys):
@@ -274,6 +274,8 @@ class StepObserver(Integrator):
     def _take_step(self, course, end):
         """One step of the method, not beyond a corner of a table, nor further than a body can be passed."""
         stop = self._limits.stop(course.time, course.x, course.v, end)
+        if self.restarts and course.nsteps and self._limits.at_corner(course.time):
+            self._enter(course)
         self._wrong = None
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
         with self._told(course):
@@ -320,6 +322,8 @@ class StepObserver(Integrator):
         course.work, course.impulse = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind
+        if self._limits.at_corner(course.time):  # what is stored there may be gone again at the row
+            self._book.note_largest(course, self._book.energies(piece.end, course.work, course.step))
         if piece.jump and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(course)
 

@@ -1,0 +1,118 @@
+"""Tables of time that are shorter than a step: a pulse of any width gives its impulse, in every method.
+
+Each scene has one mass that flies off, at rest until a pulse at `BEGIN`, so that its speed is impulse over mass.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import refweb
+
+BEGIN = 0.0123
+"""Start of a pulse [s], at no multiple of steps or rows."""
+EA, MASS, LENGTH = 200.0, 0.5, 1.0
+METHODS = {
+    "central-difference": dict(method="central-difference"),
+    "auto": dict(method="auto"),
+    "cvode": dict(method="cvode", rtol=1e-8),
+    "ida": dict(method="ida", rtol=1e-8),
+}
+WITHIN = {"central-difference": 0.0, "auto": 0.0, "cvode": 1e-3, "ida": 1e-3}
+"""Error of a speed over itself: the implicit methods' sum of a hundred steps inside the pulse at their tolerance."""
+
+
+def triangle(width, height, base=0.0):
+    """Rows of a table: up and down within twice the width."""
+    return [(BEGIN, base), (BEGIN + width, base + height), (BEGIN + 2.0 * width, base)]
+
+
+def flight(method, effects, observe=(), points=((0, 0, 0), (LENGTH, 0, 0)), **changes):
+    """A line from a support to a free mass, stressless and without mass of its own that counts."""
+    web = refweb.Inline(points=[list(p) for p in points], lines=[[0, 1]], supports=[0])
+    return refweb.run(
+        refweb.Scene(
+            web=web,
+            cable=refweb.Cable(law="tension-only", modulus=EA / 1e-4, area=1e-4, density=1e-6),
+            effects=[refweb.PointMass(node=1, mass=MASS), *effects],
+            solve=refweb.Dynamic(duration=0.03, **METHODS[method], **changes),
+            output=refweb.Output(interval=0.01),
+            observe=[refweb.Observe(name="speed", quantity="velocity", node=1, reduce="final"), *observe],
+        )
+    )
+
+
+def speed_is(solution, truth, method, width, more=0.0):
+    """± contains the truth, and the error is that of the method and of the rounding of the table's times."""
+    result = solution.reduced["speed"]
+    rounding = 4.0 * np.spacing(BEGIN) / width
+    off = abs(result.value - truth)
+    assert off <= (WITHIN[method] + rounding + 1e-9 + more) * truth, (result, truth)
+    assert off <= result.error + (rounding + 1e-9 + more) * truth, (result, truth)
+    assert result.error <= 5e-3 * truth + 1e3 * rounding * truth
+
+
+@pytest.mark.parametrize("width", [1e-5, 1e-8])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_load(method, width):
+    """∫F dt/m, towards the support, where the line is slack."""
+    load = refweb.Load(node=1, force=(-1.0, 0.0, 0.0), factor=triangle(width, 0.1 * MASS / width))
+    speed_is(flight(method, [load]), 0.1, method, width, 1e-6)
+
+
+@pytest.mark.parametrize("width", [1e-5, 1e-8])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_motion(method, width):
+    """The support pulls at the line for a moment: EA/L ∫u dt/m; what the mass moves meanwhile is (ωw)² of it."""
+    height = 0.01 * LENGTH * MASS / (EA * width) * (1e-3 if width > 1e-6 else 1e-6)
+    motion = refweb.Motion(node=0, displacement=[(t, -u, 0.0, 0.0) for t, u in triangle(width, height)])
+    atol = {} if METHODS[method]["method"] in ("auto", "central-difference") else dict(atol_velocity=1e-13)
+    truth = EA / LENGTH * height * width / MASS
+    speed_is(flight(method, [motion], **atol), truth, method, width, EA / MASS * width**2)
+
+
+@pytest.mark.parametrize("width", [1e-5, 1e-8])
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kind", ["reel", "temperature"])
+def test_natural_lengths(method, kind, width):
+    """EA ∫(1/n − 1) dt/m of the factor n = 1 − a s: 2 w (−ln(1 − a)/a − 1)."""
+    a = 1e-3
+    factor = triangle(width, -a, 1.0)
+    if kind == "reel":
+        effect = refweb.Reel(lines="all", factor=factor)
+    else:
+        effect = refweb.Temperature(expansion=1e-3, change=[(t, 1e3 * (n - 1.0)) for t, n in factor])
+    truth = EA * 2.0 * width * (-math.log(1.0 - a) / a - 1.0) / MASS
+    atol = {} if METHODS[method]["method"] in ("auto", "central-difference") else dict(atol_velocity=1e-6 * truth)
+    speed_is(flight(method, [effect], **atol), truth, method, width, EA / MASS * width**2 / a + a)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("kind", ["pressure", "thrust"])
+def test_follower_loads(method, kind):
+    """Of a line that has not yet turned: half of p L, and the thrust along it, times the time."""
+    width, speed = 1e-8, 0.1
+    factor = triangle(width, speed * MASS / width)
+    if kind == "pressure":
+        effect = refweb.Pressure(lines="all", normal=(0.0, 0.0, 1.0), value=2.0 / LENGTH, factor=factor)
+    else:
+        effect = refweb.Thrust(node=1, line=0, force=1.0, factor=factor)
+    # It then turns with speed/L, or flies to the support, where the slack line does not feel it.
+    solution = flight(method, [effect])
+    stretch = (speed * 0.02) ** 4 * EA / MASS if kind == "pressure" else 0.0
+    speed_is(solution, speed, method, width, 1e-6 + stretch / speed**2)
+
+
+def moved_and_loaded(method, **changes):
+    """Energy drift where a node that carries a constant load is moved, with corners between rows and between steps."""
+    table = [(0.0, 0.0, 0.0, 0.0), (0.01013, 0.0, 0.0, 0.2), (0.01771, 0.0, 0.0, 0.05), (0.05, 0.0, 0.0, 0.05)]
+    effects = [refweb.Motion(node=0, displacement=table), refweb.Load(node=0, force=(0.0, 0.0, 30.0))]
+    return flight(method, effects, **changes).solver["energy_drift"]
+
+
+def test_work_on_a_loaded_node_that_is_moved():
+    """Work is force times displacement, whatever the velocity does at a corner: the book closes to the order, 2."""
+    coarse, fine = (moved_and_loaded("central-difference", step_size=step) for step in (2e-4, 1e-4))
+    assert 3.0 < coarse / fine < 5.0 and fine < 1e-3
+    assert all(moved_and_loaded(method) < 1e-5 for method in ("cvode", "ida"))
