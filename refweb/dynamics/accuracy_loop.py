@@ -98,7 +98,7 @@ def run_within_drift(simulation, folder, tell):
     if ended is not None:
         from .twin_error import add_errors
 
-        rows = simulation.watch.of_observables(np.array(simulation.rows) if folder is None else folder.rows())
+        rows = simulation.compared(folder)
         add_errors(solution, run, ended, rows, simulation.integrator.error_share(run.course, ended.course))
     elif twin:
         solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")

@@ -11,6 +11,8 @@ import numpy as np
 BLOCK = 0.1
 """Time that a block of rows is meant to take [s]: between two of them a run can be interrupted, and tells where it is.
 """
+COMPARED = 50
+"""Least number of times at which a run and its twin are compared, whatever the interval of its rows."""
 MOST_ROWS = 10_000
 """Largest number of rows of a block."""
 
@@ -24,16 +26,20 @@ class Schedule(NamedTuple):
         Times of the history rows [s].
     frames : ndarray of int
         Numbers of the rows that frames are written at, the last row at least.
+    between : ndarray
+        Times between rows at which a run is compared with its twin [s]; none where rows are many.
     """
 
     times: np.ndarray
     frames: np.ndarray
+    between: np.ndarray = np.zeros(0)
 
     @classmethod
     def of(cls, scene):
         """That of a scene: the rows of its interval, and a frame every ``frames`` rows and at the end."""
-        times = row_times(scene)
-        return cls(times, np.unique(np.append(np.arange(0, len(times), scene.output.frames), len(times) - 1)))
+        times, compared = row_times(scene), scene.accuracy.error != "none"
+        frames = np.unique(np.append(np.arange(0, len(times), scene.output.frames), len(times) - 1))
+        return cls(times, frames, times_between(times) if compared else np.zeros(0))
 
 
 def row_times(scene):
@@ -47,11 +53,42 @@ def row_times(scene):
     return times
 
 
+def times_between(times):
+    """Times that cut rows which are fewer than `COMPARED` into about as many parts [s], equal in each row."""
+    parts = -(-COMPARED // max(len(times) - 1, 1))
+    shares = np.arange(1, parts) / parts
+    return (times[:-1, None] + shares * np.diff(times)[:, None]).ravel()
+
+
 class Block(NamedTuple):
-    """Rows that an integrator has come through at once: the number of the first, and its history of all of them."""
+    """Rows that an integrator has come through at once.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first row.
+    history : refweb.dynamics.integrators.integrator.History
+        All of them.
+    compared : refweb.dynamics.integrators.integrator.History
+        The same and, where rows are few, what lies between them.
+    """
 
     first: int
     history: object
+    compared: object
+
+
+def _block(integrator, course, schedule, first, count):
+    """Advance through ``count`` rows from ``first`` on."""
+    rows = schedule.times[first : first + count]
+    if not len(schedule.between):
+        history = integrator.advance(course, rows)
+        return Block(first, history, history)
+    between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
+    history = integrator.advance(course, np.sort(np.concatenate([rows, between])))
+    shown = np.isin(history.time, rows)
+    shown[-1] = True  # where an event ends the run, its row is that of the event
+    return Block(first, history[shown], history)
 
 
 def blocks(integrator, course, schedule, first=0):
@@ -83,7 +120,7 @@ def blocks(integrator, course, schedule, first=0):
         stop = schedule.frames[np.searchsorted(schedule.frames, first)]
         count = min(size, stop + 1 - first)
         began = time.perf_counter()
-        yield Block(first, integrator.advance(course, times[first : first + count]))
+        yield _block(integrator, course, schedule, first, count)
         first += count
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.5 * BLOCK else int(size * BLOCK / spent), MOST_ROWS))

@@ -68,7 +68,7 @@ class Simulation:
             scene, self._choice = scene.replace(solve=chosen.solve), {"choice": chosen.reason}
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
-        self.rows, self._kept = [], kept
+        self.rows, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self.standing = Standing.of(getattr(scene.solve, INTEGRATORS[scene.solve.method].knob), kept)
         self.integrator = self.integrator_at(self.standing.knob)
@@ -128,8 +128,10 @@ class Simulation:
         tell(ahead / len(times))
         integrator.breathe = lambda t: tell(t / times[-1])
         try:
-            for first, history in blocks(integrator, course, self.schedule, ahead):
+            for first, history, compared in blocks(integrator, course, self.schedule, ahead):
                 table = self.watch.table(history)
+                if len(self.schedule.between):
+                    self._compared += self.watch.of_observables(self.watch.table(compared)).tolist()
                 last = first + len(table) - 1
                 if folder is None:
                     self.rows += table.tolist()
@@ -144,9 +146,15 @@ class Simulation:
             self._note(course)
         return Ended(self.watch.results(course, self.rows[-1]), course)
 
+    def compared(self, folder):
+        """Rows that are compared with those of a twin: time, then the observables in their order."""
+        if len(self.schedule.between):
+            return np.array(self._compared)
+        return self.watch.of_observables(np.array(self.rows) if folder is None else folder.rows())
+
     def again(self, folder):
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
-        self.integrator, self.rows = self.integrator_at(self.standing.knob), []
+        self.integrator, self.rows, self._compared = self.integrator_at(self.standing.knob), [], []
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -157,8 +165,9 @@ class Simulation:
             return self.integrator.start(*self.begin), 0
         own = {key.removeprefix("run_"): array for key, array in self._kept.items() if key.startswith("run_")}
         course, row = self.integrator.load(own), int(self._kept["row"])
+        self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
         self._kept, self.rows = None, [folder.last_row()]
-        times, frames = self.schedule
+        times, frames = self.schedule.times, self.schedule.frames
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
         return course, len(times) if course.stopped else row + 1
 
@@ -186,7 +195,8 @@ class Simulation:
             return
         kept = {f"run_{name}": array for name, array in self.integrator.save(course).items()}
         kept |= {f"begin_{name}": array for name, array in self.begin._asdict().items() if array is not None}
-        folder.frame(number, state, run=kept | {"row": number} | self.standing.arrays())
+        kept |= {"row": number} | self.standing.arrays()
+        folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
     def remarks(self):
         """What a reader of the results has to know."""

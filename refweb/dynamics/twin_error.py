@@ -82,7 +82,7 @@ class Twin:
             integrator = made()
             course = integrator.start(*simulation.begin)
             for block in blocks(integrator, course, simulation.schedule):
-                rows.append(simulation.watch.table(block.history))
+                rows.append(simulation.watch.table(block.compared))
                 if self._stop.is_set():
                     return
             self._course, self._table = course, np.concatenate(rows)
@@ -101,12 +101,23 @@ class Twin:
         return TwinRun(watch.results(self._course, self._table[-1]), self._course, watch.of_observables(self._table))
 
 
+def _largest_mean(times, apart, end):
+    """Largest root mean square of differences: from ½ end to end, from ¼ to ½, from ⅛ to ¼, from 0 to ⅛."""
+    largest, starts = 0.0, (0.5, 0.25, 0.125, 0.0)
+    for start, until in zip(starts, (1.0, *starts[:-1]), strict=False):
+        near = (times >= start * end) & (times <= until * end)
+        if near.any():
+            largest = max(largest, float(np.sqrt(np.mean(apart[near] ** 2))))
+    return largest
+
+
 def with_errors(results, twin, own, other, order=2.0):
     """Results with ± from what differs in a run of a smaller error, times ``order`` and `SPREAD`.
 
-    Two runs may agree by chance on a peak, or at the end, where the motion differs otherwise. What counts is the larger
-    of the difference of the result and the mean one, root mean square, of the observable in the rows before: in half
-    the time up to the result. Central differences are of order 2: a run of √2 times the steps has half the error, so
+    Two runs may agree by chance on a peak, or at the end, where the motion differs otherwise; what is constant after
+    contact carries one difference through all rows. What counts is the larger of the difference of the result and the
+    mean one, root mean square, of the observable at the times before: in half the time up to the result, or in half of
+    what is left, wherever it is largest. Central differences are of order 2: a run of √2 times the steps has half the error, so
     that the error is twice the difference where that order holds (``order`` is that factor for the steps really taken).
     The error of CVODE and IDA goes with the tolerance to the power 2/3 at order 2, and faster at higher ones. Higher
     orders count as 2 here: peaks, contact and slack lines leave no more of them, for which the threefold is taken as
@@ -126,9 +137,8 @@ def with_errors(results, twin, own, other, order=2.0):
     same = own[:rows, 0] == other[:rows, 0]
     own, apart = own[:rows][same], np.abs(own[:rows] - other[:rows])[same]
     for i, (name, result) in enumerate(results.items(), 1):
-        near = (own[:, 0] >= 0.5 * result.time) & (own[:, 0] <= result.time)
-        mean = np.sqrt(np.mean(apart[near, i] ** 2)) if near.any() else 0.0
-        error = SPREAD * order * max(abs(result.value - twin[name].value), mean) + 4e-16 * abs(result.value)
+        apart_then = max(abs(result.value - twin[name].value), _largest_mean(own[:, 0], apart[:, i], result.time))
+        error = SPREAD * order * apart_then + 4e-16 * abs(result.value)
         found[name] = result._replace(error=float(error))
     return found
 

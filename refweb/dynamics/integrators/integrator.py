@@ -141,7 +141,7 @@ class History:
         return len(self.values)
 
     def __getitem__(self, rows):
-        """Some of the rows, by a slice."""
+        """Some of the rows, by a slice or a mask."""
         return History(self.names, self.values[rows], self.probed)
 
     @property
