@@ -57,6 +57,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     """
     web = _web(web, folder)
     _check_memory(len(web.lines), cable, effects, solve, output)
+    _check_history(solve, output, len(observables))
     net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported)
@@ -93,6 +94,14 @@ def _check_memory(lines, cable, effects, solve, output):
     more = f", {bodies} bodies" * (bodies > 0) + f" and {steps} load steps" * (steps > 1)
     name = f"[web] {lines} lines with [cable] subdivide = {cable.subdivide}, order = {cable.order}"
     memory.check(size, f"{name}{more}")
+
+
+def _check_history(solve, output, observables):
+    """Refuse a history that does not fit into memory."""
+    if solve.kind == "dynamic":
+        rows = solve.duration / output.interval
+        size = rows * memory.BYTES_PER_ROW * (memory.NUMBERS_PER_ROW + observables)
+        memory.check(size, f"[output] interval = {output.interval:g}: {rows:.3g} rows of {observables} observables")
 
 
 def _supported(net, supports, support):

@@ -14,6 +14,9 @@ from .errors import InputError
 BYTES_EXPLICIT, BYTES_IMPLICIT, BYTES_PER_BODY, BYTES_PER_STATE = 1e3, 6e3, 3e2, 2e2
 """Bytes for each element of order 1: of explicit methods and of others, for each body that it may touch, and of each
 state that is kept."""
+BYTES_PER_ROW, NUMBERS_PER_ROW = 24, 24
+"""Bytes of a number of a history row, of the run and of its twin and while they are put together; and how many numbers
+a row has besides the observables."""
 READING = 10.0
 """Memory to read a mesh file, over its size."""
 

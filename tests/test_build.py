@@ -93,3 +93,17 @@ def test_memory_by_the_knob(method, monkeypatch, knob, explicit):
     monkeypatch.setattr(memory, "needed", lambda lines, order, explicit, *rest: seen.append(explicit) or 0.0)
     build(**{**PARTS, "solve": refweb.Dynamic(method="able", duration=1.0)})
     assert seen == [explicit]
+
+
+def test_a_history_that_does_not_fit_is_refused(monkeypatch):
+    """Before anything is computed: nine million rows of 25 numbers are 1.8 GB, for the run and for its twin."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1e3),
+        solve=refweb.Dynamic(duration=9e3),
+        output=refweb.Output(interval=1e-3),
+    )
+    monkeypatch.setattr(memory, "available", lambda: 2e9)
+    with pytest.raises(InputError, match=r"interval = 0.001: 9e\+06 rows .* must be ≤ 2 GB"):
+        scene.build()
+    scene.replace(output=refweb.Output(interval=0.1)).build()

@@ -50,8 +50,6 @@ class Simulation:
         Where from; that of an equilibrium is known when the run has begun.
     standing : refweb.dynamics.accuracy_loop.Standing
         How accurate runs are, and how often they were repeated.
-    rows : list of list of float
-        Rows of ``history.csv``, where a folder has them the last one alone.
 
     Raises
     ------
@@ -68,7 +66,7 @@ class Simulation:
             scene, self._choice = scene.replace(solve=chosen.solve), {"choice": chosen.reason}
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
-        self.rows, self._compared, self._kept = [], [], kept
+        self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self.standing = Standing.of(getattr(scene.solve, INTEGRATORS[scene.solve.method].knob), kept)
         self.integrator = self.integrator_at(self.standing.knob)
@@ -88,7 +86,12 @@ class Simulation:
     @property
     def done(self):
         """How far it came."""
-        return f"t = {self.rows[-1][0] if self.rows else 0.0:.6g} s"
+        return f"t = {self._tables[-1][-1, 0] if self._tables else 0.0:.6g} s"
+
+    @property
+    def rows(self):
+        """Rows of ``history.csv``, shape (rows, columns); where a folder has them the last one alone."""
+        return np.concatenate(self._tables) if self._tables else np.zeros((0, len(self.columns)))
 
     def integrator_at(self, knob):
         """The integrator that the scene asks for, at a value of its knob."""
@@ -134,9 +137,9 @@ class Simulation:
                     self._compared += self.watch.of_observables(self.watch.table(compared)).tolist()
                 last = first + len(table) - 1
                 if folder is None:
-                    self.rows += table.tolist()
+                    self._tables.append(table)
                 else:
-                    self.rows = [table[-1].tolist()]
+                    self._tables = [table[-1:]]
                     for row in table:
                         folder.row(row)
                 if last in self.schedule.frames or course.stopped:
@@ -144,17 +147,17 @@ class Simulation:
                 tell((last + 1) / len(times))
         finally:
             self._note(course)
-        return Ended(self.watch.results(course, self.rows[-1]), course)
+        return Ended(self.watch.results(course, self._tables[-1][-1]), course)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin: time, then the observables in their order."""
         if len(self.schedule.between):
             return np.array(self._compared)
-        return self.watch.of_observables(np.array(self.rows) if folder is None else folder.rows())
+        return self.watch.of_observables(self.rows if folder is None else folder.rows())
 
     def again(self, folder):
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
-        self.integrator, self.rows, self._compared = self.integrator_at(self.standing.knob), [], []
+        self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -166,7 +169,7 @@ class Simulation:
         own = {key.removeprefix("run_"): array for key, array in self._kept.items() if key.startswith("run_")}
         course, row = self.integrator.load(own), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
-        self._kept, self.rows = None, [folder.last_row()]
+        self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
         return course, len(times) if course.stopped else row + 1

@@ -56,7 +56,7 @@ class Twin:
 
     def __init__(self, simulation):
         self._simulation, self._stop = simulation, threading.Event()
-        self._thread = self._course = self._table = self.failure = None
+        self._thread = self._course = self._last = self._rows = self.failure = None
 
     def __enter__(self):
         integrator = self._simulation.integrator
@@ -82,10 +82,11 @@ class Twin:
             integrator = made()
             course = integrator.start(*simulation.begin)
             for block in blocks(integrator, course, simulation.schedule):
-                rows.append(simulation.watch.table(block.compared))
+                table = simulation.watch.table(block.compared)
+                rows.append(simulation.watch.of_observables(table).copy())
                 if self._stop.is_set():
                     return
-            self._course, self._table = course, np.concatenate(rows)
+            self._course, self._last, self._rows = course, table[-1], np.concatenate(rows)
         except Exception as error:  # whatever it is, it belongs into the warnings of the run itself
             self.failure = error
 
@@ -97,8 +98,7 @@ class Twin:
             self._run(self._simulation.integrator.refined)
         if self._course is None:
             return None
-        watch = self._simulation.watch
-        return TwinRun(watch.results(self._course, self._table[-1]), self._course, watch.of_observables(self._table))
+        return TwinRun(self._simulation.watch.results(self._course, self._last), self._course, self._rows)
 
 
 def _largest_mean(times, apart, end):
@@ -117,11 +117,11 @@ def with_errors(results, twin, own, other, order=2.0):
     Two runs may agree by chance on a peak, or at the end, where the motion differs otherwise; what is constant after
     contact carries one difference through all rows. What counts is the larger of the difference of the result and the
     mean one, root mean square, of the observable at the times before: in half the time up to the result, or in half of
-    what is left, wherever it is largest. Central differences are of order 2: a run of √2 times the steps has half the error, so
-    that the error is twice the difference where that order holds (``order`` is that factor for the steps really taken).
-    The error of CVODE and IDA goes with the tolerance to the power 2/3 at order 2, and faster at higher ones. Higher
-    orders count as 2 here: peaks, contact and slack lines leave no more of them, for which the threefold is taken as
-    well. How often ± contains the truth is counted by ``python -m validation coverage``.
+    what is left, wherever it is largest. Central differences are of order 2: a run of √2 times the steps has half the
+    error, so that the error is twice the difference where that order holds (``order`` is that factor for the steps
+    really taken). The error of CVODE and IDA goes with the tolerance to the power 2/3 at order 2, and faster at higher
+    ones. Higher orders count as 2 here: peaks, contact and slack lines leave no more of them, for which the threefold
+    is taken as well. How often ± contains the truth is counted by ``python -m validation coverage``.
 
     Parameters
     ----------

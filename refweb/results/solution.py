@@ -146,5 +146,5 @@ class SolutionData:
 def as_history(columns, rows):
     """Rows of numbers as a dict by name; ``columns`` are names with units."""
     names = [column.rsplit(" [", 1)[0] for column in columns]
-    table = np.array(rows, dtype=float).reshape(len(rows), len(names))
+    table = np.asarray(rows, dtype=float).reshape(len(rows), len(names))
     return Names(zip(names, table.T, strict=True))
