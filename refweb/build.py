@@ -98,7 +98,7 @@ def _check_memory(lines, cable, effects, solve, output):
 
 def _check_history(solve, output, observables):
     """Refuse a history that does not fit into memory."""
-    if solve.kind == "dynamic":
+    if solve.kind == "dynamic" and output.interval:
         rows = solve.duration / output.interval
         size = rows * memory.BYTES_PER_ROW * (memory.NUMBERS_PER_ROW + observables)
         memory.check(size, f"[output] interval = {output.interval:g}: {rows:.3g} rows of {observables} observables")
