@@ -11,8 +11,8 @@ import numpy as np
 BLOCK = 0.1
 """Time that a block of rows is meant to take [s]: between two of them a run can be interrupted, and tells where it is.
 """
-COMPARED = 50
-"""Least number of times at which a run and its twin are compared, whatever the interval of its rows."""
+FEW, COMPARED = 10, 50
+"""Number of rows below which a run and its twin are compared between rows as well, and at about how many times then."""
 MOST_ROWS = 10_000
 """Largest number of rows of a block."""
 
@@ -27,7 +27,8 @@ class Schedule(NamedTuple):
     frames : ndarray of int
         Numbers of the rows that frames are written at, the last row at least.
     between : ndarray
-        Times between rows at which a run is compared with its twin [s]; none where rows are many.
+        Times between rows at which a run is compared with its twin [s]; none where rows are many. Steps end there
+        whether there is a twin or not: errors do not change the run.
     """
 
     times: np.ndarray
@@ -37,9 +38,9 @@ class Schedule(NamedTuple):
     @classmethod
     def of(cls, scene):
         """That of a scene: the rows of its interval, and a frame every ``frames`` rows and at the end."""
-        times, compared = row_times(scene), scene.accuracy.error != "none"
+        times = row_times(scene)
         frames = np.unique(np.append(np.arange(0, len(times), scene.output.frames), len(times) - 1))
-        return cls(times, frames, times_between(times) if compared else np.zeros(0))
+        return cls(times, frames, times_between(times))
 
 
 def row_times(scene):
@@ -54,8 +55,8 @@ def row_times(scene):
 
 
 def times_between(times):
-    """Times that cut rows which are fewer than `COMPARED` into about as many parts [s], equal in each row."""
-    parts = -(-COMPARED // max(len(times) - 1, 1))
+    """Times that cut rows which are fewer than `FEW` into about `COMPARED` parts [s], equal in each row."""
+    parts = -(-COMPARED // max(len(times) - 1, 1)) if len(times) <= FEW else 1
     shares = np.arange(1, parts) / parts
     return (times[:-1, None] + shares * np.diff(times)[:, None]).ravel()
 

@@ -28,7 +28,7 @@ from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
-SHARED = CLOCK.names[:-3]
+SHARED = CLOCK.names[:-4]
 """Numbers that a course and the loop's clock have in common."""
 
 
@@ -196,6 +196,7 @@ class CentralDifference(Integrator):
         clock = np.zeros(1, dtype=CLOCK)
         for name in SHARED:
             clock[name] = getattr(course, name)
+        clock["least"] = least_energy(self.system.net)
         families, changing = len(self.system.families), len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse)
         carried = np.zeros(families), np.zeros((2, changing))

@@ -123,7 +123,7 @@ def drifts_away(clock, energy, stored, work, limit):
     clock.worst = max(clock.worst, drift)
     if not math.isfinite(drift):
         return True
-    if not clock.largest > 0.0:
+    if clock.nsteps == 0 or not clock.largest > clock.least:
         return False
     share, before = drift / clock.largest, clock.share
     clock.share = share

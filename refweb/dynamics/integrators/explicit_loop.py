@@ -80,6 +80,25 @@ def look_inside(now, h, inside, where, total, model, observed, running):
 
 
 @kernel()
+def look_behind(model, observed, running, total):
+    """Look for extremes behind a corner of motion, where velocities have jumped."""
+    now, families, extremes, where = (
+        running.clock[0].time,
+        model.families,
+        running.extremes,
+        np.zeros(2, dtype=np.int64),
+    )
+    probes, rows, data, signs = observed.probes, observed.rows, observed.data, observed.signs
+    look(
+        now, running.x, running.v, running.f, families.outs[0], False, where, probes, rows, data, signs,
+        observed.followed, extremes,
+    )  # fmt: skip
+    if observed.sums.shape[0]:
+        energies_now(model, running, total)
+        look_at_sums(now, False, observed.sums, total, len(probes), signs, extremes)
+
+
+@kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
     """``count`` steps of size h, behind those that are taken of the row.
 
@@ -265,10 +284,10 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
     clock, events, reels, left = running.clock[0], running.events, model.reels, breath
     total, stopped = np.zeros(running.work.size + 2), ended_by(events)
     for n in range(times.size):
+        if reels.lengths.size and not clock.begun:
+            set_lengths(clock.time, reels, model.families.data[0])
         while clock.time < times[n] and not stopped:
             end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
-            if reels.lengths.size and not begun:
-                set_lengths(clock.time, reels, model.families.data[0])
             changing = reels.corners.size > 2 and reels.corners[0] < end and reels.corners[-3] > clock.time
             if not begun:
                 clock.since = clock.time
@@ -284,8 +303,8 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
                 return n
             clock.time = end if clock.begun == clock.planned else clock.time + clock.begun * clock.step
             clock.begun = 0
-            if model.inertia.driven.size:
-                turn_supports(clock.time, model, running)
+            if model.inertia.driven.size and turn_supports(clock.time, model, running):
+                look_behind(model, observed, running, total)
             if clock.time < times[n]:  # a corner: what is stored may be gone again at the row
                 largest = energies_now(model, running, total)[1]
                 if not math.isfinite(largest):

@@ -27,13 +27,15 @@ CLOCK = np.dtype(
         ("largest", float),
         ("worst", float),
         ("share", float),
+        ("least", float),
         ("since", float),
         ("begun", np.int64),
         ("planned", np.int64),
     ]
 )
 """Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.Course` by their names, then the
-time from which steps are equal, the number of these that are taken, 0 where none are, and that of all."""
+energy that a drift is held against at least, the time from which steps are equal, how many of these are taken, 0 where
+none are, and how many they are."""
 
 
 @record

@@ -133,7 +133,7 @@ class SimpsonBook:
     """
 
     def __init__(self, system, hold):
-        self.system, self._hold = system, hold
+        self.system, self._hold, self._least = system, hold, least_energy(system.net)
         families = system.families
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
@@ -221,7 +221,7 @@ class SimpsonBook:
     def open(self, course, energies):
         """Note the energy at the start of a course."""
         own = self._own(energies)
-        course.energy, course.largest = own.sum(), max(np.abs(own).sum(), least_energy(self.system.net))
+        course.energy, course.largest = own.sum(), max(np.abs(own).sum(), self._least)
 
     def note_largest(self, course, energies):
         """Note the largest energy of a course."""
@@ -239,7 +239,7 @@ class SimpsonBook:
                 f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and "
                 f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}"
             )
-        if course.largest > 0.0:
+        if course.nsteps and course.largest > self._least:
             course.share = share
 
     def _own(self, energies):

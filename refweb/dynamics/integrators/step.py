@@ -94,7 +94,7 @@ def move_supports(t, h, x, v, f, aside, kernels, cells, data, outs):
 
 @kernel()
 def turn_supports(t, model, running):
-    """Write prescribed velocities behind a corner at time t, with the forces that follow from velocity.
+    """Write prescribed velocities behind a corner at time t, and forces that follow from velocity; whether any jumps.
 
     What the kinetic energy of the supports gains is work of their motion; the rows of a history show what is behind.
     """
@@ -115,6 +115,7 @@ def turn_supports(t, model, running):
         f[:] = 0.0
         for i in range(len(forces)):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
+    return turned
 
 
 @kernel()
