@@ -2,10 +2,12 @@
 
 import copy
 import csv
+import itertools
 import json
 import re
 import threading
 from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import meshio
@@ -17,8 +19,10 @@ from scipy.integrate import DOP853
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics import schedule, simulation
+from refweb.dynamics.history import Watch
 from refweb.dynamics.integrators import central_difference
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
+from refweb.dynamics.integrators.integrator import History
 from refweb.dynamics.twin_error import SPREAD
 from refweb.results.state import State
 
@@ -843,3 +847,22 @@ def test_what_is_not_at_rest_before_the_start_is_said():
     motion = refweb.Motion(node="centre", displacement=[(0.0, 0.0, 0.0, 1e-3), (1.0, 0.0, 0.0, 1e-3)])
     moved = refweb.run(scene(effects=[motion]))
     assert any("[[motion]] has moved node" in text for text in moved.warnings)
+
+
+def test_histories_do_not_depend_on_the_clock(monkeypatch):
+    """Blocks of rows are sized by the clock: one that stands, runs or stutters gives the same bits, and so any rows."""
+    damped = scene(interval=2e-4, effects=[*ball(), refweb.Damping(time=1e-5, rate=3.0)])
+    histories = []
+    for ticks in ([0.0], [1.0], [0.0, 0.3, 0.0, 0.0, 1.0]):
+        clock = itertools.accumulate(itertools.cycle(ticks))
+        monkeypatch.setattr(schedule, "time", SimpleNamespace(perf_counter=lambda clock=clock: next(clock)))
+        histories.append(refweb.run(damped).history)
+    for other in histories[1:]:
+        for name, column in histories[0].items():
+            np.testing.assert_array_equal(other[name], column, err_msg=name)
+    system = damped.build()
+    watch = Watch(damped, system)
+    some = History.empty(100, len(watch.probes), system.families)
+    some.values[:] = np.random.default_rng(0).normal(size=some.values.shape)
+    for first, last in ((0, 1), (1, 4), (4, 100)):
+        np.testing.assert_array_equal(watch.table(some[first:last]), watch.table(some)[first:last])
