@@ -17,7 +17,11 @@ class SolverError(RuntimeError):
 
 
 class OpenBook(SolverError):
-    """The energy of a run drifted away from the work done on it."""
+    """The energy of a run drifted away from the work done on it; ``drift`` says how far, over its largest energy."""
+
+    def __init__(self, message, drift=float("inf")):
+        super().__init__(message)
+        self.drift = drift
 
 
 @contextlib.contextmanager

@@ -13,8 +13,9 @@ import numpy as np
 
 from ..errors import OpenBook
 
-ATTEMPTS = 3
-"""Number of runs in which the book of energies has to close."""
+ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
+"""Number of runs in which the book of energies has to close; more, up to the second number, as long as each brings its
+drift down to the third of that before."""
 CLIMBS = 8
 """Number of times that accuracy is raised for digits that are missing."""
 STAYS = "a higher accuracy changes it as much: it is zero, or not determined, or a peak that needs a shorter interval"
@@ -75,8 +76,9 @@ def follow(simulation, folder, tell):
 
 
 def run_within_drift(simulation, folder, tell):
-    """Run with errors; one whose energy book stays open is repeated with a smaller knob, `ATTEMPTS` runs at most."""
+    """Run with errors; one whose energy book stays open is repeated with a smaller knob, see `ATTEMPTS`."""
     scene, solution, standing = simulation.scene, simulation.solution, simulation.standing
+    before = np.inf
     while True:
         name = simulation.integrator.knob
         text = "running" if standing.knob == standing.first else f"running with {name} = {standing.knob:g}"
@@ -84,9 +86,10 @@ def run_within_drift(simulation, folder, tell):
             try:
                 run = simulation.run(folder, functools.partial(tell, text))
             except OpenBook as error:
-                if standing.repeated == ATTEMPTS - 1 or scene.solve.step_size is not None:
+                pays = error.drift <= PAYS * before and standing.repeated < MOST_ATTEMPTS - 1
+                if scene.solve.step_size is not None or standing.repeated >= ATTEMPTS - 1 and not pays:
                     raise
-                standing.repeated += 1
+                standing.repeated, before = standing.repeated + 1, error.drift
                 standing.knob *= simulation.integrator.retry
                 solution.warnings.append(f"{error}; repeated with {name} = {standing.knob:g}")
                 simulation.again(folder)

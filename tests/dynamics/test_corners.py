@@ -116,3 +116,29 @@ def test_work_on_a_loaded_node_that_is_moved():
     coarse, fine = (moved_and_loaded("central-difference", step_size=step) for step in (2e-4, 1e-4))
     assert 3.0 < coarse / fine < 5.0 and fine < 1e-3
     assert all(moved_and_loaded(method) < 1e-5 for method in ("cvode", "ida"))
+
+
+def hammered(width, error="twin", **solve):
+    """Two taut lines with a mass between them, hit within a few steps of central differences; its place 20 ms later."""
+    return refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(points=[[-1, 0, 0], [1, 0, 0], [0, 0, 0]], lines=[[0, 2], [1, 2]], supports=[0, 1]),
+            cable=refweb.Cable(law="tension-only", modulus=7e9, area=1e-6, density=200.0, prestrain=1e-3),
+            effects=[
+                refweb.PointMass(node=2, mass=0.05),
+                refweb.Load(node=2, force=(0.0, 0.0, 500.0), factor=[(0.0, 0.0), (width / 2, 1.0), (width, 0.0)]),
+            ],
+            solve=refweb.Dynamic(duration=0.02, **solve),
+            accuracy=refweb.Accuracy(error=error),
+            observe=[refweb.Observe(name="z", quantity="displacement", node=2, component="z")],
+        )
+    )
+
+
+@pytest.mark.parametrize("width", [1e-3, 2e-3])
+@pytest.mark.parametrize("method", ["central-difference", "auto"])
+def test_a_hammer_blow(method, width):
+    """Halving goes on as long as the book closes faster than that; against Adams at 1e-10."""
+    truth = hammered(width, "none", method="cvode", family="adams", rtol=1e-10).results["z"].value
+    result = hammered(width, method=method).results["z"]
+    assert abs(result.value - truth) <= result.error < 0.05 * abs(truth)

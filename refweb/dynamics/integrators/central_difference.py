@@ -272,7 +272,8 @@ class CentralDifference(Integrator):
             place = self.system.row_name(of.cells[cell, 0])
         raise OpenBook(
             f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and {course.time:.6g} s, "
-            f"limit {DRIFT:g}: energy came in with {of.name} at {place}; {self._remedy}"
+            f"limit {DRIFT:g}: energy came in with {of.name} at {place}; {self._remedy}",
+            course.drift,
         )
 
     @property

@@ -33,7 +33,8 @@ def least_energy(net):
 def refuse_open(course, limit, remedy):
     """Refuse a whole run whose energy drift exceeds a limit; `OpenBook`."""
     if not course.drift <= limit:
-        raise OpenBook(f"energy drift {course.drift:.3g} of the largest energy of the run, limit {limit:g}: {remedy}")
+        drift = f"energy drift {course.drift:.3g} of the largest energy of the run"
+        raise OpenBook(f"{drift}, limit {limit:g}: {remedy}", course.drift)
 
 
 @kernel()

@@ -237,7 +237,8 @@ class SimpsonBook:
         if not share <= max(DRIFT, CLOSING * course.share):
             raise OpenBook(
                 f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and "
-                f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}"
+                f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}",
+                course.drift,
             )
         if course.nsteps and course.largest > self._least:
             course.share = share
