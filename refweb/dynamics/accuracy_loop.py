@@ -103,6 +103,8 @@ def run_within_drift(simulation, folder, tell):
 
         rows = simulation.compared(folder)
         add_errors(solution, run, ended, rows, simulation.integrator.error_share(run.course, ended.course))
+        if folder is not None:
+            folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:
         solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
 

@@ -29,7 +29,7 @@ class Start(NamedTuple):
 def start_of(scene, system):
     """The `Start` of a scene."""
     if scene.start_folder is not None:
-        return stored(system, scene.start_folder)
+        return stored(system, scene.start_folder)[0]
     return Start(equilibrium(system).x) if scene.solve.start == "equilibrium" else Start()
 
 
@@ -82,7 +82,7 @@ _STATE = ("positions", "displacements", "velocities", "bodies")
 
 
 def stored(system, folder):
-    """The `Start` that the checkpoint in a result folder holds.
+    """The `Start` that the checkpoint in a result folder holds, and that of its twin, None where there was none.
 
     Nodes are matched by number, bodies by name; a body that the folder does not have stays as its table says.
 
@@ -93,9 +93,9 @@ def stored(system, folder):
     """
     path = str(folder)
     net, name = system.net, f'[solve] start = "{path if len(path) <= 60 else "..." + path[-57:]}":'
-    arrays = checkpoint(folder, name, ' it must be "web", "equilibrium" or a result folder')
+    given = checkpoint(folder, name, ' it must be "web", "equilibrium" or a result folder')
     try:
-        positions, displacements, velocities, bodies = map(arrays.__getitem__, _STATE)
+        positions, displacements, velocities, bodies = map(given.__getitem__, _STATE)
     except KeyError as error:
         raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes (it has no {error})") from None
     arrays = (positions, displacements, velocities)
@@ -107,6 +107,16 @@ def stored(system, folder):
         raise InputError(
             f"{name} holds {nodes} nodes, must be those of this scene, {net.nodes}: same web, order and subdivide"
         )
+    start = _start_at(system, positions, displacements, velocities, bodies)
+    twin = [given.get(f"twin_{one}") for one in ("displacements", "velocities")]
+    if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in twin):
+        return start, None
+    return start, _start_at(system, positions - displacements + twin[0], *twin, bodies)
+
+
+def _start_at(system, positions, displacements, velocities, bodies):
+    """The `Start` of a system at what a checkpoint has of nodes and, behind them, of bodies with their names."""
+    net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
     own = zip(row_names(net.bodies), range(net.nodes, system.rows), strict=True)
@@ -116,8 +126,8 @@ def stored(system, folder):
     reference = positions - displacements
     same = np.isclose(reference[there], net.points[here], rtol=0, atol=1e-15 * np.abs(positions).max(initial=0.0))
     x[here] = np.where(same, displacements[there], positions[there] - net.points[here])
-    given = v.copy()
+    own_velocity = v.copy()
     v[here] = velocities[there]
-    told = given.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
-    v[told] = given[told]
+    told = own_velocity.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
+    v[told] = own_velocity[told]
     return Start(x, v)

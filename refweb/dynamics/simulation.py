@@ -16,6 +16,11 @@ from .initial_state import Start, equilibrium, remarks_on, stored
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
 from .schedule import Schedule, blocks
 
+NO_TWIN = (
+    "the run whose last state it starts from came to its end without a twin: ± holds what this run adds, not what the "
+    "state is off already"
+)
+
 
 class Ended(NamedTuple):
     """A run at its end: its results by name, without errors, and its course."""
@@ -48,6 +53,8 @@ class Simulation:
         What takes the system through time.
     begin : refweb.dynamics.initial_state.Start
         Where from; that of an equilibrium is known when the run has begun.
+    begin_of_twin : refweb.dynamics.initial_state.Start, optional
+        Where its twin begins, if that is elsewhere: where the twin of the run ended that this one starts from.
     standing : refweb.dynamics.accuracy_loop.Standing
         How accurate runs are, and how often they were repeated.
 
@@ -70,11 +77,15 @@ class Simulation:
         _check_step(scene)
         self.standing = Standing.of(getattr(scene.solve, INTEGRATORS[scene.solve.method].knob), kept)
         self.integrator = self.integrator_at(self.standing.knob)
-        self.begin = Start()
+        self.begin, self.begin_of_twin = Start(), None
         if kept is not None:
             self.begin = Start(kept.get("begin_x"), kept.get("begin_v"))
+            if "twin_begin_x" in kept:
+                self.begin_of_twin = Start(kept["twin_begin_x"], kept["twin_begin_v"])
         elif scene.start_folder is not None:
-            self.begin = stored(system, scene.start_folder)
+            self.begin, self.begin_of_twin = stored(system, scene.start_folder)
+            if self.begin_of_twin is None and self.begin.v.any():
+                solution.warnings.append(NO_TWIN)
         if scene.solve.start != "equilibrium" and kept is None:
             solution.warnings += remarks_on(self.begin, system)
 
@@ -198,6 +209,8 @@ class Simulation:
             return
         kept = {f"run_{name}": array for name, array in self.integrator.save(course).items()}
         kept |= {f"begin_{name}": array for name, array in self.begin._asdict().items() if array is not None}
+        if self.begin_of_twin is not None:
+            kept |= {f"twin_begin_{name}": array for name, array in self.begin_of_twin._asdict().items()}
         kept |= {"row": number} | self.standing.arrays()
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 

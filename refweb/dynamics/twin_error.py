@@ -80,7 +80,8 @@ class Twin:
         simulation, rows = self._simulation, []
         try:
             integrator = made()
-            course = integrator.start(*simulation.begin)
+            begin = simulation.begin if simulation.begin_of_twin is None else simulation.begin_of_twin
+            course = integrator.start(*begin)
             for block in blocks(integrator, course, simulation.schedule):
                 table = simulation.watch.table(block.compared)
                 rows.append(simulation.watch.of_observables(table).copy())

@@ -213,6 +213,13 @@ class Folder:
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self.listed([(number, state.time if shape is None else number)], net.bodies)
 
+    def keep(self, **arrays):
+        """Add arrays to the last checkpoint."""
+        with self._written():
+            with np.load(self.path / "checkpoint.npz") as archive:
+                arrays = {key: archive[key] for key in archive} | arrays
+            write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
+
     def listed(self, frames, bodies):
         """Add frames, each a row number and its time, to ``web.pvd``."""
         for row, time in frames:

@@ -346,3 +346,37 @@ def test_another_net_is_refused(ended, tmp_path, changes, nodes):
         refweb.run(hit(folder, **changes), out=tmp_path / "out")
     assert f"holds 21 nodes, must be those of this scene, {nodes}" in str(error.value)
     assert not (tmp_path / "out").exists()
+
+
+def swing(duration, start="web", error="twin", **changes):
+    """A mass on a linear line, thrown along it at 1 m/s: x = sin(ωt)/ω with ω = √(EA/Lm) = 200/s."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=8e8, area=1e-4, density=0.0),
+        effects=[refweb.PointMass(node=1, mass=2.0)]
+        + [refweb.Velocity(node=1, value=(1.0, 0.0, 0.0))] * (start == "web"),
+        solve=refweb.Dynamic(duration=duration, start=start, **changes),
+        accuracy=refweb.Accuracy(error=error),
+        observe=[refweb.Observe(name="x", quantity="displacement", node=1, component="x")],
+    )
+
+
+@pytest.mark.parametrize("method", ["central-difference", "cvode"])
+def test_errors_go_on_with_the_state(method, tmp_path):
+    """30 periods, then a sixth of one: what the first leg is off counts in the second, whose own part is far less."""
+    rate, first, second = np.sqrt(8e4 / 2.0), 0.95, 0.005
+    refweb.run(swing(first, method=method), out=tmp_path / "first")
+    went_on = refweb.run(swing(second, start=str(tmp_path / "first"), method=method), out=tmp_path / "second")
+    third = refweb.run(swing(second, start=str(tmp_path / "second"), method=method))
+    for solution, end in ((went_on, first + second), (third, first + 2 * second)):
+        value, error = solution.results["x"][:2]
+        off = abs(value - np.sin(rate * end) / rate)
+        assert off <= error < 20.0 * off and solution.warnings == []
+    own = refweb.run(swing(second, method=method)).results["x"].error
+    assert went_on.results["x"].error > 5.0 * own
+
+
+def test_a_state_without_errors_says_so(tmp_path):
+    refweb.run(swing(0.01, error="none"), out=tmp_path / "first")
+    (warning,) = refweb.run(swing(0.01, start=str(tmp_path / "first"))).warnings
+    assert warning.startswith("the run whose last state it starts from came to its end without a twin")
