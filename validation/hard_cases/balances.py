@@ -84,7 +84,9 @@ def momentum_left(solution):
     given = np.zeros(3)
     for effect in solution.scene.effects:
         if isinstance(effect, refweb.Load):
-            given += end * np.array(effect.force)
+            times, factors = np.transpose(effect.factor) if effect.factor else ([0.0], [1.0])
+            within = np.unique([0.0, *np.clip(times, 0.0, end), end])
+            given += np.trapezoid(np.interp(within, times, factors), within) * np.array(effect.force)
     largest = max((mass * np.linalg.norm(v, axis=1)).sum(), np.linalg.norm(given))
     for k, axis in enumerate("xyz"):
         now = (mass * np.where(system.supported[linear, k], 0.0, v[:, k])).sum()

@@ -2,7 +2,8 @@
 
 Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of
 1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
-bodies that start inside of the web. Each is solved by every method that takes it; a number proves each result:
+bodies that start inside of the web, pulses between steps. Each is solved by every method that takes it; a number proves
+each result:
 
 - statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
   positions and natural lengths by the law alone, assembled with numpy line by line.
@@ -186,6 +187,13 @@ def free(*effects, web=None, duration=0.02, supports=None, refused=None, **law):
     )
 
 
+def pulse(width, impulse=0.02):
+    """A web that is given an impulse [N s] within a time, most of them far below a step."""
+    factor = [(0.0051, 0.0), (0.0051 + width / 2, 2.0 / width), (0.0051 + width, 0.0)]
+    load = refweb.Load(node="centre", force=(0.0, 0.0, impulse), factor=factor)
+    return free(load, supports=RIM, refused=not_explicit("load"))
+
+
 def thrown(web, supports, velocity=UP, node=1, **more):
     """Nodes of a web held, one of the others thrown."""
     held = refweb.Supports(nodes=list(supports))
@@ -236,6 +244,7 @@ MOTIONS = {
     "modulus [Pa]": {
         e: hit(modulus=e, duration=0.02 if e < 1e9 else 1e-3) for e in (1.0, 1e6, 1e9, 1e12)
     },
+    "pulse of a load, length [s]": {w: pulse(w) for w in (1e-2, 1e-4, 1e-6, 1e-8)},
     "motion": {
         "all lines snap taut": free(*OUTWARD, web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [], natural_length=1.1),
                                     duration=0.2),
