@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from refweb import kernels
+
 FACTORY = """
 import sys
 import numpy as np
@@ -86,3 +88,21 @@ def test_kernels_that_capture_different_kernels_never_share_a_name(run):
     )
     assert [value for value, _, _ in found] == [6.0, 8.0, 10.0, 12.0]
     assert len({name for _, _, name in found}) == 4
+
+
+def test_machine_code_is_kept_by_the_content_of_all_kernels(tmp_path, monkeypatch):
+    """A changed law in one file makes the machine code of a kernel in another stale: the folder has another name."""
+    package = tmp_path / "package"
+    (package / "laws").mkdir(parents=True)
+    (package / "kernels.py").write_text("")
+    law, plain = package / "laws" / "law.py", package / "plain.py"
+    law.write_text("@kernel()\ndef law(x):\n    return x\n")
+    plain.write_text("a = 1\n")
+    monkeypatch.setattr(kernels, "__file__", str(package / "kernels.py"))
+    monkeypatch.setattr(kernels.numba.config, "CACHE_DIR", "")
+    folders = [kernels._cache_folder()]
+    plain.write_text("a = 2\n")
+    folders.append(kernels._cache_folder())
+    law.write_text("@kernel()\ndef law(x):\n    return 2 * x\n")
+    folders.append(kernels._cache_folder())
+    assert folders[0] == folders[1] != folders[2] and str(package) in folders[0]

@@ -380,3 +380,10 @@ def test_a_state_without_errors_says_so(tmp_path):
     refweb.run(swing(0.01, error="none"), out=tmp_path / "first")
     (warning,) = refweb.run(swing(0.01, start=str(tmp_path / "first"))).warnings
     assert warning.startswith("the run whose last state it starts from came to its end without a twin")
+
+
+def test_errors_are_three_times_what_is_off():
+    """Where a run is of order 2 and no chance is in it: at the end of 30 periods, where its lag moves the mass most."""
+    end = 30.0 * 2.0 * np.pi / np.sqrt(8e4 / 2.0)
+    value, error = refweb.run(swing(end, safety=0.1)).results["x"][:2]
+    assert 2.8 < error / abs(value) < 3.2

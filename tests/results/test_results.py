@@ -437,3 +437,25 @@ def test_utilisation_in_the_box(capsys, tmp_path):
     print_solution(straight("linear", 0.1, groups={"weak": refweb.Group(strength=2e4)}), tmp_path)
     box = capsys.readouterr().out
     assert "│ strength  utilisation 0.50 at line 1 " in box and f"results in {tmp_path}" in box
+
+
+def test_frames_of_a_body(tmp_path):
+    """Each array of its file is what it is called: the ball's way, its velocity, no reaction as nothing holds it."""
+    ball = dict(name="ball", radius=0.1, mass=0.5, position=(0.01, 0.02, -0.09), velocity=(0.5, 0.0, 2.0))
+    solution = refweb.run(
+        refweb.Scene(
+            web=refweb.Window(mesh="square", rows=2, columns=2, side=0.2),
+            cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0, prestrain=0.01),
+            effects=[refweb.Body(**ball), refweb.Contact(stiffness=1e4)],
+            solve=refweb.Dynamic(duration=1e-3),
+            output=refweb.Output(interval=1e-3, frames=1),
+        ),
+        out=tmp_path / "out",
+    )
+    frame, state = meshio.read(tmp_path / "out/frames/ball_000001.vtu"), solution.state
+    for name, truth in (("displacement", state.x[-1]), ("velocity", state.v[-1]), ("reaction", state.reaction[-1])):
+        np.testing.assert_array_equal(frame.point_data[name][0], truth)
+    before, after = np.array(ball["velocity"]), frame.point_data["velocity"][0]
+    assert not frame.point_data["reaction"].any()
+    assert after[2] < before[2] and abs(after[0] - before[0]) < 0.1 * (before[2] - after[2])
+    np.testing.assert_allclose(frame.point_data["displacement"][0], 1e-3 * before, rtol=0.2, atol=1e-4)

@@ -1,6 +1,7 @@
 """Balances of forces, energy and momentum of a solution, from its positions and velocities and the law alone."""
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 import refweb
 from refweb.net.net import AXIAL_STIFFNESS
@@ -86,7 +87,7 @@ def momentum_left(solution):
         if isinstance(effect, refweb.Load):
             times, factors = np.transpose(effect.factor) if effect.factor else ([0.0], [1.0])
             within = np.unique([0.0, *np.clip(times, 0.0, end), end])
-            given += np.trapezoid(np.interp(within, times, factors), within) * np.array(effect.force)
+            given += trapezoid(np.interp(within, times, factors), within) * np.array(effect.force)
     largest = max((mass * np.linalg.norm(v, axis=1)).sum(), np.linalg.norm(given))
     for k, axis in enumerate("xyz"):
         now = (mass * np.where(system.supported[linear, k], 0.0, v[:, k])).sum()
