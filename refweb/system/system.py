@@ -163,6 +163,12 @@ class System:
         signs = {"work": 1, "dissipated_energy": -1}
         return np.array([signs[f.book] if f.power is not None else 0 for f in self.families], dtype=np.int64)
 
+    @property
+    def corners(self):
+        """Times at which a table of time has a corner [s], increasing."""
+        times = [t for part in (*self.families, *self.drives, *self.line_drives) for t in part.times]
+        return np.unique(np.array(times, dtype=float))
+
     def line_data(self, t):
         """`Net.line_data` with the natural lengths of time t, shape (elements, columns)."""
         if not self.line_drives:

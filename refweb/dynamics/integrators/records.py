@@ -16,7 +16,6 @@ from ...results.probes import INTEGERS, PROBE
 from .energy_book import no_energy
 from .extremes import Extremes
 from .step_bound import no_bound
-from .step_limits import corners
 
 CLOCK = np.dtype(
     [
@@ -237,7 +236,7 @@ class Model(NamedTuple):
     @classmethod
     def of(cls, system):
         """That of a `refweb.system.system.System`."""
-        return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system), corners(system))
+        return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system), system.corners)
 
 
 @record

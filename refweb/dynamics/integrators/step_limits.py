@@ -9,12 +9,6 @@ TRAVEL = 0.2
 are further away, half of that distance."""
 
 
-def corners(system):
-    """Times at which a table of a `refweb.system.system.System` has a corner [s], increasing."""
-    times = [t for part in (*system.families, *system.drives, *system.line_drives) for t in part.times]
-    return np.unique(np.array(times, dtype=float))
-
-
 class StepLimits:
     """The limits of steps of one system.
 
@@ -26,7 +20,7 @@ class StepLimits:
 
     def __init__(self, system):
         self._net, self._moving = system.net, system.rows - system.net.spins
-        self._corners = corners(system)
+        self._corners = system.corners
         bodies = system.net.bodies
         self._thickness = min((body.thickness for body in bodies), default=np.inf)
         self._outreach = np.array([body.radius + np.linalg.norm(body.core) for body in bodies])
