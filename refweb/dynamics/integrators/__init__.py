@@ -52,7 +52,7 @@ An implicit method finds K = −∂f/∂x and C = −∂f/∂v by ``self.system.
 ``damping``, None without any: values of which ``self.system.pattern.matrix`` makes a sparse matrix, as M is in
 ``self.system.mass.matrix``, all over the free unknowns. Tangents and factorizations of its own it counts in
 ``self.stats``, as ``njev`` and ``nlu``. ``self.force`` is f, and ``self.acceleration`` M⁻¹f. A method says by
-``takes_massless`` and ``takes_links`` that its equations have a place for nodes without mass and rigid links. What else
-there is to say about an integrator, also one that takes steps by another key than rtol, is in
-`refweb.dynamics.integrators.integrator.Integrator`.
+``takes_massless`` and ``takes_links`` that its equations have a place for nodes without mass and rigid links, and
+by ``restarts`` that it is to begin anew at corners. What else there is to say about an integrator, also one that takes
+steps by another key than rtol, is in `refweb.dynamics.integrators.integrator.Integrator`.
 """

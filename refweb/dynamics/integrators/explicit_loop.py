@@ -82,17 +82,10 @@ def look_inside(now, h, inside, where, total, model, observed, running):
 @kernel()
 def look_behind(model, observed, running, total):
     """Look for extremes behind a corner of motion, where velocities have jumped."""
-    now, families, extremes, where = (
-        running.clock[0].time,
-        model.families,
-        running.extremes,
-        np.zeros(2, dtype=np.int64),
-    )
+    now, lines, where = running.clock[0].time, model.families.outs[0], np.zeros(2, dtype=np.int64)
+    x, v, f, extremes, followed = running.x, running.v, running.f, running.extremes, observed.followed
     probes, rows, data, signs = observed.probes, observed.rows, observed.data, observed.signs
-    look(
-        now, running.x, running.v, running.f, families.outs[0], False, where, probes, rows, data, signs,
-        observed.followed, extremes,
-    )  # fmt: skip
+    look(now, x, v, f, lines, False, where, probes, rows, data, signs, followed, extremes)
     if observed.sums.shape[0]:
         energies_now(model, running, total)
         look_at_sums(now, False, observed.sums, total, len(probes), signs, extremes)
