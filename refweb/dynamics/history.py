@@ -117,11 +117,7 @@ class Watch:
 
         Each row is summed in one order, however many rows there are; a product of matrices is not.
         """
-        table = np.zeros((len(history.values), len(self.columns)))
-        for column, shares in zip(history.values.T, self._weights, strict=True):
-            used = np.flatnonzero(shares)
-            table[:, used] += column[:, None] * shares[used]
-        return table
+        return (history.values[:, :, None] * self._weights).sum(axis=1)
 
     def of_observables(self, table):
         """Time and observables alone of rows of ``history.csv``."""

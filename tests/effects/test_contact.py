@@ -247,7 +247,7 @@ def test_hit_with_damping(shape, exponent, damping):
     solved = solve_ivp(rate, (0.0, 0.5), (0.0, SPEED), method="DOP853", rtol=1e-12, atol=1e-14, dense_output=True)
     np.testing.assert_allclose(-solved.y[1, -1], last, rtol=1e-8)
     within = 0.5 * deepest / SPEED
-    ways = within / np.array([50, 100, 200])  # the parts of one row are 50
+    ways = within / np.array([60, 120, 240])  # the parts of one row are 20
     early = [hit(shape, exponent, damping, duration=within, step=h * (1.0 + 1e-9)) for h in ways]
     late = [hit(shape, exponent, damping, duration=0.5, step=h) for h in steps]
     depth, speed = solved.sol(within)
