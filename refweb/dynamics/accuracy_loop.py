@@ -14,8 +14,8 @@ import numpy as np
 from ..errors import OpenBook
 
 ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
-"""Number of runs in which the book of energies has to close; more, up to the second number, as long as each brings its
-drift down to the third of that before."""
+"""Number of runs in which the book of energies has to close; a larger one where it pays; and that is where the drift of
+each run is at most this share of that before."""
 CLIMBS = 8
 """Number of times that accuracy is raised for digits that are missing."""
 STAYS = "a higher accuracy changes it as much: it is zero, or not determined, or a peak that needs a shorter interval"

@@ -43,7 +43,7 @@ class ExplicitCourse(Course):
     force : ndarray, shape (rows, 3)
         Force [N], last seen with the velocity at half a step.
     before : ndarray, shape (3, rows, 3)
-        Displacement, velocity and force at the row before.
+        Displacement, velocity and force at the row or the corner of a table before.
     """
 
     force: np.ndarray
@@ -109,7 +109,7 @@ class CentralDifference(Integrator):
             )
         self._model = Model.of(system)
         self._observed = Observed.of(probes, sums, len(system.families))
-        self._events = event_rows(events)
+        self._events, self._least = event_rows(events), least_energy(net)
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
@@ -153,7 +153,7 @@ class CentralDifference(Integrator):
         extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         extremes.recent[:, 3] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
-        book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), least_energy(system.net)))
+        book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), self._least))
         return ExplicitCourse(time=0.0, x=x, v=v, force=force, extremes=extremes, events=events, **book)
 
     def save(self, course):
@@ -196,7 +196,7 @@ class CentralDifference(Integrator):
         clock = np.zeros(1, dtype=CLOCK)
         for name in SHARED:
             clock[name] = getattr(course, name)
-        clock["least"] = least_energy(self.system.net)
+        clock["least"] = self._least
         families, changing = len(self.system.families), len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse)
         carried = np.zeros(families), np.zeros((2, changing))
@@ -228,7 +228,7 @@ class CentralDifference(Integrator):
                     break
                 self.breathe(now["time"] + now["begun"] * now["step"])
         except BaseException:
-            if clock["begun"]:  # back to the last row
+            if clock["begun"]:  # back to the last row or corner
                 course.x[:], course.v[:], course.force[:] = course.before
             raise
         finally:
@@ -244,7 +244,7 @@ class CentralDifference(Integrator):
         return history
 
     def _name_blow_up(self, course, before, running):
-        """Replay the last row step by step and name the first number that is not finite."""
+        """Replay the steps from ``before`` [s] one by one and name the first number that is not finite."""
         net, (x, v, f) = self.system.net, course.before.copy()
         running.clock["time"] = before
         running = running._replace(x=x, v=v, f=f, events=course.events[:0])
@@ -258,7 +258,7 @@ class CentralDifference(Integrator):
         raise SolverError(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _name_drift(self, course, before):
-        """Say where energy came in: the effect and cell whose energy grew most in the last row."""
+        """Say where energy came in: the effect and cell whose energy grew most from ``before`` [s] on."""
         system, most, of, cell = self.system, -np.inf, self.system.families[0], 0
         for family in system.families:
             if family.energy is not None and family.book != "work":

@@ -18,7 +18,7 @@ from ...results.probes import PLACE
 from .energy_book import begin_powers, book_energies, book_lengths, book_motion, book_powers, drifts_away, note_motion
 from .events import ended_by, note_events
 from .extremes import look, look_at_sums, quadratic_peak, take_over
-from .integrator import MAX_STEPS_PER_ROW
+from .integrator import MAX_STEPS_PER_ROW, SAME
 from .records import Inside
 from .step import (
     add_forces,
@@ -37,8 +37,6 @@ from .step_bound import safe_step
 
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
-ROUNDING = 1e-12
-"""Share of a time within which another is the same."""
 LOOKS = 4
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
 
@@ -257,8 +255,8 @@ def plan(end, changing, scheme, model, running):
 def end_of_steps(corners, time, row):
     """The next corner of a table behind a time, not beyond ``row``; either is met within rounding."""
     for n in range(corners.size):
-        if corners[n] > time * (1.0 + ROUNDING):
-            return corners[n] if corners[n] < row * (1.0 - ROUNDING) else row
+        if corners[n] > time * (1.0 + SAME):
+            return corners[n] if corners[n] < row * (1.0 - SAME) else row
     return row
 
 

@@ -21,6 +21,8 @@ import numpy as np
 from .events import ended_by
 from .extremes import Extremes
 
+SAME = 1e-12
+"""Share of a time within which another is the same: corners of tables, rows and ends of steps are sums."""
 MAX_STEPS_PER_ROW = 1e8
 """Largest number of steps that a history row may take."""
 AXES = "xyz"

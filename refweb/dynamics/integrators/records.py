@@ -287,7 +287,7 @@ class Running(NamedTuple):
     x, v, f : ndarray, shape (rows, 3)
         Displacement [m], velocity [m/s] and force [N].
     before : ndarray, shape (3, rows, 3)
-        The same at the row before.
+        The same at the row or the corner of a table before.
     work : ndarray, shape (families + 1,)
         Work of each family and, last, of motion [J].
     impulse : ndarray, shape (3,)

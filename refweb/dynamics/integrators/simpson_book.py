@@ -233,7 +233,7 @@ class SimpsonBook:
         self.note_largest(course, energies)
         drift = abs(own.sum() - work - course.energy)
         course.worst = max(course.worst, drift)
-        share = drift / course.largest if course.largest > 0.0 else drift
+        share = drift / course.largest
         if not share <= max(DRIFT, CLOSING * course.share):
             raise OpenBook(
                 f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and "

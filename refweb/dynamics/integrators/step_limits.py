@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .integrator import SAME
+
 TRAVEL = 0.2
 """Largest share of a body's thickness that anything may move in a step, so that nothing passes through; where bodies
 are further away, half of that distance."""
@@ -27,17 +29,17 @@ class StepLimits:
 
     def at_corner(self, t):
         """Whether a table has a corner at a time [s]."""
-        return bool((np.abs(self._corners - t) <= 1e-12 * t).any())
+        return len(self._corners) > 0 and bool((np.abs(self._corners - t) <= SAME * t).any())
 
     def stop(self, t, x, v, end):
         """Time that a step from a state must not pass, on the way to ``end`` [s]; infinite where nothing limits it."""
-        ahead = self._corners[self._corners > t * (1.0 + 1e-12)]
+        ahead = self._corners[self._corners > t * (1.0 + SAME)]
         stop = ahead[0] if len(ahead) else np.inf
         if np.isfinite(self._thickness):
             speed = 2.0 * np.sqrt((v[: self._moving] ** 2).sum(axis=1).max())
             way = max(TRAVEL * self._thickness, 0.5 * self._gap(x))
             stop = min(stop, t + way / speed) if speed > 0.0 else stop
-        return t + 1e-12 * end if stop - t < 1e-12 * end else stop
+        return t + SAME * end if stop - t < SAME * end else stop
 
     def _gap(self, x):
         """At most the least distance between a body and a node [m]: that of balls around and a box around."""
