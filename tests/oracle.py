@@ -5,18 +5,101 @@ Position x(s) ∈ R³ over natural arc length s, λ = |x'|, t = x'/λ, T = A σ(
     internal force   ∫ T t·δx' ds
     tangent          ∫ [A σ' (t·δx')(t·dx') + T/λ (δx'·dx' − (t·δx')(t·dx'))] ds
 
-scikit-fem sees natural arc length through the mapping of `refweb.net.discretisation.basis` and numbers the components
-of nodes in its own way: vertices first, then what lies inside of elements. `Oracle` knows the row of each of its dofs
-from the numbering that scenes promise: the web's nodes, then those that order and subdivision add, line by line and
-along each line.
+Nothing of it is refweb's own. Every element is an interval of one axis of natural arc length, beside its neighbours
+and not joined to them, so that the metric is that of scikit-fem's mesh. Functions and quadrature are scikit-fem's, but
+for the cubic that it does not have; the laws are written here as the paper has them. `Oracle` gathers the nodes of
+intervals into rows by the numbering that scenes promise: the web's nodes, then those that order and subdivision add,
+line by line and along each line.
 """
 
 import numpy as np
+import scipy.sparse
 import skfem
 from skfem.helpers import dot
 
-from refweb.net import discretisation
-from refweb.net.elements import line_element
+# Laws
+
+
+class Smooth:
+    """σ = E[(s + r)/2 − α], s = ε − ε0, r = √(s² + 4η²), α = (−ε0 + √(ε0² + 4η²))/2; its slope, and its integral."""
+
+    @staticmethod
+    def stress(strain, E, slackness, smoothing):
+        s = strain - slackness
+        floor = 0.5 * (np.sqrt(slackness**2 + 4.0 * smoothing**2) - slackness)
+        return E * (0.5 * (s + np.sqrt(s**2 + 4.0 * smoothing**2)) - floor)
+
+    @staticmethod
+    def tangent(strain, E, slackness, smoothing):
+        s = strain - slackness
+        return 0.5 * E * (1.0 + s / np.sqrt(s**2 + 4.0 * smoothing**2))
+
+    @staticmethod
+    def energy_density(strain, E, slackness, smoothing):
+        def integral(s):
+            root = np.sqrt(s**2 + 4.0 * smoothing**2)
+            return 0.25 * s * (s + root) + smoothing**2 * np.arcsinh(0.5 * s / smoothing)
+
+        floor = 0.5 * (np.sqrt(slackness**2 + 4.0 * smoothing**2) - slackness)
+        return E * (integral(strain - slackness) - integral(-slackness) - floor * strain)
+
+
+class TensionOnly:
+    """σ = E max(ε, 0)."""
+
+    @staticmethod
+    def stress(strain, E, slackness, smoothing):
+        return E * np.maximum(strain, 0.0)
+
+    @staticmethod
+    def tangent(strain, E, slackness, smoothing):
+        return E * (strain >= 0.0)
+
+    @staticmethod
+    def energy_density(strain, E, slackness, smoothing):
+        return 0.5 * E * np.maximum(strain, 0.0) ** 2
+
+
+class Linear:
+    """σ = E ε."""
+
+    @staticmethod
+    def stress(strain, E, slackness, smoothing):
+        return E * strain
+
+    @staticmethod
+    def tangent(strain, E, slackness, smoothing):
+        return E + 0.0 * strain
+
+    @staticmethod
+    def energy_density(strain, E, slackness, smoothing):
+        return 0.5 * E * strain**2
+
+
+LAWS = {"smooth": Smooth, "tension-only": TensionOnly, "linear": Linear}
+
+
+# Elements
+
+
+class Cubic(skfem.element.ElementH1):
+    """Lagrange's polynomials on the four points at which (1 − z²) P₃'(z) is zero, z = 2 ξ − 1; ends come first."""
+
+    nodal_dofs, interior_dofs, maxdeg, dofnames = 1, 2, 3, ["u", "u", "u"]
+    refdom = skfem.refdom.RefLine
+    inner = np.polynomial.Legendre.basis(3).deriv().roots()
+    doflocs = 0.5 * (np.concatenate([[-1.0, 1.0], inner])[:, None] + 1.0)
+
+    def lbasis(self, X, i):
+        own, others = self.doflocs[i, 0], np.delete(self.doflocs[:, 0], i)
+        product = np.polynomial.Polynomial.fromroots(others) / np.prod(own - others)
+        return product(X[0]), product.deriv()(X[0])[None]
+
+
+ELEMENTS = {1: skfem.ElementLineP1, 2: skfem.ElementLineP2, 3: Cubic}
+
+
+# Forms
 
 
 def along(u):
@@ -97,7 +180,7 @@ class Oracle:
     """
 
     def __init__(self, web, cable):
-        order, pieces, element = cable.order, cable.subdivide, line_element(cable.order)
+        order, pieces, element = cable.order, cable.subdivide, ELEMENTS[cable.order]()
         rows = rows_of_lines(web, cable)
         self.cells = np.vstack([line[k * order : (k + 1) * order + 1] for line in rows for k in range(pieces)])
         along = np.sort(element.doflocs[:, 0])
@@ -108,31 +191,34 @@ class Oracle:
 
         of_line = np.repeat(np.arange(len(web.lines)), pieces)
         values = {name: value[of_line] for name, value in cable.properties(web).items()}
-        ends, vertex = np.unique(self.cells[:, [0, -1]], return_inverse=True)
-        vertex = vertex.reshape(-1, 2)
-        vector = skfem.ElementVector(element, 3)
-        self.basis = discretisation.basis(self.points[ends], vertex, values["natural_length"] / pieces, vector)
+        self.basis = self._basis(2 * order - 1, element, values["natural_length"] / pieces)
         # Dofs of an element: first its two ends, then what lies inside along it; of each node x, y, z.
         own = np.hstack([self.cells[:, [0, -1]], self.cells[:, 1:-1]])
         self.row = np.empty(self.basis.N, dtype=int)
         self.row[self.basis.element_dofs.T] = (3 * own[:, :, None] + np.arange(3)).reshape(len(own), -1)
-        self.forms = forms(cable.tension_law)
+        self.gather = scipy.sparse.csr_array((np.ones(self.basis.N), (self.row, np.arange(self.basis.N))))
+        self.forms = forms(LAWS[cable.law])
         names = dict(E="modulus", A="area", density="density", slackness="slackness", smoothing="smoothing")
         self.numbers = {key: values[name][:, None] for key, name in names.items()}
+
+    @staticmethod
+    def _basis(degree, element, lengths):
+        """Intervals of these lengths [m] side by side; their quadrature is exact for a degree."""
+        ends = np.cumsum(lengths)
+        places = np.column_stack([ends - lengths, ends]).ravel()
+        mesh = skfem.MeshLine1(places[None], np.arange(len(places)).reshape(-1, 2).T, validate=False)
+        return skfem.Basis(mesh, skfem.ElementVector(element, 3), intorder=degree)
 
     def _at(self, x):
         return dict(self.numbers, x=self.basis.interpolate((self.points + x).ravel()[self.row]))
 
     def _by_row(self, matrix):
         """A matrix of scikit-fem's dofs as one of components 3 row + axis."""
-        matrix = matrix.tocoo()
-        return type(matrix)((matrix.data, (self.row[matrix.row], self.row[matrix.col])), matrix.shape).tocsr()
+        return (self.gather @ matrix.tocsr() @ self.gather.T).tocsr()
 
     def force(self, x):
         """Force of the lines on every node at the displacement x [N], shape (rows, 3)."""
-        force = np.empty(self.basis.N)
-        force[self.row] = -self.forms[0].assemble(self.basis, **self._at(x))
-        return force.reshape(-1, 3)
+        return (self.gather @ -self.forms[0].assemble(self.basis, **self._at(x))).reshape(-1, 3)
 
     def stiffness(self, x):
         """Tangent of all components [N/m]."""
@@ -148,5 +234,5 @@ class Oracle:
 
     def mass(self):
         """Consistent mass of all components [kg], by quadrature that is exact for it."""
-        exact = skfem.Basis(self.basis.mesh, self.basis.elem, mapping=self.basis.mapping, intorder=8)
+        exact = skfem.Basis(self.basis.mesh, self.basis.elem, intorder=8)
         return self._by_row(mass.assemble(exact, **self.numbers))

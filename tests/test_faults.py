@@ -24,6 +24,7 @@ import tomli_w
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics.integrators import central_difference, step_observer
+from refweb.errors import OpenBook
 
 WEB = refweb.Window(mesh="hexagon", rows=4, columns=3, side=0.2)
 CABLE = refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
@@ -231,6 +232,33 @@ def test_a_repeated_run_goes_on_with_its_accuracy(tmp_path, monkeypatch):
         refweb.resume(cut)
     assert made == [] and told(cut) == told(whole)
     assert files(cut)["history.csv"] == files(whole)["history.csv"]
+
+
+@pytest.mark.parametrize("pays, attempts, cut_at", [(True, 5, 2), (False, 3, 1), (False, 3, 3)])
+def test_a_run_that_goes_on_has_no_more_attempts(tmp_path, monkeypatch, pays, attempts, cut_at):
+    """A book that never closes ends the run after as many attempts, wherever one of them was interrupted."""
+    monkeypatch.setattr(refweb.dynamics.accuracy_loop, "MOST_ATTEMPTS", 5)
+    own, interrupting = central_difference.CentralDifference.advance, []
+
+    def advance(self, course, times):
+        attempt = round(np.log2(0.5 / self.safety)) + 1  # each has half the step of that before
+        if interrupting and attempt == cut_at and course.time > 0.0105:
+            raise KeyboardInterrupt
+        if course.time > 0.0205:
+            raise OpenBook("the book is open", 0.25**attempt if pays else 0.5)
+        return own(self, course, times)
+
+    monkeypatch.setattr(central_difference.CentralDifference, "advance", advance)
+    case, whole, cut = scene(), tmp_path / "whole", tmp_path / "cut"
+    with pytest.raises(OpenBook):
+        refweb.run(case, out=whole)
+    interrupting.append(True)
+    with pytest.raises(KeyboardInterrupt):
+        refweb.run(case, out=cut)
+    interrupting.clear()
+    with pytest.raises(OpenBook):
+        refweb.resume(cut)
+    assert len(told(whole)["warnings"]) == attempts - 1 and told(cut) == told(whole)
 
 
 def test_a_resumed_run_can_be_resumed(tmp_path, monkeypatch):

@@ -35,6 +35,8 @@ class Standing:
         Its value in the run.
     repeated : int
         How often a run was repeated since digits were last looked at, as its book stayed open.
+    drift : float
+        Energy drift at which the last of these ended [1], infinite where there is none.
     missing : dict of str to float
         ± over what digits allow, by result, when they were last looked at.
     """
@@ -42,6 +44,7 @@ class Standing:
     first: float
     knob: float
     repeated: int = 0
+    drift: float = np.inf
     missing: dict[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -50,12 +53,13 @@ class Standing:
         if kept is None:
             return cls(first, first)
         missing = dict(zip(kept["missing"].tolist(), kept["shares"].tolist(), strict=True))
-        return cls(first, float(kept["accuracy"]), int(kept["repeated"]), missing)
+        return cls(first, float(kept["accuracy"]), int(kept["repeated"]), float(kept["drift"]), missing)
 
     def arrays(self):
         """What a checkpoint keeps of it."""
         names, shares = np.array(list(self.missing), dtype=str), np.array(list(self.missing.values()))
-        return {"accuracy": self.knob, "repeated": self.repeated, "missing": names, "shares": shares}
+        counted = {"accuracy": self.knob, "repeated": self.repeated, "drift": self.drift}
+        return {**counted, "missing": names, "shares": shares}
 
 
 def follow(simulation, folder, tell):
@@ -78,7 +82,6 @@ def follow(simulation, folder, tell):
 def run_within_drift(simulation, folder, tell):
     """Run with errors; one whose energy book stays open is repeated with a smaller knob, see `ATTEMPTS`."""
     scene, solution, standing = simulation.scene, simulation.solution, simulation.standing
-    before = np.inf
     while True:
         name = simulation.integrator.knob
         text = "running" if standing.knob == standing.first else f"running with {name} = {standing.knob:g}"
@@ -86,10 +89,10 @@ def run_within_drift(simulation, folder, tell):
             try:
                 run = simulation.run(folder, functools.partial(tell, text))
             except OpenBook as error:
-                pays = error.drift <= PAYS * before and standing.repeated < MOST_ATTEMPTS - 1
+                pays = error.drift <= PAYS * standing.drift and standing.repeated < MOST_ATTEMPTS - 1
                 if scene.solve.step_size is not None or standing.repeated >= ATTEMPTS - 1 and not pays:
                     raise
-                standing.repeated, before = standing.repeated + 1, error.drift
+                standing.repeated, standing.drift = standing.repeated + 1, error.drift
                 standing.knob *= simulation.integrator.retry
                 solution.warnings.append(f"{error}; repeated with {name} = {standing.knob:g}")
                 simulation.again(folder)
@@ -97,7 +100,7 @@ def run_within_drift(simulation, folder, tell):
             tell("finding errors by a twin run", 1.0)
             ended = twin.ended() if twin else None
         break
-    solution.reduced, standing.repeated = run.results, 0
+    solution.reduced, standing.repeated, standing.drift = run.results, 0, np.inf
     if ended is not None:
         from .twin_error import add_errors
 

@@ -103,6 +103,31 @@ def test_smoothing(smoothing):
     assert {n: r.value for n, r in without.results.items()} == {n: r.value for n, r in smooth.results.items()}
 
 
+@pytest.mark.parametrize("ratio", [1e-3, 1e-2, 0.1, 0.3])
+def test_smoothing_of_one_line(ratio):
+    """A line of natural length L under EA e: by the smooth law it is strained by e + ηe/(e + η), and 0 is the limit.
+
+    A tenth of η has another curve: the estimate is short of what η changes by 0.1 η/(e + 0.1 η) of it, and by nothing
+    else but the rounding of positions.
+    """
+    load = 70.0
+    smoothing = ratio * load / EA
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=bars("smooth", smoothing=smoothing),
+        effects=[refweb.Load(node=1, force=(load, 0.0, 0.0))],
+        observe=[
+            refweb.Observe(name="far", quantity="displacement", node=1, component="x"),
+            refweb.Observe(name="tension", quantity="tension"),
+        ],
+    )
+    results, strain = refweb.run(scene).results, load / EA
+    off = smoothing * strain / (strain + smoothing)
+    assert results["far"].value == pytest.approx(strain + off, rel=1e-9)
+    assert results["far"].smoothing == pytest.approx(off / (1.0 + 0.1 * ratio), rel=1e-8)
+    assert abs(results["tension"].value - load) <= 1e-8 * load and results["tension"].smoothing <= 1e-8 * load
+
+
 # Elements
 
 

@@ -213,13 +213,13 @@ def test_prescribed_motion_is_followed():
 # Rows and resumed runs
 
 
-def impact_system():
+def impact_system(**changes):
     """Gravity, a load, prescribed motion, a ball: all that a run's state has to remember."""
     effects = [
         refweb.Gravity(acceleration=(0.0, 0.0, -9.81)),
         refweb.Load(node="centre", force=(0.0, 1.0, 2.0), factor=[(0.0, 1.0), (0.01, 2.0)]),
         refweb.Motion(node=0, displacement=MOTION),
-        *ball(),
+        *ball(**changes),
     ]
     return scene(effects=effects).build()
 
@@ -307,6 +307,31 @@ def test_rows_are_multiples_of_the_interval_and_the_end(duration, interval, last
     assert times[-1] == duration and len(times) == last + 1
 
 
+@pytest.mark.parametrize("method", ["central-difference", "cvode", "ida"])
+def test_momentum_is_that_of_what_is_free(method):
+    """Σ m v of nodes that are neither held nor driven, whose masses here are those of two half lines each.
+
+    A chain is drawn by one end: the driven node has the largest velocity, and half a line of mass that is not counted.
+    """
+    drawn = refweb.Motion(node=3, displacement=[(0.0, 0.0, 0.0, 0.0), (1.0, 2.0, 0.0, 1.0)])
+    solution = refweb.run(
+        refweb.Scene(
+            web=refweb.SingleCable(start=(0, 0, 0), end=(0.3, 0, 0), elements=3),
+            cable=cable(law="linear", prestrain=0.01),
+            effects=[drawn],
+            supports=refweb.Supports(nodes=[0]),
+            solve=refweb.Dynamic(duration=5e-3, method=method),
+            output=refweb.Output(interval=1e-3, frames=1),
+            accuracy=refweb.Accuracy(error="none"),
+        )
+    )
+    node = DENSITY * AREA * 0.1 / 1.01
+    expected = np.array([node * state.v[1:3].sum(axis=0) for _, state in solution.frames])
+    found = np.column_stack([solution.history[f"momentum_{axis}"] for axis in "xyz"])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * node)
+    assert np.abs(found[-1]).max() > 1e-2 * node
+
+
 # Observables
 
 
@@ -326,7 +351,7 @@ def choices(system):
 @pytest.fixture(scope="module")
 def followed():
     """(observables, run with a row and a frame at every step, the same run with a row every 20 steps)."""
-    system = impact_system()
+    system = impact_system(velocity=(0.0, 0.5, 8.0))
     observe = [
         refweb.Observe(name=f"{i} {reduce}", reduce=reduce, **given)
         for i, given in enumerate(choices(system))
@@ -336,6 +361,23 @@ def followed():
     h = 1e-4
     fine = scene(interval=h, frames=1, step_size=h, effects=effects, observe=observe)
     return observe, refweb.run(fine), refweb.run(fine.replace(output=refweb.Output(interval=20 * h)))
+
+
+STIFFNESS, RADIUS = 1e5, 0.1
+"""Of the contact [N/m] and of the ball [m]."""
+
+
+def pushed(state):
+    """Depth of the ball in each line [m], and its push on all [N]: a penalty at the nearest point of each."""
+    net, web = state.system.net, state.system.net.web
+    place = net.points + state.x
+    start, end, centre = place[web.lines[:, 0]], place[web.lines[:, 1]], place[len(web.points)]
+    along = end - start
+    share = np.clip(((centre - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    away = start + share[:, None] * along - centre
+    distance = np.linalg.norm(away, axis=1)
+    depth = np.maximum(RADIUS - distance, 0.0)
+    return depth, STIFFNESS * (depth / distance) @ away
 
 
 def recomputed(observe, state):
@@ -359,6 +401,11 @@ def recomputed(observe, state):
         return 0.5 * np.sum(net.mass[:, None] * state.v**2)
     if observe.quantity in ("work", "step_size"):
         return None
+    if observe.quantity == "contact_energy":
+        return 0.5 * STIFFNESS * (pushed(state)[0] ** 2).sum()
+    if observe.quantity == "reaction" and observe.body is not None:
+        push = pushed(state)[1]
+        return np.linalg.norm(push) if observe.component is None else -push[observe.component]
     if observe.quantity == "total_energy":
         book = state.energies
         return sum(book[f"{name}_energy"] for name in ("strain", "potential", "contact")) + 0.5 * np.sum(
@@ -368,10 +415,12 @@ def recomputed(observe, state):
 
 
 def test_observables_at_every_row(followed):
-    """Columns are what positions and velocities of the frames say."""
+    """Columns are what positions and velocities of the frames say; the ball touches, several lines at a time."""
     observe, fine, _ = followed
     states = [state for _, state in fine.frames]
     assert len(states) == len(fine.history["time"]) == 201
+    touched = np.array([(pushed(state)[0] > 0.0).sum() for state in states])
+    assert (touched > 0).sum() > 20 and (touched == 0).sum() > 20 and touched.max() > 1
     for o in observe[::3]:
         values = [recomputed(o, state) for state in states]
         if None not in values:

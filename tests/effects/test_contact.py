@@ -1,5 +1,7 @@
 """Contact with bodies of all shapes, with damping and friction: distances, hits, slides, wraps, rolls and messages."""
 
+import pathlib
+import re
 from dataclasses import replace
 
 import nets
@@ -334,6 +336,44 @@ def test_block_slides_to_rest():
     limit = speed**2 / (2.0 * friction * GRAVITY)
     np.testing.assert_allclose(ways[-1], limit, rtol=2e-4)
     assert 1.6 < slope(np.array(ways) - limit, slips) < 2.0
+
+
+README = (pathlib.Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+
+
+def test_slip_velocity_by_default():
+    """At the one that the README names friction is 1/√2 of μ N, and far above it all of it."""
+    slip = float(re.search(r"`slip_velocity` \((\S+) m/s\)", README).group(1))
+    web = refweb.Inline(points=[[-0.1, 0, 0], [0.1, 0, 0]], lines=[[0, 1]]).web()
+    effects = [rigid("sphere", position=(0.0, 0.0, -0.299)), refweb.Contact(stiffness=1e4, friction=0.5)]
+    material = refweb.Cable(law="linear", modulus=1e6, area=1e-4, density=1.0)
+    contact = nets.system(web, material, effects, False, np.zeros((2, 3), dtype=bool))
+    along, x = np.zeros((3, 3)), np.zeros((3, 3))
+    along[:2, 0] = 1.0
+    friction = [-contact.force(0.0, x, times * slip * along)[:2, 0].sum() for times in (1.0, 1e4)]
+    np.testing.assert_allclose(friction[1], 0.5 * 1e4 * 1e-3, rtol=1e-7)
+    np.testing.assert_allclose(friction[0], friction[1] / np.sqrt(2.0), rtol=1e-7)
+
+
+@pytest.mark.parametrize("shape", ["box", "cylinder"])
+def test_rounding_by_default(shape):
+    """Of the share of the smallest size that the README names: a line past an edge touches where the round begins.
+
+    It runs along the edge, in the plane that halves its angle; there the surface lies (√2 − 1) r within the sharp edge.
+    """
+    share = float(re.search(r"`rounding` \((\S+) % of the smallest size\)", README).group(1)) / 100.0
+    sizes = dict(box=dict(size=(0.6, 0.5, 0.8)), cylinder=dict(radius=0.3, length=0.5, axis=(0.0, 1.0, 0.0)))[shape]
+    within = (np.sqrt(2.0) - 1.0) * share * 0.5
+    body = refweb.Body(name="it", shape=shape, position=(0.0, 0.0, 0.0), fixed=True, **sizes)
+    long = 0.05 if shape == "box" else 1e-6  # the cylinder's edge is a circle
+    material = refweb.Cable(law="linear", modulus=1e6, area=1e-4, density=1.0)
+    pushes = []
+    for deep in (0.97 * within, 1.03 * within):
+        x, y = 0.3 - deep / np.sqrt(2.0), 0.25 - deep / np.sqrt(2.0)
+        web = refweb.Inline(points=[[x, y, -long], [x, y, long]], lines=[[0, 1]]).web()
+        one = nets.system(web, material, [body, refweb.Contact(stiffness=1e4)], False, np.zeros((2, 3), dtype=bool))
+        pushes.append(np.abs(one.force(0.0, np.zeros((3, 3)))).max())
+    assert pushes[0] == 0.0 < pushes[1]
 
 
 def test_block_that_is_dropped_rests_on_the_box():

@@ -8,6 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from refweb.errors import InputError
+from refweb.net import lattices
 from refweb.net.inline import Inline
 from refweb.net.lattices import Layers, Paper, Window
 from refweb.net.mesh_file import File
@@ -210,6 +211,18 @@ def test_layers_refuse():
         Layers(mesh="hexagn", layers=2, cell_area=1.0)
 
 
+@pytest.mark.parametrize("mesh", MESHES)
+def test_the_limit_of_layers_is_one_of_cells(mesh, monkeypatch):
+    """A web of as many cells as are allowed is made, and one that has one more is refused with its number of cells."""
+    layers = Layers(mesh=mesh, layers=5, cell_area=1.0)
+    cells = layers.web().cells
+    monkeypatch.setattr(lattices, "_MOST_CELLS", cells)
+    assert layers.web().cells == cells
+    monkeypatch.setattr(lattices, "_MOST_CELLS", cells - 1)
+    with pytest.raises(InputError, match=f"^layers = 5 makes {cells} cells, must be ≤ {cells - 1}$"):
+        layers.web()
+
+
 @pytest.mark.parametrize("elements", [2, 3, 10, 101])
 @pytest.mark.parametrize("stretch", [1 + 1e-14, 1 + 1e-9, 1.01, pi / 2, 3.0, 1e3])
 def test_slack_cable_lies_on_an_arc_of_equal_chords(elements, stretch):
@@ -311,6 +324,19 @@ def test_inline():
     given = Inline(**TRIANGLE, natural_length=2.5).web()
     assert given.natural_length.tolist() == [2.5] * 3 and given.length_given
     assert Inline(**TRIANGLE, natural_length=[1, 2, 3]).web().natural_length.tolist() == [1, 2, 3]
+
+
+def test_cells_of_a_web_in_parts():
+    """Two triangles apart, and a line by itself: each closed loop is a mesh, whatever part it belongs to."""
+    points = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    apart = [*points, *([x + 5, y, z] for x, y, z in points)]
+    triangles = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3]]
+    assert Inline(points=points, lines=triangles[:3]).web().cells == 1
+    assert Inline(points=apart, lines=triangles).web().cells == 2
+    assert Inline(points=[*apart, [9, 0, 0], [9, 1, 0]], lines=[*triangles, [6, 7]]).web().cells == 2
+    assert Inline(points=apart, lines=[*triangles, [1, 3]]).web().cells == 2
+    count, part = Inline(points=apart, lines=triangles).web().components()
+    assert count == 2 and part.tolist() == [0, 0, 0, 1, 1, 1]
 
 
 def test_arrays_are_typed_and_read_only():

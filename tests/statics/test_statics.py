@@ -409,6 +409,47 @@ def test_gap_of_a_hanging_line_is_its_energy_above_the_least(seed):
     assert abs(seen.tension[0] - weight) <= found.tension[0]
 
 
+@pytest.mark.parametrize("share", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_the_bound_on_strain_energy_is_sharp(share):
+    """A line along its weight F, stretched by a share δ too much: T − F = δF, and all bounds are met but for O(δ²).
+
+    The energy is off by (T² − F²)/2k = (2δ + δ²) F²/2k, of which the bound 2 √(U gap) + gap is (2δ + 3δ²) F²/2k.
+    """
+    axial, length, weight = 100.0, 2.0, 3.0
+    points, cable = [[0, 0, 0], [0, 0, -length]], Cable(law="tension-only", modulus=1e6, area=1e-4, density=0.0)
+    net_system = joined(points, [[0, 1]], None, [0], cable, Load(node=1, force=(0.0, 0.0, -weight)))
+    stiffness, x = axial / length, np.zeros((2, 3))
+    x[1, 2] = -(1.0 + share) * weight / stiffness
+    force, seen = net_system.forces(1.0, x)
+    found = duality_bound(net_system, Equilibrium(1.0, x, seen.tension.copy(), force))
+    unit = 0.5 * weight**2 / stiffness
+    allowed = 1e-15 / share**2  # a few roundings of energies, over the gap δ² F²/2k
+    assert found.strain_energy == pytest.approx((2.0 * share + 3.0 * share**2) * unit, rel=allowed)
+    assert found.tension[0] == pytest.approx(share * weight, rel=allowed)
+
+
+def test_the_gap_holds_the_rounding_of_positions():
+    """Under loads whose stretch F/k is no double Π(x) lies above Π* = −F²/2k, though T is F to the last bit.
+
+    In exact arithmetic Π(x) − Π* = ½ k (x − F/k)², of which a gap of computed forces alone knows nothing.
+    """
+    axial, length, unseen = 100.0, 2.0, 0
+    points, cable = [[0, 0, 0], [0, 0, -length]], Cable(law="tension-only", modulus=1e6, area=1e-4, density=0.0)
+    for weight in np.random.default_rng(0).uniform(0.5, 5.0, 40):
+        net_system = joined(points, [[0, 1]], None, [0], cable, Load(node=1, force=(0.0, 0.0, -weight)))
+        (found,) = solve(net_system)
+        with mpmath.workdps(60):
+            stiffness = mpmath.mpf(net_system.net.line_data[0, 1]) / mpmath.mpf(length)
+            off = -mpmath.mpf(float(found.x[1, 2])) - mpmath.mpf(float(weight)) / stiffness
+            above = stiffness * off**2 / 2
+        assert found.duality_bound.gap >= above, weight
+        # By computed forces alone the gap is that of T − F, as doubles.
+        unseen += (found.tension[0] - weight) ** 2 / (2.0 * axial / length) < above
+        energy = 0.5 * weight**2 / (axial / length)
+        assert found.duality_bound.gap < 1e-14 * energy and found.x[1, :2].tolist() == [0.0, 0.0]
+    assert unseen > 0
+
+
 # Any start, load, slackness.
 
 

@@ -7,7 +7,9 @@ import pytest
 
 import refweb
 from refweb.__main__ import main
+from refweb.dynamics.initial_state import Start
 from refweb.errors import InputError
+from refweb.studies import predictability
 from refweb.studies.predictability import PERTURBATION
 
 
@@ -62,6 +64,41 @@ def test_an_ensemble_of_what_is_not_determined():
     last = found["ensemble"]["last"]
     assert "last" in found["statistical"]
     assert last["deviation"] > abs(last["mean"]) > 0.0
+
+
+def test_mean_and_deviation_of_an_ensemble(monkeypatch):
+    """Of runs that begin at known places y beside an unstable equilibrium, which end at y cosh κt.
+
+    The deviation is that of a sample: (n − 1) of its squares are the sum of those of the distances from the mean. The
+    time in which y grows ends before lines turn; steps of the default bound keep cosh κt to 1 %, alike in all runs.
+    """
+    rate, beside = np.sqrt(2.0 * 7e3 * 1e-3), np.array([3.0, -1.0, 4.0, 1.0, -5.0]) * 1e-9
+
+    def start(simulation, seed):
+        x = np.zeros((simulation.system.rows, 3))
+        x[1, 1] = beside[seed - 1]
+        return Start(x, None)
+
+    monkeypatch.setattr(predictability, "_beside", start)
+    found = refweb.run(oscillator(-1e-3, 8.0 / rate, ensemble=len(beside))).horizon["ensemble"]
+    grown, mean = np.cosh(8.0), beside.mean()
+    deviation = np.sqrt(((beside - mean) ** 2).sum() / (len(beside) - 1))
+    assert found["last"]["mean"] == pytest.approx(grown * mean, rel=0.01)
+    assert found["last"]["deviation"] == pytest.approx(grown * deviation, rel=0.01)
+    assert found["last"]["deviation"] / found["last"]["mean"] == pytest.approx(deviation / mean, rel=1e-6)
+
+
+def test_only_what_lies_beyond_the_horizon_is_statistical():
+    """A peak of a time at which all digits are left is none, beside an end at which none is."""
+    rate = np.sqrt(2.0 * 7e3 * 1e-3)
+    scene = oscillator(-1e-3, 45.0 / rate)
+    early = refweb.Observe(name="early", quantity="velocity", body="ball", component="z", reduce="max")
+    ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(1.0, 9.0, 0.0), velocity=(0.0, 0.0, 1e-6))
+    # Drawn down from the start on: its largest velocity upwards is the first.
+    down = refweb.Gravity(acceleration=(0.0, 0.0, -1e-6))
+    scene = scene.replace(effects=[*scene.effects, ball, down], observe=[early, *scene.observe[1:]])
+    solution = refweb.run(scene)
+    assert solution.results["early"].time == 0.0 and solution.horizon["statistical"] == ["last"]
 
 
 def test_command_line(tmp_path, capsys):
