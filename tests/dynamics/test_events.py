@@ -64,14 +64,14 @@ def test_first_touch_of_a_flying_ball(solve):
     hit = scene(
         [refweb.Event(name="touch", kind="contact"), refweb.Event(name="same", kind="contact", body="ball")],
         solve,
-        duration=0.05,
+        duration=0.032,
         web=refweb.Window(mesh="square", rows=2, columns=2, side=0.2),
         cable=cable(density=200.0),
         effects=[ball(), refweb.Contact(stiffness=1e5)],
     )
     solution = refweb.run(hit)
     event = agrees(solution, "touch", 0.13 - np.sqrt(0.1**2 - 0.01**2), within=1e-9)
-    assert times(solution)["same"] == event["time"] and solution.history["time"][-1] == 0.05
+    assert times(solution)["same"] == event["time"] and solution.history["time"][-1] == 0.032
 
 
 def held_line(**changes):

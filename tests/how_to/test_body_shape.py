@@ -75,16 +75,18 @@ WALL = {"name": "it", "shape": "wall", "normal": [float(x) for x in NORMAL], "fi
 TOP = {"name": "it", "shape": "top", "lower": 0.3, "upper": 0.15, "fixed": True}
 
 
-@pytest.fixture(autouse=True)
-def shapes(tmp_path, monkeypatch):
+@pytest.fixture(autouse=True, scope="module")
+def shapes(tmp_path_factory):
     """The example in a file of its own, and its line in the table; the other shape likewise."""
-    (tmp_path / "scratch").mkdir()
-    (tmp_path / "scratch" / "__init__.py").touch()
-    (tmp_path / "scratch" / f"{NAME}.py").write_text(EXAMPLE, encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setitem(SHAPES, NAME, PLACE.replace("refweb.net.shapes", "scratch"))
-    monkeypatch.setitem(SHAPES, "top", f"{__name__}:Top")
-    yield
+    scratch = tmp_path_factory.mktemp("page") / "scratch"
+    scratch.mkdir()
+    (scratch / "__init__.py").touch()
+    (scratch / f"{NAME}.py").write_text(EXAMPLE, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(scratch.parent)
+        patch.setitem(SHAPES, NAME, PLACE.replace("refweb.net.shapes", "scratch"))
+        patch.setitem(SHAPES, "top", f"{__name__}:Top")
+        yield
     for name in ("scratch", f"scratch.{NAME}"):
         sys.modules.pop(name, None)
 

@@ -25,21 +25,23 @@ COUNT = 16
 """Elements of a cable."""
 
 
-@pytest.fixture
-def page(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
     """The tables of a scene that the page ends with, when all it says before has been done."""
     source, line, scene = (textwrap.dedent(block) for block in BLOCK.findall(refweb.effects.__doc__))
-    (tmp_path / "scratch").mkdir()
-    (tmp_path / "scratch" / "current.py").write_text(source.replace("'''", '"""'), encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
+    scratch = tmp_path_factory.mktemp("page") / "scratch"
+    scratch.mkdir()
+    (scratch / "current.py").write_text(source.replace("'''", '"""'), encoding="utf-8")
     name, place = re.fullmatch(r'"(\w+)": "([\w.:]+)",\s*', line).groups()
-    monkeypatch.setitem(registry.EFFECTS, name, place.replace("refweb.effects", "scratch"))
-    yield tomllib.loads(scene)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(scratch.parent)
+        patch.setitem(registry.EFFECTS, name, place.replace("refweb.effects", "scratch"))
+        yield tomllib.loads(scene)
     for module in [module for module in sys.modules if module.split(".")[0] == "scratch"]:
         del sys.modules[module]
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def current(page):
     """The class of the page."""
     return importlib.import_module("scratch.current").Current

@@ -163,7 +163,7 @@ print(-peak(3) + peak(100))
 
 BOMBS = {
     "deep lists": "x = " + "[" * 100_000,
-    "deep tables": "[" + "a." * 50_000 + "a]",
+    "deep tables": "[" + "a." * 5_000 + "a]",
     "deep inline tables": "x = " + "{a=" * 50_000,
     "long number": "x = " + "9" * 100_000,
     "many keys": "\n".join(f"k{i} = 1" for i in range(100_000)),
@@ -179,9 +179,9 @@ def test_bombs(tmp_path, capsys, name):
 
 
 def test_a_huge_list(tmp_path, capsys):
-    nodes = ", ".join(["0"] * 300_000)
+    nodes = ", ".join(["0"] * 100_000)
     write(tmp_path, more=f"[[load]]\nnode = [{nodes}, 99]\nforce = [0.0, 0.0, 1.0]")
-    refused(tmp_path, capsys, "[[load]] 1 node[300000] = 99 must be 0 … ")
+    refused(tmp_path, capsys, "[[load]] 1 node[100000] = 99 must be 0 … ")
 
 
 @pytest.mark.parametrize("value", ["1e308", "nan", "inf", "-inf", "1e101", "5e-324"])
