@@ -35,7 +35,7 @@ DIGITS_OF_ORDER_6 = 5
 """Digits from which order 6 is cheaper than order 2."""
 DIGITS_OF_ADAMS = 8
 """Digits from which Adams methods are cheaper than order 2, where order 6 does not take the forces: central differences
-take √10 times the steps for each, on webs under a load with a factor 0.01 s for 6 and Adams methods 0.3 s for 9."""
+take √10 times the steps for each, on webs whose load has a factor 0.01 s for 6 where Adams methods take 0.3 s for 9."""
 PER_STEP, PER_ELEMENT = 1e-6, 12e-9
 """CPU time of a compiled explicit step [s], and of each element in it [s]."""
 QUICK_RUN = 0.5
@@ -80,7 +80,7 @@ def decided(scene, system):
     if digits >= DIGITS_OF_ORDER_6:
         try:
             load(INTEGRATORS["explicit"].integrator)(system)
-            return _of(scene, "explicit", f"{digits} digits, and forces that follow from displacement alone: {price}")
+            return _of(scene, "explicit", f"{digits} digits, and forces of displacement alone and dead loads: {price}")
         except InputError:
             if digits >= DIGITS_OF_ADAMS:
                 why = f"{digits} digits, and forces that no explicit step of order 6 takes"

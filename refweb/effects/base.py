@@ -42,7 +42,8 @@ class Family:
         Column of the energy book that its energy or power belongs to: "work", "dissipated_energy", or an energy of
         its own.
     energy : kernel, optional
-        Potential of the force, where there is one.
+        Potential of the force, where there is one; that of a force with a ``power`` is linear in time between its
+        ``times``.
     stiffness : kernel, optional
         −∂f/∂x by cell, None where it is zero.
     bound : kernel, optional
@@ -92,6 +93,11 @@ class Family:
     symmetric: bool = True
     at_rest: bool = True
     times: tuple = ()
+
+    @property
+    def dead(self):
+        """Whether it is a load that follows from time alone, with a power and a potential."""
+        return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
 
 
 @dataclass(frozen=True, eq=False)

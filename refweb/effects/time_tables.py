@@ -11,20 +11,23 @@ from ..kernels import kernel
 
 @kernel()
 def interpolate(t, data, start, width, column):
-    """(value, slope) of one column at time t; ``width`` counts the time column."""
-    rows = int(data[start])
-    first = start + 1
-    if t < data[first]:
-        return data[first + column], 0.0
-    for k in range(1, rows):
-        here = first + k * width
-        if t < data[here]:
-            before = here - width
-            slope = (data[here + column] - data[before + column]) / (data[here] - data[before])
-            if t - data[before] < data[here] - t:
-                return data[before + column] + slope * (t - data[before]), slope
-            return data[here + column] - slope * (data[here] - t), slope
-    return data[first + (rows - 1) * width + column], 0.0
+    """(value, slope) of one column at time t, by bisection; ``width`` counts the time column."""
+    before = start + 1
+    here = before + (int(data[start]) - 1) * width
+    if t < data[before]:
+        return data[before + column], 0.0
+    if not t < data[here]:
+        return data[here + column], 0.0
+    while here - before > width:
+        middle = before + (here - before) // width // 2 * width
+        if t < data[middle]:
+            here = middle
+        else:
+            before = middle
+    slope = (data[here + column] - data[before + column]) / (data[here] - data[before])
+    if t - data[before] < data[here] - t:
+        return data[before + column] + slope * (t - data[before]), slope
+    return data[here + column] - slope * (data[here] - t), slope
 
 
 def flattened(table):

@@ -65,8 +65,7 @@ class Dop853:
         self._start = np.concatenate([x.ravel()[system.free], v.ravel()[system.free]])
         self._held, self._mass = np.where(system.supported, x, 0.0), np.repeat(system.net.mass, 3)[system.free]
         self._consistent = system.net.consistent_minus_lumped is not None
-        parts = (*system.families, *system.drives, *system.line_drives)
-        self._breaks = sorted({t for part in parts for t in part.times})
+        self._breaks = system.corners
         self._thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
 
     def _rows(self, t, y):
@@ -109,7 +108,8 @@ class Dop853:
         solver = DOP853(self._rate, 0.0, y, end, rtol=rtol, atol=rtol * np.repeat([near, fast], self._unknowns))
         values, row, steps, looking = np.empty(len(times)), 0, 0, 0.0
         while row < len(values):
-            ahead = min((t for t in self._breaks if t > solver.t * (1.0 + 1e-12)), default=end)
+            behind = np.searchsorted(self._breaks, solver.t * (1.0 + 1e-12), side="right")
+            ahead = self._breaks[behind] if behind < len(self._breaks) else end
             solver.max_step = max(min(ahead - solver.t, self._travel(solver.y)), 1e-12 * end)
             if steps or row:
                 message = solver.step()

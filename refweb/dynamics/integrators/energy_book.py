@@ -83,6 +83,31 @@ def book_powers(t, h, x, v, extra, power, work, powers, forces, cells, data, out
         power[i] = gained
 
 
+@kernel()
+def book_potential(sign, t, x, families, work):
+    """Add the potential at time t of each family that is booked, times a sign, to its work [J].
+
+    With + before a drift of a step of higher order and − behind it this is the work of dead loads. Such a potential is
+    linear in time between corners of tables. Where time, as a coordinate, goes with the drifts, what the kicks give the
+    momentum that belongs to it is lost in these sums when t goes with the kicks: the book closes as the energy of a
+    scene without loads does, to the order of the method and without a drift that grows.
+    """
+    for n in range(families.powers.shape[0]):
+        i = families.powers[n, 0]
+        families.energies[i](t, x, families.cells[i], families.data[i], families.stored[i])
+        work[i] += sign * families.stored[i].sum()
+
+
+@kernel()
+def own_energy(total, working):
+    """Sum of the energies in ``total`` that are no potential of work, and of the kinetic energy [J]."""
+    energy = 0.0
+    for i in range(working.size):
+        if working[i] <= 0:
+            energy += total[i]
+    return energy + total[working.size]
+
+
 @kernel(forceinline=True)
 def note_motion(driven, mass, x, v, f, before):
     """Note position, force and kinetic energy of the rows whose motion is prescribed, ahead of a step."""

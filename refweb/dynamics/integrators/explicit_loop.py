@@ -15,7 +15,17 @@ import numpy as np
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...results.probes import PLACE
-from .energy_book import begin_powers, book_energies, book_lengths, book_motion, book_powers, drifts_away, note_motion
+from .energy_book import (
+    begin_powers,
+    book_energies,
+    book_lengths,
+    book_motion,
+    book_potential,
+    book_powers,
+    drifts_away,
+    note_motion,
+    own_energy,
+)
 from .events import ended_by, note_events
 from .extremes import look, look_at_sums, quadratic_peak, take_over
 from .integrator import MAX_STEPS_PER_ROW, SAME
@@ -43,29 +53,44 @@ LOOKS = 4
 
 @kernel()
 def inner_stages(now, h, scheme, model, running, reaction):
-    """All kicks and drifts of a step of higher order but the last drift, with the impulse of the supports."""
+    """All kicks and drifts of a step of higher order but the last drift, with work and the impulse of the supports.
+
+    Time goes with the drifts, and in the potential that is booked with the kicks.
+    """
     families, inverse, held = model.families, model.inertia.inverse, model.inertia.held
     x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    drifted = kicked = now - h
     for n in range(scheme.drifts.size - 1):
         kick, drift = scheme.kicks[n] * h, scheme.drifts[n] * h
+        drifted, kicked = drifted + drift, kicked + kick
         give_impulse(kick, reaction, running.impulse)
+        book_potential(1.0, kicked, x, families, running.work)
         kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
-        add_forces(now, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
+        book_potential(-1.0, kicked, x, families, running.work)
+        add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
         set_reaction(held, f, reaction)
+    book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
 
 
 @kernel()
 def look_inside(now, h, inside, where, total, model, observed, running):
     """Look for extremes at `LOOKS` places of a long step that ends ``now``, but its end.
 
-    They are looked for on the polynomial of degree 5 through position, velocity and acceleration at its ends.
+    They are looked for on the polynomial of degree 5 through position, velocity and acceleration at its ends. Work
+    there is that of the whole step less what the energies still gain.
     """
     families, inertia, extremes, sums = model.families, model.inertia, running.extremes, observed.sums
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     first, (x, v, f) = (forces[0], cells[0], data[0]), (inside.state[0], inside.state[1], inside.state[2])
     probes, rows, numbers, signs = observed.probes, observed.rows, observed.data, observed.signs
     energies, stored, working = families.energies, families.stored, families.working
+    worked, last = sums.shape[0] > 0 and families.powers.shape[0] > 0, 0.0
+    if worked:
+        book_energies(
+            now, running.x, running.v, inertia.mass, cells, data, energies, stored, running.work, working, total
+        )
+        last = own_energy(total, working)
     for n in range(1, LOOKS):
         t = now - h + h * n / LOOKS
         interpolate(n / LOOKS, h, inside.before, running.x, running.v, inertia.inverse, running.f, x, v)
@@ -74,6 +99,8 @@ def look_inside(now, h, inside, where, total, model, observed, running):
         look(t, x, v, f, inside.lines, True, where, probes, rows, numbers, signs, observed.followed, extremes)
         if sums.shape[0]:
             book_energies(t, x, v, inertia.mass, cells, data, energies, stored, running.work, working, total)
+            if worked:
+                total[-2] -= last - own_energy(total, working)
             look_at_sums(t, True, sums, total, len(probes), signs, extremes)
 
 
@@ -91,12 +118,10 @@ def look_behind(model, observed, running, total):
 
 @kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
-    """``count`` steps of size h, behind those that are taken of the row.
+    """``count`` steps of size h, behind those that are taken of the row; where ``changing`` natural lengths change.
 
-    It writes x, v, f, extremes, events, the work and the supports' impulse; where ``changing`` natural lengths change.
-
-    A step is a kick, a drift and a kick of h times ``kicks`` and ``drifts``; more of them are a method of higher order,
-    for forces that follow from displacement alone. Such steps are long, and looked at inside.
+    It writes all of ``running`` but ``before``. A step is a kick, a drift and a kick of h times ``kicks`` and
+    ``drifts``; more of them are a method of higher order, whose long steps are looked at inside.
 
     Returns the steps taken: fewer than asked for where an event ends the run.
     """
@@ -133,6 +158,8 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         if moved:
             note_motion(driven, mass, x, v, f, before)
         kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
+        if stages:
+            book_potential(-1.0, now - kicks[stages + 1], x, families, work)
         if moved:
             move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
@@ -147,7 +174,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)
         else:
             last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)
-        if powers.shape[0]:
+        if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
         if moved:
             book_motion(driven, mass, x, v, f, before, work)
@@ -197,14 +224,11 @@ def energies_now(model, running, total):
         clock.time, running.x, running.v, model.inertia.mass, families.cells, families.data, families.energies,
         families.stored, running.work, families.working, total,
     )  # fmt: skip
-    stored = energy = 0.0
+    stored = 0.0
     for i in range(total.size - 2):
-        stored, energy = stored + abs(total[i]), energy + total[i]
-    for i in range(families.working.size):
-        if families.working[i] > 0:
-            stored -= abs(total[i])
-            energy -= total[i]
-    return energy, stored
+        if i >= families.working.size or families.working[i] <= 0:
+            stored += abs(total[i])
+    return own_energy(total, families.working), stored
 
 
 @kernel()
@@ -254,10 +278,14 @@ def plan(end, changing, scheme, model, running):
 @kernel()
 def end_of_steps(corners, time, row):
     """The next corner of a table behind a time, not beyond ``row``; either is met within rounding."""
-    for n in range(corners.size):
-        if corners[n] > time * (1.0 + SAME):
-            return corners[n] if corners[n] < row * (1.0 - SAME) else row
-    return row
+    first, behind = 0, corners.size
+    while first < behind:
+        middle = (first + behind) // 2
+        if corners[middle] > time * (1.0 + SAME):
+            behind = middle
+        else:
+            first = middle + 1
+    return corners[first] if first < corners.size and corners[first] < row * (1.0 - SAME) else row
 
 
 @kernel()

@@ -5,6 +5,11 @@ follow from displacement alone and are smooth. A kink, of a line that goes slack
 that it lies in its order. The splittings are symplectic, so that energy does not drift, and keep momenta to rounding.
 Largest values are looked for four times a step and on parabolas in between: they are of order 4, or 2 at a kink.
 
+Dead loads may follow tables of time: steps end at the corners of these, and between them time is a coordinate that
+goes with the drifts, in which a force is taken where its drifts have come to. Their work is what their potential
+loses in each drift, taken at the time that the kicks have come to, see
+`refweb.dynamics.integrators.energy_book.book_potential`.
+
 The coefficients are those of S. Blanes and P. C. Moan [1]_. On the square web of the paper, thrown by its centre
 (smooth law, η = 1e-4, 0.05 s), errors of any displacement and evaluations of forces are
 
@@ -95,7 +100,7 @@ class Splitting(CentralDifference):
     Raises
     ------
     InputError
-        As central differences, and for forces that depend on velocity or time.
+        As central differences, and for forces that depend on velocity or, but for dead loads, on time.
     """
 
     method = "explicit"
@@ -105,10 +110,11 @@ class Splitting(CentralDifference):
 
     def __init__(self, system, *observed, order=6, **steps):
         for family in system.families:
-            if family.damping is not None or family.power is not None or family.times:
+            timed = family.power is not None or len(family.times) > 0
+            if family.damping is not None or timed and not family.dead:
                 raise InputError(
-                    f'[solve] method = "explicit" takes no [{family.name}], nothing that depends on velocity or time '
-                    'or whose work has to be booked: use "central-difference" or "cvode"'
+                    f'[solve] method = "explicit" takes no [{family.name}], nothing that depends on velocity, and of '
+                    'time dead loads alone: use "central-difference" or "cvode"'
                 )
         if system.drives or system.line_drives:
             raise InputError(

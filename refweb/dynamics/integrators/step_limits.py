@@ -29,12 +29,13 @@ class StepLimits:
 
     def at_corner(self, t):
         """Whether a table has a corner at a time [s]."""
-        return len(self._corners) > 0 and bool((np.abs(self._corners - t) <= SAME * t).any())
+        at = np.searchsorted(self._corners, t * (1.0 - SAME))
+        return at < len(self._corners) and bool(self._corners[at] <= t * (1.0 + SAME))
 
     def stop(self, t, x, v, end):
         """Time that a step from a state must not pass, on the way to ``end`` [s]; infinite where nothing limits it."""
-        ahead = self._corners[self._corners > t * (1.0 + SAME)]
-        stop = ahead[0] if len(ahead) else np.inf
+        ahead = np.searchsorted(self._corners, t * (1.0 + SAME), side="right")
+        stop = self._corners[ahead] if ahead < len(self._corners) else np.inf
         if np.isfinite(self._thickness):
             speed = 2.0 * np.sqrt((v[: self._moving] ** 2).sum(axis=1).max())
             way = max(TRAVEL * self._thickness, 0.5 * self._gap(x))

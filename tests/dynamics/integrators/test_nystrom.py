@@ -1,5 +1,7 @@
 """Explicit steps of order 4 and 6: orders, stability, invariants, and what they refuse."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -25,7 +27,7 @@ def window(effects=(), **changes):
 
 
 def exact(system, end):
-    """Displacement of every row by scipy's DOP853."""
+    """Displacement of every row by scipy's DOP853, begun anew at corners of tables."""
     free, n = system.free, len(system.free)
     mass = np.repeat(system.net.mass, 3)[free]
 
@@ -34,10 +36,12 @@ def exact(system, end):
         x.ravel()[free], v.ravel()[free] = y[:n], y[n:]
         return np.concatenate([y[n:], system.force(t, x, v).ravel()[free] / mass])
 
-    start = np.concatenate([np.zeros(n), system.initial_velocity().ravel()[free]])
-    y = solve_ivp(rate, (0.0, end), start, "DOP853", rtol=1e-13, atol=1e-15).y[:n, -1]
+    y = np.concatenate([np.zeros(n), system.initial_velocity().ravel()[free]])
+    stops = sorted({0.0, end, *(t for family in system.families for t in family.times)})
+    for begin, stop in itertools.pairwise(stops):
+        y = solve_ivp(rate, (begin, stop), y, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
     x = np.zeros((system.rows, 3))
-    x.ravel()[free] = y
+    x.ravel()[free] = y[:n]
     return x
 
 
@@ -60,6 +64,55 @@ def test_order(order):
     assert errors[-1] > 1e-13
     slope = np.polyfit(np.log(END / counts), np.log(errors), 1)[0]
     assert abs(slope - order) < 0.4, (slope, errors)
+
+
+FACTOR = ((0.0, 0.0), (0.0037, 1.0), (0.0061, -0.7), (0.0142, 0.4), (0.017, 0.4))
+"""Corners at no multiple of any step."""
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_order_under_dead_loads(order):
+    """Displacement and energy book, which dead loads of any factor leave as they are; momentum to rounding."""
+    jerked = refweb.Load(node="centre", force=(3.0, 1.0, 20.0), factor=FACTOR)
+    steady = refweb.Load(node=8, force=(0.0, 2.0, -4.0))
+    system = window([jerked, steady, refweb.Gravity(acceleration=(0.0, 0.0, -9.81))])
+    reference, limit = exact(system, END), CentralDifference(system).bound()
+    steps, errors, drifts = [], [], []
+    for share in (0.96, 0.72, 0.54, 0.42):
+        _, run, _ = ran(system, END, order=order, step_size=share * limit)
+        steps.append(END / run.nsteps)
+        errors.append(np.abs(run.x - reference).max())
+        drifts.append(run.drift)
+    assert errors[-1] > 1e-12
+    slope, closing = (np.polyfit(np.log(steps), np.log(values), 1)[0] for values in (errors, drifts))
+    assert abs(slope - order) < 0.4, (slope, errors)
+    assert closing > order - 0.4 and drifts[-1] < 1e-8, (closing, drifts)
+    mass = np.where(system.supported, 0.0, system.net.mass[:, None])
+    factor = np.array([*FACTOR, (END, FACTOR[-1][1])]).T
+    held = system.supported[: len(system.net.web.points), 2].any()
+    given = np.trapezoid(factor[1], factor[0]) * np.array(jerked.force) + END * np.array(steady.force)
+    given += END * system.net.mass.sum() * np.array([0.0, 0.0, -9.81])
+    gained = (mass * (run.v - system.initial_velocity())).sum(axis=0)
+    assert held and np.abs(gained - given - run.impulse).max() < 1e-12 * np.abs(run.impulse).max()
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_largest_work_between_steps(order):
+    """A mass on a spring that a force is let go on, x = F/k (1 − cos ωt): the work is at most 2 F²/k, of order 4."""
+    errors, shares = [], np.array([0.8, 0.4, 0.2])
+    for share in shares:
+        scene = refweb.Scene(
+            web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+            cable=refweb.Cable(law="linear", modulus=7e7, area=1e-4, density=0.0),
+            effects=[refweb.PointMass(node=1, mass=1.0), refweb.Load(node=1, force=(7.0, 0.0, 0.0))],
+            support=[refweb.Supports(nodes=1, components=["y", "z"])],
+            observe=[refweb.Observe(name="done", quantity="work", reduce="max")],
+            solve=refweb.Dynamic(duration=0.3, method="explicit", order=order, safety=share),
+            accuracy=refweb.Accuracy(error="none"),
+            output=refweb.Output(interval=0.3),
+        )
+        errors.append(abs(refweb.run(scene).results["done"].value / (2.0 * 7.0**2 / 7e3) - 1.0))
+    assert errors[-1] < 1e-4 and np.polyfit(np.log(shares), np.log(errors), 1)[0] > 3.0, errors
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -144,7 +197,7 @@ REFUSED = {
     "rotating frame": refweb.Frame(angular_velocity=(0.0, 0.0, 1.0)),
     "motion": refweb.Motion(node="rim", displacement=[(0, 0, 0, 0), (1, 0, 0, 1)]),
     "reel": refweb.Reel(lines="all", factor=[(0, 1), (1, 0.9)]),
-    "load in time": refweb.Load(node="centre", force=(0, 0, 1), factor=[(0, 0), (1, 1)]),
+    "pressure": refweb.Pressure(lines="all", normal=(0, 0, 1), value=1.0),
 }
 
 
