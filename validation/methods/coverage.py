@@ -5,6 +5,12 @@ nets short explicit steps of order 6; what those still differ from steps that ar
 added to ±. All methods, several accuracies of each; regular motions, and nets that go slack and snap taut or are hit,
 whose peaks are of no order.
 
+Random impacts on small webs, a flying ball or a node that is thrown, have a table of their own: each method at its
+default, history rows as usual and, for explicit steps and Adams methods, a single row as long as the run. There what
+truth is comes from a method of another kind at far smaller steps: Adams methods at rtol = 1e-11 for explicit steps and
+for ``auto``, explicit steps of order 6 for CVODE and IDA. ± has to contain it in 97 of 100, nothing may be off by more
+than three times ±, and in the median ± may be 8 times what is off.
+
 Over all observables ± has to contain the truth in 95 of 100, and in the median it may not be wider than 30 times what
 is really off. The bounds on tensions that statics proves from convex duality count as contained or not, and are left
 out of the width: they hold for every net, and are wide where nothing is off.
@@ -151,6 +157,96 @@ def against_fine_steps(name, scene, methods, duration):
         yield f"{name}, {named(keys)}", solved.results, exact, open_, set()
 
 
+# Random impacts
+
+BY_CHANCE = {
+    "central differences": (dict(method="central-difference"), 200, True),
+    "order 6": (dict(method="explicit", order=6), 200, True),
+    "Adams": (dict(method="cvode", family="adams"), 200, True),
+    "auto": (dict(method="auto"), 200, True),
+    "BDF, rtol = 1e-4": (dict(method="cvode", rtol=1e-4), 50, False),
+    "IDA, rtol = 1e-4": (dict(method="ida", rtol=1e-4), 50, False),
+}
+"""Keys of [solve], number of impacts, and whether a single row is tried as well, by the name of the method."""
+FINE = [dict(method="explicit", order=6, safety=0.01), dict(method="cvode", family="adams", rtol=1e-11)]
+"""Two methods that are taken for truth, each for those of the other kind; what lies between them is added to ±."""
+
+
+def random_impact(seed):
+    """A scene without a method: one of three webs, of some law and prestrain, that is hit or thrown."""
+    random = np.random.default_rng(seed)
+    mesh, law = random.choice(["triangle", "square", "hexagon"]), random.choice(["tension-only", "smooth", "linear"])
+    count, speed = int(random.integers(3, 6)), 10.0 ** random.uniform(-0.3, 1.0)
+    cable = dict(law=str(law), prestrain=random.uniform(1e-3 if law == "linear" else -2e-3, 0.01))
+    velocity = speed * np.append(random.uniform(-0.3, 0.3, 2), 1.0)
+    observe = [*OBSERVE[:3], OBSERVE[4]]
+    if random.random() < 0.6:
+        radius, gap = random.uniform(0.08, 0.2), random.uniform(0.001, 0.02)
+        place = (*random.uniform(-0.1, 0.1, 2), -radius - gap)
+        mass, stiffness = 10.0 ** random.uniform(-1.0, 0.5), 10.0 ** random.uniform(3.5, 4.5)
+        ball = refweb.Body(name="ball", radius=radius, mass=mass, position=place, velocity=tuple(velocity))
+        effects = [ball, refweb.Contact(stiffness=stiffness)]
+        observe.append(refweb.Observe(name="ball_speed", quantity="velocity", body="ball"))
+        observe.append(refweb.Observe(name="ball_height", quantity="position", body="ball", component="z"))
+    else:
+        mass = refweb.PointMass(node="centre", mass=10.0 ** random.uniform(-1.5, 0.0))
+        effects = [refweb.Velocity(node="centre", value=tuple(velocity)), mass]
+        observe.append(refweb.Observe(name="centre_speed", quantity="velocity", node="centre"))
+        observe.append(OBSERVE[3])
+    return refweb.Scene(
+        web=refweb.Window(mesh=str(mesh), rows=count, columns=count, side=0.2),
+        cable=refweb.Cable(**CABLE, **({"smoothing": 1e-3} if law == "smooth" else {}), **cable),
+        effects=effects,
+        observe=observe,
+        solve=refweb.Dynamic(duration=random.uniform(0.005, 0.04)),
+    )
+
+
+def by_chance(quick):
+    """What is off, ± and what truth leaves open, of all results of random impacts, by method and rows."""
+    found = {}
+    for seed in range(3 if quick else max(count for _, count, _ in BY_CHANCE.values())):
+        scene = random_impact(seed)
+        duration, quiet = scene.solve.duration, refweb.Accuracy(error="none")
+        fine = [
+            refweb.run(scene.replace(solve=refweb.Dynamic(duration=duration, **keys), accuracy=quiet)).results
+            for keys in FINE
+        ]
+        for name, (keys, count, alone) in list(BY_CHANCE.items())[:: 2 if quick else 1]:
+            if seed >= count:
+                continue
+            truth = fine[0 if keys["method"] in ("cvode", "ida") else 1]
+            asked = scene.replace(solve=refweb.Dynamic(duration=duration, **keys))
+            rows = {"": asked}
+            if alone:
+                rows[", one row"] = asked.replace(output=refweb.Output(interval=duration))
+            for which, one in rows.items():
+                for key, result in refweb.run(one).results.items():
+                    between = abs(fine[0][key].value - fine[1][key].value) + 1e-14 * abs(truth[key].value)
+                    off = abs(result.value - truth[key].value)
+                    found.setdefault(name + which, []).append((off, result.error, between))
+    return {name: np.array(results) for name, results in found.items()}
+
+
+def judged(found):
+    """Rows and a table of what `by_chance` has found."""
+    rows, lines = [], []
+    for name, results in found.items():
+        off, error, between = results.T
+        inside = float(np.mean(off <= error + between))
+        worst = float(np.max((off - between) / np.maximum(error, 1e-300)))
+        known = off > 2.0 * between
+        width = float(np.median(error[known] / off[known]))
+        lines.append([name, len(off), f"{100 * inside:.1f} %", f"{worst:.2f}", f"{width:.1f}"])
+        rows.append(
+            Row(f"random impacts, {name}: share inside ±", inside, 1.0, "asked for", 0.03, "97 of 100", scale=1)
+        )
+        rows.append(Row(f"{name}: largest error over ±", max(worst, 0.0), 1.5, "asked for: ≤ 3", 1.5, "≤ 3", scale=1))
+        rows.append(Row(f"{name}: median of ± over what is off", width, 4.0, "asked for: ≤ 8", 4.0, "≤ 8", scale=1))
+    head = ["method", "results", "inside ±", "largest error over ±", "median of ± over what is off"]
+    return rows, Table("Random impacts", head, lines)
+
+
 def case(quick):
     methods = METHODS[::3] if quick else METHODS
     runs = [*arms(), *oscillators(methods)]
@@ -175,11 +271,14 @@ def case(quick):
         Row("share of observables whose ± contains the truth", share, 1.0, "asked for", 0.05, "95 of 100", scale=1),
         Row("median of ± over what is off", width, 15.5, "asked for: 1 to 30", 14.5, "not wider than 30", scale=1),
     ]
+    rows_by_chance, by_method = judged(by_chance(quick))
+    rows += rows_by_chance
     by_group = [
         [name, len(inside), f"{100 * np.mean(inside):.1f} %", f"{np.median(wide):.3g}" if wide else "nothing is off"]
         for name, (inside, wide) in groups.items()
     ]
     tables = [Table("By kind of case", ["case", "observables", "contained", "median of ± over what is off"], by_group)]
+    tables.append(by_method)
     if missed:
         tables.append(Table("Not contained", ["case", "observable", "result", "truth"], missed))
 
