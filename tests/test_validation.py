@@ -9,8 +9,17 @@ from validation.harness import case as cases
 from validation.harness import page, plots
 from validation.harness.case import Case, Figure, Row, Table, Verdict
 
-LONG = ("webs_hit", "webs_under_load", "hard_cases", "work_precision", "example_2", "example_3")
-"""Cases that take more than twenty seconds with ``--quick``; what they show has tests of its own beside them."""
+LONG = (
+    "webs_hit",
+    "webs_under_load",
+    "hard_cases",
+    "work_precision",
+    "example_2",
+    "example_3",
+    "cross_validation",
+    "open_parameters",
+)
+"""Cases that take more than ten seconds with ``--quick``; what they show has tests of its own beside them."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in cases.names()])

@@ -20,7 +20,7 @@ import numpy as np
 from ...errors import InputError, OpenBook, SolverError
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
-from .explicit_loop import BREATH, LOOKS, advance_rows, begin, first_wrong
+from .explicit_loop import BREATH, LOOKS, advance_rows, begin, take_steps
 from .extremes import Extremes
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .records import CLOCK, Model, Observed, Running, Scheme
@@ -244,17 +244,34 @@ class CentralDifference(Integrator):
         return history
 
     def _name_blow_up(self, course, before, running):
-        """Replay the steps from ``before`` [s] one by one and name the first number that is not finite."""
-        net, (x, v, f) = self.system.net, course.before.copy()
-        running.clock["time"] = before
-        running = running._replace(x=x, v=v, f=f, events=course.events[:0])
-        steps, row = first_wrong(self._scheme, self._model, self._observed, running)
-        if row < 0:
+        """Take the steps from ``before`` [s] again and name the first number that is not finite."""
+        net, planned = self.system.net, int(running.clock[0]["planned"])
+        running.clock["time"], total = before, np.zeros(running.work.size + 2)
+
+        def after(state, begun, count):
+            """The state ``count`` steps behind one that ``begun`` steps have led to."""
+            state, running.clock["begun"] = state.copy(), begun
+            copy = running._replace(x=state[0], v=state[1], f=state[2], events=course.events[:0])
+            changing = self._model.reels.lengths.size > 0
+            take_steps(count, float(course.step), changing, self._scheme, self._model, self._observed, copy, total)
+            return state
+
+        sound, done, ahead = course.before.copy(), 0, planned
+        if np.isfinite(after(sound, 0, planned)).all():
             raise SolverError(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
+        while ahead > 1:  # what is not finite stays so: the first step that leads there is between done and ahead of it
+            half = ahead // 2
+            state = after(sound, done, half)
+            if np.isfinite(state).all():
+                sound, done, ahead = state, done + half, ahead - half
+            else:
+                ahead = half
+        wrong = ~np.isfinite(after(sound, done, 1)).all(axis=(0, 2))
+        row = int(wrong.argmax())
         name = self.system.row_name(row)
         lines = net.line[(net.cells == row).any(axis=1)]
         name += f", line {lines[0]}," if len(lines) else ""
-        t = before + steps * course.step
+        t = before + (done + 1) * course.step
         raise SolverError(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _name_drift(self, course, before):

@@ -355,22 +355,3 @@ def begin(x, v, f, model, observed, extremes, work, total):
         0.0, x, v, model.inertia.mass, families.cells, families.data, families.energies, families.stored, work,
         families.working, total,
     )  # fmt: skip
-
-
-@kernel()
-def first_wrong(scheme, model, observed, running):
-    """Replay steps from ``before``: how many, and the row, until the first number is not finite.
-
-    The row is −1 where there is none. The clock stands where they begin, with their size and the number planned.
-    """
-    clock, total, changing = running.clock[0], np.zeros(running.work.size + 2), model.reels.lengths.size > 0
-    if changing:
-        set_lengths(clock.time, model.reels, model.families.data[0])
-    for step in range(1, clock.planned + 1):
-        take_steps(1, clock.step, changing, scheme, model, observed, running, total)
-        clock.begun = step
-        for r in range(running.x.shape[0]):
-            for k in range(3):
-                if not math.isfinite(running.x[r, k] + running.v[r, k] + running.f[r, k]):
-                    return step, r
-    return clock.planned, -1
