@@ -1,0 +1,385 @@
+"""Bugs of one line, put into a copy of the code one at a time, and the tests that notice them.
+
+    python tests/mutants.py [--list] [--trusted] [--keep FOLDER] [NUMBERS or WORDS]
+
+runs, for each bug or for those of some numbers or words in it, the test files that mirror the changed file, and
+says which test noticed it first. Its exit status is 1 where one survives that is not a named equivalent, and where tests
+fail without any. A bug in a file of kernels has all of them compiled anew, which takes a minute or two.
+
+`test_mutants.py` sees to it that the list stays true: every text stands in its file exactly once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from typing import NamedTuple
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+COPIED = ("refweb", "tests", "validation", "README.md", "pyproject.toml")
+LONGEST = 1800.0
+"""Time that the tests of a bug may take [s]; one that makes them hang is noticed as well."""
+MIRRORS = {
+    "net/web": "net/test_webs.py",
+    "net/lattices": "net/test_webs.py",
+    "net/single_cable": "net/test_webs.py",
+    "net/discretisation": "net/test_elements.py system/test_orders.py",
+    "net/elements": "net/test_elements.py system/test_orders.py",
+    "net/cable": "net/test_elements.py test_scene.py",
+    "net/tension_laws": "net/test_laws.py net/test_elements.py",
+    "net/rigid_body": "effects/test_contact.py test_contract.py",
+    "net/shapes": "effects/test_contact.py",
+    "effects/contact": "test_contract.py effects/test_contact.py",
+    "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
+    "effects/elasticity": "net/test_elements.py test_contract.py",
+    "effects/temperature": "effects/test_temperature.py",
+    "effects/outer_load": "test_contract.py",
+    "effects": "test_contract.py effects/test_{}.py",
+    "system/links": "dynamics/integrators/test_ida.py",
+    "system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py",
+    "statics/smoothing_error": "dynamics/test_accuracy.py",
+    "statics/critical_speed": "effects/test_frame.py",
+    "statics/dynamic_relaxation": "statics/test_relaxation.py",
+    "statics": "statics/test_statics.py dynamics/test_accuracy.py",
+    "dynamics/accuracy_loop": "test_faults.py dynamics/test_accuracy.py",
+    "dynamics/twin_error": "dynamics/test_one_row.py dynamics/test_events.py dynamics/test_dynamics.py",
+    "dynamics/initial_state": "dynamics/test_starts.py",
+    "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_dynamics.py",
+    "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py",
+    "dynamics/integrators/central_difference": "dynamics/test_dynamics.py",
+    "dynamics/integrators/explicit_loop": "dynamics/test_dynamics.py dynamics/test_impact.py",
+    "dynamics/integrators/energy_book": "test_readme.py dynamics/test_impact.py",
+    "dynamics/integrators/ida": "dynamics/integrators/test_ida.py",
+    "dynamics/integrators": "dynamics/integrators/test_cvode.py dynamics/test_dynamics.py",
+    "dynamics": "dynamics/test_dynamics.py",
+    "results/observables": "results/test_observable_contract.py dynamics/test_accuracy.py statics/test_statics.py",
+    "results/state": "results/test_results.py results/test_observable_contract.py",
+    "results": "results/test_results.py test_faults.py",
+    "studies/predictability": "studies/test_horizon.py",
+    "studies/discretisation_error": "dynamics/test_accuracy.py",
+    "studies/spectrum": "studies/test_modes.py",
+    "studies/pencil": "studies/test_modes.py",
+    "studies": "studies/test_cost.py",
+    "commands": "commands/test_cli.py",
+    "__main__": "commands/test_cli.py",
+    "scene": "test_scene.py",
+}
+"""Test files of a file or a folder, that with the longest name that fits; ``{}`` is the name of the file."""
+
+
+class Mutant(NamedTuple):
+    """A bug of one line.
+
+    Attributes
+    ----------
+    file : str
+        The changed file, without its ending, below the package.
+    text, wrong : str
+        What stands there, and what stands there instead.
+    same : str
+        Why nothing can be noticed, of an equivalent; empty otherwise.
+    """
+
+    file: str
+    text: str
+    wrong: str
+    same: str = ""
+
+    @property
+    def path(self):
+        """The changed file, from the root of the code."""
+        return pathlib.Path("refweb") / f"{self.file}.py"
+
+    @property
+    def tests(self):
+        """Test files that mirror it, from the root of the code."""
+        parts = self.file.split("/")
+        names = ("/".join(parts[:end]) for end in range(len(parts), 0, -1))
+        files = MIRRORS[next(name for name in names if name in MIRRORS)].format(parts[-1]).split()
+        return [f"tests/{file}" for file in files if (ROOT / "tests" / file).exists()]
+
+    def changed(self, code):
+        """The code of its file with the bug; an error where its text does not stand there exactly once."""
+        if (count := code.count(self.text)) != 1:
+            raise ValueError(f"{self.path}: {self.text!r} stands there {count} times, must be once")
+        return code.replace(self.text, self.wrong)
+
+
+MUTANTS = [
+    # Bodies, shapes and webs
+    Mutant("net/web", "len(points) + self.components()[0])", "len(points) + 1)"),
+    Mutant("net/web", "for axis in (1, 0, 2):", "for axis in (0, 1, 2):"),
+    Mutant("net/web", "np.roll(self.points[hull, :2], -1, axis=0)", "np.roll(self.points[hull, :2], 1, axis=0)"),
+    Mutant("net/lattices", "3 * layers * layers - 3 * layers + 1", "3 * layers * layers + 3 * layers + 1"),
+    Mutant("net/lattices", "if cells > _MOST_CELLS:", "if cells >= _MOST_CELLS:"),
+    Mutant("net/lattices", '"hexagon": (45, 40)', '"hexagon": (44, 40)'),
+    Mutant("net/single_cable", "scale * np.sin((n - k) * phi)", "-scale * np.sin((n - k) * phi)"),
+    Mutant("net/shapes/rounding", "ROUNDING = 0.02", "ROUNDING = 0.03"),
+    Mutant("net/discretisation", "quadrature=gauss(element.maxdeg))", "quadrature=gauss(element.maxdeg + 1))"),
+    Mutant("net/discretisation", "np.array([0.5, 0.5])", "np.array([0.6, 0.4])"),
+    Mutant("net/discretisation", "g0 = 2.0 * smoothing**2", "g0 = smoothing**2"),
+    Mutant("net/cable", "web.natural_length / (1.0 + prestrain)", "web.natural_length * (1.0 - prestrain)"),
+    # Laws, forces and tangents
+    Mutant(
+        "net/tension_laws",
+        "return 2.0 * smoothing * smoothing / (r - s), r",
+        "return smoothing * smoothing / (r - s), r",
+    ),
+    Mutant(
+        "net/tension_laws",
+        "return modulus * (2.0 * smoothing * smoothing / (total",
+        "return modulus * (smoothing * smoothing / (total",
+    ),
+    Mutant("effects/elasticity", "d * (along - across) * p[i] * p[j]", "d * along * p[i] * p[j]"),
+    Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
+    Mutant("effects/damping", "max(pull, least)", "pull"),
+    Mutant(
+        "effects/damping",
+        "power -= weights[q] * data[c, LENGTH] * pull * rate",
+        "power += weights[q] * data[c, LENGTH] * pull * rate",
+    ),
+    Mutant(
+        "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
+    ),
+    Mutant("effects/frame", "to, m = cells[c, a], 2.0 * data", "to, m = cells[c, a], -2.0 * data"),
+    Mutant("effects/pressure", "d0 += couple * x[other, 0]", "d0 -= couple * x[other, 0]"),
+    Mutant(
+        "effects/outer_load",
+        "(0.0, 1.0) if net.quasi_static else (1.0, 0.0)",
+        "(1.0, 0.0) if net.quasi_static else (0.0, 1.0)",
+    ),
+    Mutant("effects/temperature", "1.0 + expansion * value", "1.0 - expansion * value"),
+    Mutant("effects/base", "return ((2.0 * self.data[:, :3] + u) * u)", "return ((2.0 * self.data[:, :3] - u) * u)"),
+    Mutant(
+        "effects/base",
+        "return (self.between(v) ** 2).sum(axis=1) / self.length",
+        "return (self.between(v) ** 2).sum(axis=1)",
+    ),
+    # Contact and friction
+    Mutant("effects/contact/table", "slip_velocity: float = real(1e-2", "slip_velocity: float = real(1e-3"),
+    Mutant("effects/contact/table", "return getattr(self, key) if own is None else own", "return getattr(self, key)"),
+    Mutant("effects/contact/friction", "damped = max(pair.damping * rate, -1.0)", "damped = pair.damping * rate"),
+    Mutant(
+        "effects/contact/friction",
+        "        -push * damped * g[0] - drag * q[0],",
+        "        -push * damped * g[0] + drag * q[0],",
+    ),
+    # Systems and links
+    Mutant(
+        "system/links",
+        "return [G, turn, -turn[self._both], G, G, G, rate]",
+        "return [G, turn, turn[self._both], G, G, G, rate]",
+    ),
+    Mutant(
+        "system/links",
+        "self._sign * self.pairs.between(v)[self._link, self._axis] / length",
+        "self._sign * self.pairs.between(v)[self._link, self._axis]",
+    ),
+    Mutant("system/mass", "lumped if self._consistent_minus_lumped is None else lumped + self.passed_on(v)", "lumped"),
+    Mutant("system/mass", "jump - self.moved_by(self.passed_on(jump))", "jump + self.moved_by(self.passed_on(jump))"),
+    # Statics and its bounds
+    Mutant(
+        "statics/duality_bound",
+        "2.0 * np.sqrt(strain_energy * gap) + gap",
+        "0.5 * (2.0 * np.sqrt(strain_energy * gap) + gap)",
+    ),
+    Mutant("statics/duality_bound", "_gaps(bars, force, size).sum() + rounding)", "_gaps(bars, force, size).sum())"),
+    Mutant("statics/duality_bound", "np.sqrt(2.0 * bars.stiffness * gap)", "np.sqrt(bars.stiffness * gap)"),
+    Mutant(
+        "statics/duality_bound", "np.where(bars.tension > 0.0, 0.0, bars.natural - bars.length)", "0.0 * bars.length"
+    ),
+    Mutant("statics/smoothing_error", "/ (1.0 - SHARE) for", "* (1.0 - SHARE) for"),
+    Mutant("statics/newton", "((-tiny, 1), (tiny, 0))", "((-tiny, 1), (tiny, -1))"),
+    Mutant(
+        "statics/newton",
+        "np.abs(state.tension) + stiffness * moved",
+        "0.0 * (np.abs(state.tension) + stiffness * moved)",
+    ),
+    # Dynamics, its books and its ±
+    Mutant("dynamics/integrators/simpson_book", "np.where(self._held, 0.0, v)", "v"),
+    Mutant("dynamics/integrators/simpson_book", "s - 1.5 * s**2 + s**3 / 1.5", "s - 1.5 * s**2 + s**3 / 3.0"),
+    Mutant("dynamics/integrators/simpson_book", "np.bincount(self._fixed % 3,", "np.bincount(self._fixed // 3 % 3,"),
+    Mutant(
+        "dynamics/integrators/explicit_loop",
+        "if inertia.inverse[r, k] > 0.0:\n                row[at + k]",
+        "if inertia.mass[r] > 0.0:\n                row[at + k]",
+    ),
+    Mutant("dynamics/integrators/energy_book", "DRIFT = 1e-2", "DRIFT = 2e-2"),
+    Mutant("dynamics/integrators/energy_book", "work[last] -= 0.5 * (before", "work[last] -= (before"),
+    Mutant("dynamics/integrators/tolerances", "near = 1e-3 * length.min()", "near = 1e-1 * length.min()"),
+    Mutant("dynamics/integrators/step_limits", "ahead[0] if len(ahead)", "ahead[-1] if len(ahead)"),
+    Mutant("dynamics/twin_error", "SPREAD = 3.0", "SPREAD = 1.5"),
+    Mutant("dynamics/twin_error", "factor = 1.0 / (1.0 - share)", "factor = 1.0"),
+    Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
+    Mutant("dynamics/history", 'scales["stress"] = 1.0 / net.area', 'scales["stress"] = net.area'),
+    Mutant(
+        "dynamics/history",
+        "float(extremes.values[at]), float(extremes.times[at])",
+        "float(extremes.values[at]), course.time",
+    ),
+    Mutant("dynamics/schedule", "if duration - times[-1] > 1e-9 * interval:", "if duration - times[-1] > interval:"),
+    Mutant("dynamics/initial_state", "positions - displacements + twin[0]", "positions + twin[0]"),
+    # Checkpoints and folders
+    Mutant("dynamics/accuracy_loop", 'int(kept["repeated"])', "0"),
+    Mutant("dynamics/accuracy_loop", 'float(kept["drift"])', "np.inf"),
+    Mutant("dynamics/accuracy_loop", "0.5 * 10.0**-digits", "5.0 * 10.0**-digits"),
+    Mutant(
+        "dynamics/simulation",
+        "return course, len(times) if course.stopped else row + 1",
+        "return course, len(times) if course.stopped else row",
+    ),
+    Mutant("dynamics/simulation", 'if "twin_begin_x" in kept:', "if False:"),
+    Mutant("results/vtu", '"reaction": state.reaction}', '"reaction": state.v}'),
+    Mutant("results/vtu", "state.element_tension / net.area", "state.element_tension * net.area"),
+    Mutant("results/vtu", "*np.arange(1, order) / order", "*np.arange(1, order) / (order + 1)"),
+    Mutant("results/folder", "int(number[1]) <= row", "int(number[1]) < row"),
+    Mutant("results/folder", "self._listed += [(time, part,", "self._listed += [(row, part,"),
+    Mutant("results/files", "return repr(float(value))", 'return f"{value:.9g}"'),
+    # Results and observables
+    Mutant(
+        "results/observables/nodal",
+        "np.linalg.norm(vectors, axis=1) if component is None",
+        "np.abs(vectors).max(axis=1) if component is None",
+    ),
+    Mutant(
+        "results/observables/line",
+        "return tension / net.line_data[:, AXIAL_STIFFNESS]",
+        "return tension / net.line_data[:, AXIAL_STIFFNESS] / 2.0",
+    ),
+    Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
+    Mutant("results/state", "self.element_strain <= self.system.net.slackness", "self.element_strain <= 0.0"),
+    # Studies and modes
+    Mutant("studies/predictability", "ddof=1)", "ddof=0)"),
+    Mutant("studies/predictability", "end is not None and r.time > end]", "end is not None]"),
+    Mutant(
+        "studies/predictability",
+        "np.log(np.maximum(apart, 1e-300))[known]",
+        "np.log10(np.maximum(apart, 1e-300))[known]",
+    ),
+    Mutant("studies/discretisation_error", "first * ratio / (ratio - 1.0)", "first / (ratio - 1.0)"),
+    Mutant("studies/spectrum", "/ (2.0 * np.pi)", "/ np.pi"),
+    Mutant("studies/spectrum", "modal_mass=1.0 / size[modes, nodes] ** 2", "modal_mass=1.0 / size[modes, nodes]"),
+    Mutant("studies/budget", "SHARE = 1.0 / 3.0", "SHARE = 1.0"),
+    # The command line
+    Mutant(
+        "__main__",
+        'print("refweb: interrupted", file=sys.stderr)\n        return 130',
+        'print("refweb: interrupted", file=sys.stderr)\n        return 1',
+    ),
+    Mutant(
+        "scene",
+        'if self.supports is not None:\n            given["supports"]',
+        'if self.supports:\n            given["supports"]',
+    ),
+]
+
+
+def has_kernels(code):
+    """Whether the content of a file decides where machine code is kept, as `refweb.kernels` has it."""
+    return "kernel(" in code or "ufunc(" in code
+
+
+def copied(root):
+    """A copy of the code, with the times of its files, which machine code goes by."""
+    for name in COPIED:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, root / name, ignore=shutil.ignore_patterns("__pycache__", "report", "*.png"))
+        else:
+            shutil.copy2(source, root / name)
+
+
+def tested(root, files, cache):
+    """How tests end in a copy of the code: status of pytest, None for those that hang, and what fails first."""
+    environment = {**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *files]
+    try:
+        done = subprocess.run(
+            command, cwd=root, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=LONGEST
+        )
+    except subprocess.TimeoutExpired:
+        return None, "they hang"
+    said = done.stdout.decode(errors="replace")
+    found = re.search(r"^(?:FAILED|ERROR) (\S.*?)(?: - .*)?$", said, re.MULTILINE)
+    return done.returncode, found[1] if found else said.strip().rpartition("\n")[2]
+
+
+def tried(mutant, root, cache):
+    """The test that notices a bug, None where none does."""
+    place = root / mutant.path
+    code, times = place.read_text(encoding="utf-8"), place.stat()
+    own = cache / "one" if has_kernels(code) else cache
+    try:
+        place.write_text(mutant.changed(code), encoding="utf-8")
+        status, first = tested(root, mutant.tests, own)
+        if status not in (0, 1, 2, None):
+            raise RuntimeError(f"pytest ended with {status}: {first}")
+        return None if status == 0 else first
+    finally:
+        place.write_text(code, encoding="utf-8")
+        os.utime(place, ns=(times.st_atime_ns, times.st_mtime_ns))
+        shutil.rmtree(cache / "one", ignore_errors=True)
+
+
+def chosen(words):
+    """Numbers and bugs that some words ask for, all without any."""
+    numbered = list(enumerate(MUTANTS, 1))
+    if not words:
+        return numbered
+    return [
+        (n, m) for n, m in numbered if any(w == str(n) or not w.isdigit() and w in f"{m.file} {m.text}" for w in words)
+    ]
+
+
+def main(arguments=None):
+    """Run; the status is 1 where a bug survives that is no equivalent, and where tests fail without any."""
+    parser = argparse.ArgumentParser(prog="python tests/mutants.py", description=__doc__.split("\n\n")[0])
+    parser.add_argument("words", nargs="*", metavar="NUMBERS or WORDS", help="bugs to try, by default all")
+    parser.add_argument("--list", action="store_true", help="print the bugs and their tests and stop")
+    parser.add_argument("--trusted", action="store_true", help="do not run the tests without any bug first")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder in which machine code stays for another time")
+    given = parser.parse_args(arguments)
+    bugs = chosen(given.words)
+    if given.list:
+        for number, mutant in bugs:
+            print(f"{number:3d}  {mutant.file}: {mutant.text!r} → {mutant.wrong!r}  {' '.join(mutant.tests)}")
+        return 0
+    with contextlib.ExitStack() as stack:
+        folder = given.keep or pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-mutants-")))
+        return hunt(bugs, folder.absolute(), given.trusted)
+
+
+def hunt(bugs, folder, trusted):
+    """Try bugs in a copy of the code in a folder; the exit status."""
+    root, cache, survivors = folder / "code", folder / "cache", []
+    shutil.rmtree(root, ignore_errors=True)
+    root.mkdir(parents=True)
+    copied(root)
+    files = list(dict.fromkeys(file for _, mutant in bugs for file in mutant.tests))
+    if not trusted:
+        status, first = tested(root, files, cache)
+        if status != 0:
+            print(f"tests fail without any bug: {first}")
+            return 1
+    for number, mutant in bugs:
+        began = time.perf_counter()
+        noticed = tried(mutant, root, cache)
+        verdict = f"noticed by {noticed}" if noticed else f"equivalent: {mutant.same}" if mutant.same else "SURVIVES"
+        print(f"{number:3d}  {mutant.file}: {mutant.text!r} → {mutant.wrong!r}")
+        print(f"     {verdict}, {time.perf_counter() - began:.0f} s", flush=True)
+        if not noticed and not mutant.same:
+            survivors.append(number)
+    print(f"{len(bugs)} bugs, {len(survivors)} survive{': ' + ', '.join(map(str, survivors)) if survivors else ''}")
+    return int(bool(survivors))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
