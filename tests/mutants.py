@@ -2,8 +2,8 @@
 
     python tests/mutants.py [--list] [--trusted] [--keep FOLDER] [NUMBERS or WORDS]
 
-runs, for each bug or for those of some numbers or words in it, the test files that mirror the changed file, and
-says which test noticed it first. Its exit status is 1 where one survives that is not a named equivalent, and where tests
+runs, for each bug or for those of some numbers or words in it, the test files that mirror the changed file, and says
+which test noticed it first. Its exit status is 1 where one survives that is not a named equivalent, and where tests
 fail without any. A bug in a file of kernels has all of them compiled anew, which takes a minute or two.
 
 `test_mutants.py` sees to it that the list stays true: every text stands in its file exactly once.

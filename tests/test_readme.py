@@ -4,6 +4,7 @@ import pathlib
 import re
 import tomllib
 
+import numpy as np
 import pytest
 
 import refweb
@@ -54,8 +55,148 @@ def test_two_commands_are_one_line_each(marker, words):
     assert len(lines) == 1 and lines[0].startswith("python3 -m venv") and words in lines[0]
 
 
+UNITS = {"mm": 1e-3, "kPa": 1e3, "N": 1.0, "mm/s": 1e-3}
+PRINTED = re.compile(r"(\w+) +(-?[\d.]+) ± ([\d.]+) (\S+) +t = ([\d.]+) s")
+
+
+def check_what_it_prints(solution):
+    """Values are those of the run to a quarter of ±, ± to its order of magnitude, steps and drift to all digits.
+
+    A difference of 1e-10 m in where the ball starts moves values by a fourteenth of ± and less, and makes another
+    difference of run and twin count, five times as small; peaks are elsewhere where others are as high within ±.
+    """
+    box = README.split("## What it prints")[1].split("```")[1]
+    rows = {name: found for name, *found in PRINTED.findall(box)}
+    assert rows.keys() == solution.results.keys() and f": {solution.status} ─" in box and solution.scene.title in box
+    for name, (value, error, unit, when) in rows.items():
+        result, scale = solution.results[name], UNITS[unit]
+        assert abs(float(value) * scale - result.value) <= 0.25 * float(error) * scale, (name, result)
+        assert 0.1 < float(error) * scale / result.error < 10.0, (name, result)
+        if result.error < 0.02 * abs(result.value):
+            assert float(when) == pytest.approx(result.time, rel=0.01), (name, result)
+    steps, drift = re.search(r"(\w\S*): (\d+) steps, energy drift (\S+)", box).group(2, 3)
+    assert int(steps) == solution.solver["nsteps"] and drift == f"{solution.solver['energy_drift']:.1e}"
+
+
 def test_impacts_run_by_name(tmp_path):
     for path in SHIPPED_SCENES.glob("*impact.toml"):
         solution = refweb.run(path.stem)
         assert solution.status == "solved" and not solution.warnings
         assert all(result.error is not None for result in solution.results.values())
+        if path.stem == "hexagon-impact":
+            check_what_it_prints(solution)
+
+
+def numbers(pattern, text=README):
+    """Numbers in the groups of what a pattern finds, which is to be found once."""
+    (found,) = re.findall(pattern, text)
+    return [float(one) for one in ([found] if isinstance(found, str) else found)]
+
+
+def test_numbers_of_the_papers_webs():
+    """Length, elements and areas, and the formulas of layers, by webs that are made and counted."""
+    (length,) = numbers(r"a hexagon web of (\S+) m of cable")
+    webs = {mesh: refweb.Paper(mesh=mesh, cable_length=length).web() for mesh in ("triangle", "square", "hexagon")}
+    areas = numbers(r"of one cable length have (\S+), (\S+) and (\S+) m², not one area")
+    assert areas == [round(float(np.prod(np.ptp(web.points[:, :2], axis=0))), 2) for web in webs.values()]
+    assert numbers(r"its hexagon web has (\d+) elements") == [len(webs["hexagon"].lines)]
+    for web in webs.values():
+        assert web.natural_length.sum() == pytest.approx(length, rel=1e-12)
+    pattern = r"N layers of hexagons have (\d)N² − (\d)N \+ (\d) cells and (\d)N² − (\d)N elements"
+    a, b, c, d, e = numbers(pattern)
+    for n in range(1, 6):
+        web = refweb.Layers(mesh="hexagon", layers=n, cell_area=1.0).web()
+        ends = np.unique(web.lines)
+        assert a * n * n - b * n + c == len(web.lines) - len(ends) + 1 and d * n * n - e * n == len(web.lines)
+
+
+OUTPUT = refweb.Scene.from_dict(
+    {
+        "web": {"kind": "inline", "points": [[0, 0, 0], [1, 0, 0]], "lines": [[0, 1]]},
+        "cable": {"modulus": 1.0, "area": 1.0, "density": 1.0},
+        "solve": {"kind": "dynamic", "duration": 1.0},
+    }
+).output
+DEFAULTS = [
+    (r"default (\S+) s; of fewer than", OUTPUT.interval),
+    (r"a VTU every so many rows; default (\d+), in statics 1", OUTPUT.frames),
+    (r"share of the bound of stability, default ([\d.]+)\)", refweb.Dynamic(duration=1.0).safety),
+    (r"`order` = (\d) \(default\) or 4", refweb.Dynamic(duration=1.0, method="explicit").order),
+    (r"`rtol` \(default (\S+)\)", refweb.Dynamic(duration=1.0, method="cvode").rtol),
+    (r"smooth only \(default (\S+)\)", refweb.Cable(modulus=1.0, area=1.0, density=1.0).smoothing),
+    (r"`slip_velocity` \((\S+) m/s\)", refweb.Contact(stiffness=1.0).slip_velocity),
+]
+
+
+@pytest.mark.parametrize("pattern, default", DEFAULTS)
+def test_defaults_are_those_of_the_code(pattern, default):
+    assert numbers(pattern) == [default]
+
+
+# Comments of the shipped scenes
+
+
+def comment(name):
+    """The comments of a shipped scene as running text."""
+    lines = (SHIPPED_SCENES / f"{name}.toml").read_text(encoding="utf-8").splitlines()
+    return " ".join(line.removeprefix("# ") for line in lines if line.startswith("#"))
+
+
+def body_of(scene):
+    return next(effect for effect in scene.effects if isinstance(effect, refweb.Body))
+
+
+@pytest.mark.parametrize("mesh", ["triangle", "square", "hexagon"])
+def test_comments_of_the_papers_webs(mesh):
+    """Of loads: 2014 elements of 0.1 m make the length; of impacts: momenta, and the stiffness of the lines."""
+    length, elements, size = numbers(
+        r"(\S+) m of cable for each web is (\d+) elements of (\S+) m", comment(f"{mesh}-load")
+    )
+    scene = refweb.Scene.load(f"{mesh}-load")
+    assert scene.web.cable_length == length == pytest.approx(elements * size, rel=1e-14)
+    first, last = numbers(r"under (\d) to (\d) N", comment(f"{mesh}-load"))
+    assert scene.solve.load_steps[0] == first and scene.solve.load_steps[-1] == last
+    assert len(refweb.Paper(mesh="triangle", cable_length=length).web().lines) == elements
+    said, scene = comment(f"{mesh}-impact"), refweb.Scene.load(f"{mesh}-impact")
+    ball = body_of(scene)
+    least, most, mass, speed = numbers(r"momenta of (\S+) to (\S+) kg m/s: (\S+) kg at (\S+) m/s is one", said)
+    assert (ball.mass, np.linalg.norm(ball.velocity)) == (mass, speed) and least <= mass * speed <= most
+    stiff, low, high = numbers(r"A line is (\S+) kN/\(element length\), (\S+) to (\S+) N/m, stiff", said)
+    axial = scene.cable.modulus * scene.cable.area
+    assert axial == pytest.approx(1e3 * stiff, rel=1e-14)
+    lines = {
+        m: refweb.Paper(mesh=m, cable_length=length).web().natural_length for m in ("triangle", "square", "hexagon")
+    }
+    stiffness = axial / np.concatenate(list(lines.values()))
+    assert [float(f"{k:.1e}") for k in (stiffness.min(), stiffness.max())] == [low, high]
+
+
+def test_comments_of_other_scenes():
+    """A turn in a second, 30°, where the arc and the ring are, when the net touches, and how far it is reeled in."""
+    spinning = refweb.Scene.load("spinning-web")
+    frame = next(effect for effect in spinning.effects if isinstance(effect, refweb.Frame))
+    assert "One turn in a second" in comment("spinning-web")
+    assert np.linalg.norm(frame.angular_velocity) == pytest.approx(2.0 * np.pi, rel=1e-15)
+    velocity = np.array(body_of(refweb.Scene.load("square-oblique-impact")).velocity)
+    (angle,) = numbers(r"at (\d+)° to its normal", comment("square-oblique-impact"))
+    assert np.degrees(np.arccos(velocity[2] / np.linalg.norm(velocity))) == pytest.approx(angle, rel=1e-12)
+    scene, said = refweb.Scene.load("ring-on-slack-cable"), comment("ring-on-slack-cable")
+    lowest, below = numbers(r"lowest point of the arc is at z = (\S+) m, (\d+) mm below the ring", said)
+    ring, depth = body_of(scene), scene.web.web().points[:, 2].min()
+    assert round(depth, 3) == lowest and round(1e3 * (ring.position[2] - ring.radius - depth)) == below
+    (apart,) = numbers(r"\(here (\S+) m, and an arc\)", said)
+    assert np.linalg.norm(np.subtract(scene.web.end, scene.web.start)) == pytest.approx(apart, rel=1e-15)
+    (push,) = numbers(r"\(here (\S+) kN/m at each contact", said)
+    assert next(e for e in scene.effects if isinstance(e, refweb.Contact)).stiffness == 1e3 * push
+    scene, said = refweb.Scene.load("closing-net"), comment("closing-net")
+    reel = next(effect for effect in scene.effects if isinstance(effect, refweb.Reel))
+    thrown = next(effect for effect in scene.effects if isinstance(effect, refweb.Velocity))
+    debris = body_of(scene)
+    assert "reeled in to half" in said and round(reel.factor[-1][1], 1) == 0.5
+    assert "touches the debris before the winch starts" in said
+    assert (debris.position[2] - debris.radius) / thrown.value[2] < reel.factor[0][0]
+    assert numbers(r"with (\d+) layers", said) == [scene.web.layers]
+    assert numbers(r"Example 1: (\d) m, (\d+) elements", comment("catenary")) == [
+        refweb.Scene.load("catenary").web.length,
+        refweb.Scene.load("catenary").web.elements,
+    ]

@@ -109,8 +109,8 @@ def disagreements(scene, seed, names=TRANSFORMATIONS):
 def random_static(seed):
     """A random net; what supports hold in some components has no axes of its own to turn with, and is left out."""
     scene = random_net(seed).to_dict()
-    scene["support"] = [one for one in scene.get("support", []) if len(one["components"]) == 3]
-    return scene | {"observe": OBSERVE}
+    whole = [one for one in scene.pop("support", []) if len(one["components"]) == 3]
+    return scene | {"observe": OBSERVE} | ({"support": whole} if whole else {})
 
 
 def random_motion(seed):
@@ -167,7 +167,7 @@ def random_motion(seed):
 @pytest.mark.parametrize("name", TRANSFORMATIONS)
 @pytest.mark.parametrize("kind", [random_static, random_motion])
 def test_a_scene_otherwise_described(kind, name):
-    seed = {random_static: 19, random_motion: 7}[kind]
+    seed = {random_static: 2, random_motion: 6}[kind]
     found, given = disagreements(kind(seed), seed, [name])
     assert found == [] and all(result.error > 0.0 for result in given.results.values())
 
@@ -175,9 +175,9 @@ def test_a_scene_otherwise_described(kind, name):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind, most", [(random_static, 0.4), (random_motion, 0.1)])
 def test_many_scenes_otherwise_described(kind, most):
-    """Sixty of each kind; not more than a share is refused, and then in all descriptions."""
+    """Fifty of each kind; not more than a share is refused, and then in all descriptions."""
     found, refused = [], 0
-    for seed in range(60):
+    for seed in range(50):
         more, given = disagreements(kind(seed), seed)
         found, refused = found + more, refused + isinstance(given, Exception)
-    assert found == [] and refused <= most * 60
+    assert found == [] and refused <= most * 50

@@ -420,6 +420,13 @@ def test_find():
 def test_centre_ties_go_to_lowest_y_then_x():
     points = [[1, 1, 0], [1, -1, 0], [-1, -1 + 1e-14, 0], [-1, 1, 0]]
     assert Web(points, [[0, 1], [1, 2], [2, 3]]).centre == 2
+    assert Web([[-1, 1, 0], [1, -1, 0]], [[0, 1]]).centre == 1
+
+
+def test_corners_are_where_the_hull_turns():
+    """Not a point that rounding has moved out of a side."""
+    points = [[0, 0, 0], [1, -1e-12, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
+    assert Web(points, [[0, 1], [1, 2], [2, 3], [3, 4], [4, 0]]).corners.tolist() == [0, 2, 3, 4]
 
 
 def test_corners_of_webs_without_any():
