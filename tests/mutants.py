@@ -215,7 +215,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/energy_book", "DRIFT = 1e-2", "DRIFT = 2e-2"),
     Mutant("dynamics/integrators/energy_book", "work[last] -= 0.5 * (before", "work[last] -= (before"),
     Mutant("dynamics/integrators/tolerances", "near = 1e-3 * length.min()", "near = 1e-1 * length.min()"),
-    Mutant("dynamics/integrators/step_limits", "ahead[0] if len(ahead)", "ahead[-1] if len(ahead)"),
+    Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
     Mutant("dynamics/twin_error", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "factor = 1.0 / (1.0 - share)", "factor = 1.0"),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
