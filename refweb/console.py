@@ -75,6 +75,12 @@ def print_scene(scene, system):
         step = f"{knob} {getattr(solve, knob):g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
+    corners = []
+    if solve.kind == "dynamic" and len(system.corners):
+        from .dynamics.corners import corner_remark
+
+        told = corner_remark(scene.replace(solve=solve), system)
+        corners = [("corners", told)] if told else []
     _box(
         scene.title,
         [
@@ -83,6 +89,7 @@ def print_scene(scene, system):
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
             ("solve", how),
+            *corners,
         ],
     )
 

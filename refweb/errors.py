@@ -16,7 +16,11 @@ class SolverError(RuntimeError):
     """A solver that found no answer; the message says what, where and when."""
 
 
-class OpenBook(SolverError):
+class NoEnd(SolverError):
+    """A method of dynamics that comes to no end of a scene, which another may come to."""
+
+
+class OpenBook(NoEnd):
     """The energy of a run drifted away from the work done on it; ``drift`` says how far, over its largest energy."""
 
     def __init__(self, message, drift=float("inf")):

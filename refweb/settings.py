@@ -73,7 +73,8 @@ class Dynamic(Table):
     ----------
     method : {"central-difference", "explicit", "cvode", "ida", "auto"}
         Explicit central differences, explicit steps of higher order, or CVODE or IDA of SUNDIALS with steps that follow
-        from the error; "auto" chooses by what the scene is, see `refweb.dynamics.method_choice`.
+        from the error; "auto" chooses by what the scene is, see `refweb.dynamics.method_choice`, and falls back on
+        others where its choice comes to no end, see `refweb.dynamics.fallback`.
     duration : float
         Time to simulate [s].
     safety : float

@@ -38,6 +38,8 @@ DIGITS_OF_ADAMS = 8
 take √10 times the steps for each, on webs whose load has a factor 0.01 s for 6 where Adams methods take 0.3 s for 9."""
 PER_STEP, PER_ELEMENT = 1e-6, 12e-9
 """CPU time of a compiled explicit step [s], and of each element in it [s]."""
+STEP_OF_CVODE = 100.0
+"""Explicit steps that cost as much as one of CVODE, which takes one at least to each corner of a table."""
 QUICK_RUN = 0.5
 """CPU time of an explicit run [s] below which nothing is to be gained."""
 DAMPED_BY = 5.0
@@ -53,39 +55,40 @@ class Choice(NamedTuple):
 
 def decided(scene, system):
     """The `Choice` for a scene."""
-    net, digits = system.net, scene.accuracy.digits or USUAL_DIGITS
+    net, digits = system.net, _digits(scene)
     bare = np.flatnonzero((net.mass <= 0.0) & ~system.supported.all(axis=1))
-    tolerance = max(10.0 ** -(digits + 1), 1e-12)
     if system.constraints:
-        return _of(scene, "ida", "only ida holds the lengths of [[link]]", rtol=tolerance)
+        return Choice(given_to(scene, "ida"), "only ida holds the lengths of [[link]]")
     if len(bare):
-        return _of(scene, "ida", f"node {bare[0]} has no mass, which only ida takes", rtol=tolerance)
+        return Choice(given_to(scene, "ida"), f"node {bare[0]} has no mass, which only ida takes")
     family = "adams" if digits >= DIGITS_OF_ORDER_6 else "bdf"
     if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
-        return _of(scene, "cvode", f"{what} is not for explicit steps", rtol=tolerance, family=family)
+        return Choice(given_to(scene, "cvode", family=family), f"{what} is not for explicit steps")
     # the bound of damping and friction in contact is that of all lines touched at once
     system = _undamped(system, lambda family: family.contact)
     bound = _bound(system)
-    steps = scene.solve.duration / (0.5 * bound)
+    corners = np.searchsorted(system.corners, scene.solve.duration)
+    steps = max(scene.solve.duration / (0.5 * bound), float(corners))
     seconds = steps * step_price(system)
     price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
-    damped = _damped(system, bound)
-    if seconds > QUICK_RUN and damped > DAMPED_BY:
+    damped, slow = _damped(system, bound), seconds > QUICK_RUN and steps > STEP_OF_CVODE * corners
+    if slow and damped > DAMPED_BY:
         why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
-        return _of(scene, "cvode", why, rtol=tolerance, family="adams")
-    if seconds > QUICK_RUN and _quiet(scene, system):
+        return Choice(given_to(scene, "cvode", family="adams"), why)
+    if slow and _quiet(scene, system):
         why = f"tables alone move it from its equilibrium: no waves ask for {price}"
-        return _of(scene, "cvode", why, rtol=tolerance, family="bdf")
+        return Choice(given_to(scene, "cvode", family="bdf"), why)
     if digits >= DIGITS_OF_ORDER_6:
         try:
             load(INTEGRATORS["explicit"].integrator)(system)
-            return _of(scene, "explicit", f"{digits} digits, and forces of displacement alone and dead loads: {price}")
+            why = f"{digits} digits, and forces of displacement alone and dead loads: {price}"
+            return Choice(given_to(scene, "explicit"), why)
         except InputError:
             if digits >= DIGITS_OF_ADAMS:
                 why = f"{digits} digits, and forces that no explicit step of order 6 takes"
-                return _of(scene, "cvode", why, rtol=tolerance, family="adams")
-    return _of(scene, "central-difference", price)
+                return Choice(given_to(scene, "cvode", family="adams"), why)
+    return Choice(given_to(scene, "central-difference"), price)
 
 
 def _undamped(system, chosen=lambda family: True):
@@ -111,9 +114,16 @@ def _damped(system, bound):
     return _bound(_undamped(system)) / bound
 
 
-def _of(scene, method, reason, **keys):
-    solve = scene.solve
-    return Choice(Dynamic(method=method, duration=solve.duration, mass=solve.mass, start=solve.start, **keys), reason)
+def given_to(scene, method, **keys):
+    """The `refweb.Dynamic` that gives a scene to a method, at a tolerance for its digits."""
+    solve, keys = scene.solve, {"method": method, **keys}
+    if INTEGRATORS[method].knob == "rtol":
+        keys["rtol"] = max(10.0 ** -(_digits(scene) + 1), 1e-12)
+    return Dynamic(duration=solve.duration, mass=solve.mass, start=solve.start, **keys)
+
+
+def _digits(scene):
+    return scene.accuracy.digits or USUAL_DIGITS
 
 
 def _bound(system):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, NoEnd
 from ..registry import INTEGRATORS, load
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strength_remark
@@ -65,17 +65,17 @@ class Simulation:
     """
 
     def __init__(self, scene, system, solution, kept=None):
-        self._choice = {}
+        self._ways = None
         if scene.solve.method == "auto":
-            from .method_choice import decided
+            from .fallback import Ways
 
-            chosen = decided(scene, system)
-            scene, self._choice = scene.replace(solve=chosen.solve), {"choice": chosen.reason}
+            self._ways = Ways(scene, system, kept)
+            scene = self._ways.scene
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
-        self.standing = Standing.of(getattr(scene.solve, INTEGRATORS[scene.solve.method].knob), kept)
+        self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
         self.begin, self.begin_of_twin = Start(), None
         if kept is not None:
@@ -86,6 +86,10 @@ class Simulation:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
+        if kept is None and len(system.corners):
+            from .corners import corner_remark
+
+            solution.warnings += [told] if (told := corner_remark(scene, system)) else []
         if scene.solve.start != "equilibrium" and kept is None:
             solution.warnings += remarks_on(self.begin, system)
 
@@ -122,7 +126,27 @@ class Simulation:
         """
         if self.scene.solve.start == "equilibrium" and self._kept is None:
             self._settle(tell)
-        follow(self, folder, tell)
+        while True:
+            try:
+                follow(self, folder, tell)
+            except NoEnd as error:
+                if self._ways is None:
+                    raise
+                self._fall_back(error, folder)
+            else:
+                break
+
+    def _stand(self, kept=None):
+        """Stand at the beginning of a method, or where a checkpoint has it."""
+        solve = self.scene.solve
+        self.standing = Standing.of(getattr(solve, INTEGRATORS[solve.method].knob), kept)
+
+    def _fall_back(self, error, folder):
+        """Forget what was computed, and begin with another method; `SolverError` where there is none."""
+        self.solution.warnings.append(self._ways.give_over(error))
+        self.scene, self.solution.reduced, self.solution.solver = self._ways.scene, {}, dict(SOLVER)
+        self._stand()
+        self.again(folder)
 
     def _settle(self, tell):
         """Begin at the equilibrium."""
@@ -198,7 +222,8 @@ class Simulation:
             for event, time in zip(self.scene.event, course.events["time"], strict=True)
         ]
         spent = dict(nsteps=course.nsteps, energy_drift=course.drift, **self.integrator.spent(course))
-        solution.solver = {**SOLVER, "method": self.scene.solve.method, **self._choice, **spent}
+        choice = {} if self._ways is None else self._ways.told()
+        solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 
     def _frame(self, number, folder, course):
@@ -211,7 +236,7 @@ class Simulation:
         kept |= {f"begin_{name}": array for name, array in self.begin._asdict().items() if array is not None}
         if self.begin_of_twin is not None:
             kept |= {f"twin_begin_{name}": array for name, array in self.begin_of_twin._asdict().items()}
-        kept |= {"row": number} | self.standing.arrays()
+        kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
     def remarks(self):

@@ -4,11 +4,15 @@ Each scene has one mass that flies off, at rest until a pulse at `BEGIN`, so tha
 """
 
 import math
+import re
 
 import numpy as np
 import pytest
 
 import refweb
+from refweb.dynamics import method_choice
+from refweb.dynamics.corners import corner_remark
+from refweb.results.files import as_toml
 
 BEGIN = 0.0123
 """Start of a pulse [s], at no multiple of steps or rows."""
@@ -142,3 +146,58 @@ def test_a_hammer_blow(method, width):
     truth = hammered(width, "none", method="cvode", family="adams", rtol=1e-10).results["z"].value
     result = hammered(width, method=method).results["z"]
     assert abs(result.value - truth) <= result.error < 0.05 * abs(truth)
+
+
+def trembling(corners, **solve):
+    """A line that is hit, and pushed by a load whose table has so many corners, apart by chance, in 0.02 s."""
+    times = np.sort(np.random.default_rng(1).uniform(0.0, 0.02, corners))
+    load = refweb.Load(node=2, force=(0.0, 0.0, 1.0), factor=[(t, n % 2) for n, t in enumerate(times)])
+    return refweb.Scene(
+        web=refweb.Inline(points=[[-1, 0, 0], [1, 0, 0], [0, 0, 0]], lines=[[0, 2], [1, 2]], supports=[0, 1]),
+        cable=refweb.Cable(law="linear", modulus=7e9, area=1e-6, density=200.0, prestrain=1e-3),
+        effects=[load],
+        solve=refweb.Dynamic(duration=0.02, **solve),
+        accuracy=refweb.Accuracy(error="none"),
+        observe=[refweb.Observe(name="z", quantity="displacement", node=2, component="z")],
+    )
+
+
+@pytest.mark.parametrize("solve", [dict(), dict(safety=0.2), dict(method="explicit"), dict(step_size=5e-5)])
+def test_more_corners_than_steps_are_told(solve):
+    """The steps told are those taken, and those without the table; it is a warning of the run as well."""
+    given, plain = trembling(1500, **solve), trembling(1500, **solve).replace(effects=())
+    told = corner_remark(given, given.build())
+    solution, without = refweb.run(given), refweb.run(plain)
+    taken, asked = solution.solver["nsteps"], without.solver["nsteps"]
+    found = re.fullmatch(
+        r"1500 corners of tables, 1.33e-05 s apart on average, end steps: (\S+) steps, where stability and rows ask "
+        r"for (\S+), (\S+) times the work",
+        told,
+    )
+    assert told in solution.warnings and not any("corners" in text for text in without.warnings)
+    # The bound at the start stands for that of every row, which a linear law with its shifts changes by some strains.
+    steps, least, times = map(float, found.groups())
+    assert steps == pytest.approx(taken, rel=0.02) and least == pytest.approx(asked, rel=0.02)
+    assert times == pytest.approx(taken / asked, rel=0.05) and taken >= 1500
+
+
+def test_few_corners_are_not_told(capsys, tmp_path):
+    """A table costs nothing to speak of where its corners are few; ``check`` says where they are many."""
+    from refweb.__main__ import main
+
+    for corners, said in ((15, False), (60, False), (1500, True)):
+        given = trembling(corners)
+        (tmp_path / "scene.toml").write_text(as_toml(given.to_dict()), encoding="utf-8")
+        assert main(["check", str(tmp_path / "scene.toml")]) in (None, 0)
+        out = capsys.readouterr().out
+        assert ("corners" in out) == said and bool(corner_remark(given, given.build())) == said
+    implicit = trembling(1500, method="cvode")
+    assert corner_remark(implicit, implicit.build()).endswith("end steps: cvode takes at least as many")
+
+
+def test_auto_counts_corners(monkeypatch):
+    """What tables alone move is given to BDF, but not where each of many corners asks for a step of it."""
+    monkeypatch.setattr(method_choice, "QUICK_RUN", 0.0)
+    for corners, method in ((2, "cvode"), (1500, "central-difference")):
+        given = trembling(corners, method="auto", start="equilibrium")
+        assert method_choice.decided(given, given.build()).solve.method == method

@@ -2,8 +2,8 @@
 
 Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of
 1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
-bodies that start inside of the web, pulses between steps. Each is solved by every method that takes it; a number proves
-each result:
+bodies that start inside of the web, pulses between steps, hammer blows, tables with more corners than steps. Each is
+solved by every method that takes it; a number proves each result:
 
 - statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
   positions and natural lengths by the law alone, assembled with numpy line by line.
@@ -194,6 +194,25 @@ def pulse(width, impulse=0.02):
     return free(load, supports=RIM)
 
 
+def hammered(width, force=500.0):
+    """Two taut lines with a mass between them that is hit within a few steps."""
+    factor = [(0.0, 0.0), (width / 2, 1.0), (width, 0.0)]
+    web = inline([[-1, 0, 0], [1, 0, 0], [0, 0, 0]], [[0, 2], [1, 2]], [0, 1])
+    effects = refweb.PointMass(node=2, mass=0.05), refweb.Load(node=2, force=(0.0, 0.0, force), factor=factor)
+    held = refweb.Supports(nodes=[0, 1])
+    return free(*effects, web=web, supports=held, modulus=7e9, area=1e-6, prestrain=1e-3)
+
+
+def trembling(corners, refused=None):
+    """A web under a load whose table has so many corners, at random: where they are many, less than a step apart.
+
+    Its work is then a small sum of large terms of either sign, which central differences book to second order.
+    """
+    times = np.sort(np.random.default_rng(corners).uniform(0.0, 0.02, corners))
+    load = refweb.Load(node="centre", force=(0.0, 0.0, 1.0), factor=[(t, (-1.0) ** n) for n, t in enumerate(times)])
+    return free(load, supports=RIM, refused=refused)
+
+
 def thrown(web, supports, velocity=UP, node=1, **more):
     """Nodes of a web held, one of the others thrown."""
     held = refweb.Supports(nodes=list(supports))
@@ -245,6 +264,11 @@ MOTIONS = {
         e: hit(modulus=e, duration=0.02 if e < 1e9 else 1e-3) for e in (1.0, 1e6, 1e9, 1e12)
     },
     "pulse of a load, length [s]": {w: pulse(w) for w in (1e-2, 1e-4, 1e-6, 1e-8)},
+    "hammer blow on two lines, length [s]": {w: hammered(w) for w in (1e-3, 1.5e-3, 2e-3)},
+    "corners of a table, number": {
+        30.0: trembling(30),
+        300.0: trembling(300, refused={"central-difference": "energy drift"}),
+    },
     "motion": {
         "all lines snap taut": free(*OUTWARD, web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [], natural_length=1.1),
                                     duration=0.2),

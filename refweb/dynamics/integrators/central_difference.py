@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import InputError, OpenBook, SolverError
+from ...errors import InputError, NoEnd, OpenBook
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
 from .explicit_loop import BREATH, LOOKS, advance_rows, begin, take_steps
@@ -118,10 +118,16 @@ class CentralDifference(Integrator):
         x = np.zeros((self.system.rows, 3)) if x is None else x
         return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, self._model)
 
-    def evaluations(self, duration):
-        """Evaluations of forces that a duration [s] takes, by the bound of its start."""
+    def steps_in(self, spans):
+        """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""
         step = self.step_size or self.safety * self.stretch * self.bound()
-        return len(self.drifts) * self.finer * duration / step
+        return np.ceil(self.finer * np.ceil(np.maximum(np.asarray(spans) / step, self._scheme.least) * (1.0 - 1e-9)))
+
+    def evaluations(self, duration):
+        """Evaluations of forces that a duration [s] takes, by the bound of its start and by corners of tables."""
+        step = self.step_size or self.safety * self.stretch * self.bound()
+        corners = np.searchsorted(self.system.corners, duration)
+        return len(self.drifts) * self.finer * max(duration / step, float(corners))
 
     def spent(self, course):
         """What a course has spent, for ``run.json``.
@@ -219,7 +225,7 @@ class CentralDifference(Integrator):
                 more = advance_rows(times[done:], breath, DRIFT, *records, history.values[done:])
                 now = clock[0]
                 if more < 0:
-                    raise SolverError(
+                    raise NoEnd(
                         f"the step at t = {now['time']:.6g} s is {now['step']:.3g} s, more than {MAX_STEPS_PER_ROW:g} "
                         "steps to the next row: ask for shorter rows, or lower the stiffness that asks for the step"
                     )
@@ -258,7 +264,7 @@ class CentralDifference(Integrator):
 
         sound, done, ahead = course.before.copy(), 0, planned
         if np.isfinite(after(sound, 0, planned)).all():
-            raise SolverError(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
+            raise NoEnd(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
         while ahead > 1:  # what is not finite stays so: the first step that leads there is between done and ahead of it
             half = ahead // 2
             state = after(sound, done, half)
@@ -272,7 +278,7 @@ class CentralDifference(Integrator):
         lines = net.line[(net.cells == row).any(axis=1)]
         name += f", line {lines[0]}," if len(lines) else ""
         t = before + (done + 1) * course.step
-        raise SolverError(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
+        raise NoEnd(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _name_drift(self, course, before):
         """Say where energy came in: the effect and cell whose energy grew most from ``before`` [s] on."""

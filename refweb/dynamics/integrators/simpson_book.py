@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import OpenBook, SolverError
+from ...errors import NoEnd, OpenBook
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
 from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
 
@@ -161,7 +161,7 @@ class SimpsonBook:
         """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""
         if not np.isfinite(force).all():
             name = self.system.row_name(int(np.flatnonzero(~np.isfinite(force).all(axis=1))[0]))
-            raise SolverError(f"number not finite at {name}, t = {t:.6g} s: use a smaller rtol") from None
+            raise NoEnd(f"number not finite at {name}, t = {t:.6g} s: use a smaller rtol") from None
 
     def rates(self, sample):
         """The `Rates` of a sample."""

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import InputError, SolverError
+from ...errors import InputError, NoEnd
 from .energy_book import DRIFT, refuse_open
 from .event_search import search
 from .events import event_rows, starts_above
@@ -292,7 +292,7 @@ class StepObserver(Integrator):
         course.step, course.reached, course.nsteps = reached - course.reached, reached, course.nsteps + 1
         course.short = course.short + 1 if course.step * MAX_STEPS_PER_ROW < end - course.time else 0
         if course.short > PATIENCE:
-            raise SolverError(
+            raise NoEnd(
                 f"the steps at t = {course.time:.6g} s are {course.step:.3g} s, more than {MAX_STEPS_PER_ROW:g} to the "
                 f"next row: raise rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
             )
@@ -356,7 +356,7 @@ class StepObserver(Integrator):
             system = self.system
             force = np.where(system.supported, 0.0, system.force(course.time, course.x, course.v))
             row = int(np.argmax(np.linalg.norm(force, axis=1)))
-            raise SolverError(
+            raise NoEnd(
                 f"{self.method} stopped at t = {course.reached:.6g} s with steps of {course.step:.3g} s: "
                 f"{str(stop).rstrip('.')}; "
                 f"the largest force that moves anything is at {system.row_name(row)}: raise rtol = {self.rtol:g}, "

@@ -1,0 +1,44 @@
+"""What corners of tables cost: no step passes one, and a table with more of them than a run has steps sets the step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..registry import INTEGRATORS, load
+from .schedule import row_times
+
+FEW = 20
+"""Corners in a run of which nothing is told: they cost next to nothing."""
+TOLD = 1.5
+"""Factor on the number of steps from which it is told."""
+
+
+def corner_remark(scene, system):
+    """What corners of tables make of the steps of a run, in words; empty where they change little.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        Of a method, not "auto".
+    system : refweb.system.system.System
+        What acts.
+    """
+    end = scene.solve.duration
+    corners = system.corners
+    corners = corners[(corners > 0.0) & (corners < end)]
+    if len(corners) <= FEW:
+        return ""
+    apart = f"{len(corners)} corners of tables, {end / len(corners):.3g} s apart on average, end steps"
+    method = INTEGRATORS[scene.solve.method]
+    keys = {key: value for key in method.keys if (value := getattr(scene.solve, key)) is not None}
+    integrator = load(method.integrator)(system, **keys)
+    if not hasattr(integrator, "steps_in"):
+        return f"{apart}: {scene.solve.method} takes at least as many"
+    rows = row_times(scene)
+    plain = integrator.steps_in(np.diff(rows)).sum()
+    steps = integrator.steps_in(np.diff(np.union1d(rows, corners))).sum()
+    if len(corners) < plain and steps < TOLD * plain:
+        return ""
+    return (
+        f"{apart}: {steps:.3g} steps, where stability and rows ask for {plain:.3g}, {steps / plain:.3g} times the work"
+    )
