@@ -77,10 +77,13 @@ def print_scene(scene, system):
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     corners = []
     if solve.kind == "dynamic" and len(system.corners):
-        from .dynamics.corners import corner_remark
+        from .dynamics.schedule import FEW_CORNERS
 
-        told = corner_remark(scene.replace(solve=solve), system)
-        corners = [("corners", told)] if told else []
+        if len(system.corners) > FEW_CORNERS:
+            from .dynamics.corners import corner_remark
+
+            told = corner_remark(scene.replace(solve=solve), system)
+            corners = [("corners", told)] if told else []
     _box(
         scene.title,
         [

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..registry import INTEGRATORS, load
-from .schedule import row_times
+from .schedule import FEW_CORNERS, row_times
 
-FEW = 20
-"""Corners in a run of which nothing is told: they cost next to nothing."""
 TOLD = 1.5
 """Factor on the number of steps from which it is told."""
 
@@ -26,7 +24,7 @@ def corner_remark(scene, system):
     end = scene.solve.duration
     corners = system.corners
     corners = corners[(corners > 0.0) & (corners < end)]
-    if len(corners) <= FEW:
+    if len(corners) <= FEW_CORNERS:
         return ""
     apart = f"{len(corners)} corners of tables, {end / len(corners):.3g} s apart on average, end steps"
     method = INTEGRATORS[scene.solve.method]

@@ -14,7 +14,7 @@ from .accuracy_loop import Standing, follow
 from .history import Watch
 from .initial_state import Start, equilibrium, remarks_on, stored
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
-from .schedule import Schedule, blocks
+from .schedule import FEW_CORNERS, Schedule, blocks
 
 NO_TWIN = (
     "the run whose last state it starts from came to its end without a twin: ± holds what this run adds, not what the "
@@ -86,7 +86,7 @@ class Simulation:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
-        if kept is None and len(system.corners):
+        if kept is None and len(system.corners) > FEW_CORNERS:
             from .corners import corner_remark
 
             solution.warnings += [told] if (told := corner_remark(scene, system)) else []
