@@ -128,11 +128,8 @@ class Watch:
         results, extremes = {}, course.extremes
         state = State(self.system, course.time, course.x, course.v)
         for i, o in enumerate(self._observables):
-            value, when, where, at = float(last[1 + i]), course.time, None, None
-            if o in self._probed:
-                at = self._probed.index(o)
-            elif o in self._followed:
-                at = len(self.probes) + self._followed.index(o)
+            value, when, where = float(last[1 + i]), course.time, None
+            at = self._slot(o)
             if at is not None and o.reduce != "final":
                 value, when = float(extremes.values[at]), float(extremes.times[at])
             if o in self._probed:
@@ -140,6 +137,17 @@ class Watch:
                 where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[at]))
             results[o.name] = Result(value, None, o.unit, when, where)
         return results
+
+    def corrections(self, course):
+        """What extremes exceed the values at steps by, by name of the observable; ± is no less."""
+        slots = {o.name: self._slot(o) for o in self._observables if o.reduce != "final"}
+        return {name: float(course.extremes.corrections[at]) for name, at in slots.items()}
+
+    def _slot(self, observable):
+        """Number of the probe or, behind the probes, of the sum of an observable; None where none is looked at."""
+        if observable in self._probed:
+            return self._probed.index(observable)
+        return len(self.probes) + self._followed.index(observable) if observable in self._followed else None
 
     def largest_stress(self, course):
         """Largest stress of all steps [Pa], None where nothing is warned of by it."""

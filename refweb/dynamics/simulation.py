@@ -23,9 +23,10 @@ NO_TWIN = (
 
 
 class Ended(NamedTuple):
-    """A run at its end: its results by name, without errors, and its course."""
+    """A run at its end: its results by name, without errors, what they owe to looks between steps, and its course."""
 
     results: dict[str, Result]
+    corrections: dict[str, float]
     course: Course
 
 
@@ -182,7 +183,7 @@ class Simulation:
                 tell((last + 1) / len(times))
         finally:
             self._note(course)
-        return Ended(self.watch.results(course, self._tables[-1][-1]), course)
+        return Ended(self.watch.results(course, self._tables[-1][-1]), self.watch.corrections(course), course)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin: time, then the observables in their order."""

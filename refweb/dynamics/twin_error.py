@@ -112,7 +112,7 @@ def _largest_mean(times, apart, end):
     return largest
 
 
-def with_errors(results, twin, own, other, order=2.0):
+def with_errors(results, corrections, twin, own, other, order=2.0):
     """Results with ± from what differs in a run of a smaller error, times ``order`` and `SPREAD`.
 
     Two runs may agree by chance on a peak, or at the end, where the motion differs otherwise; what is constant after
@@ -122,12 +122,15 @@ def with_errors(results, twin, own, other, order=2.0):
     error, so that the error is twice the difference where that order holds (``order`` is that factor for the steps
     really taken). The error of CVODE and IDA goes with the tolerance to the power 2/3 at order 2, and faster at higher
     ones. Higher orders count as 2 here: peaks, contact and slack lines leave no more of them, for which the threefold
-    is taken as well. How often ± contains the truth is counted by ``python -m validation coverage``.
+    is taken as well. An extreme between steps is known no better than what it exceeds the values at steps by: run and
+    twin may find it alike. How often ± contains the truth is counted by ``python -m validation coverage``.
 
     Parameters
     ----------
     results, twin : dict of str to refweb.results.solution.Result
         Of either run.
+    corrections : dict of str to float
+        What extremes exceed the values at steps by.
     own, other : ndarray, shape (rows, columns)
         Rows of either history: time, then the observables in their order. Those of equal times are compared: the last
         ones differ where an event ends either run.
@@ -140,6 +143,7 @@ def with_errors(results, twin, own, other, order=2.0):
     for i, (name, result) in enumerate(results.items(), 1):
         apart_then = max(abs(result.value - twin[name].value), _largest_mean(own[:, 0], apart[:, i], result.time))
         error = SPREAD * order * apart_then + 4e-16 * abs(result.value)
+        error = max(error, corrections.get(name, 0.0))
         found[name] = result._replace(error=float(error))
     return found
 
@@ -166,7 +170,7 @@ def add_errors(solution, run, twin, rows, share):
         solution.warnings.append(f"no errors are known: an event ends {which} and not the other of the two")
         return
     factor = 1.0 / (1.0 - share)
-    solution.reduced = with_errors(run.results, twin.results, rows, twin.rows, factor)
+    solution.reduced = with_errors(run.results, run.corrections, twin.results, rows, twin.rows, factor)
     for found, width, time in zip(solution.events, one.events["width"], other.events["time"], strict=True):
         if found["time"] is not None and np.isfinite(time):
             off = abs(found["time"] - float(time))

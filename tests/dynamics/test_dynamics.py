@@ -430,15 +430,30 @@ def test_observables_at_every_row(followed):
             np.testing.assert_allclose(column, values, rtol=1e-9, atol=1e-13 * scale, err_msg=str(o))
 
 
+def between_steps(column):
+    """What a peak may be above the steps beside it: an eighth of a second difference, twice that at kinks."""
+    return 0.25 * np.abs(np.diff(column, 2)).max()
+
+
 def test_reductions_see_every_step(followed):
-    """Largest and smallest of all steps, when it was, and where; the last value is that of the last row."""
+    """Largest and smallest of all steps, or of the motion between two; when and where; the last is that of the row."""
     observe, fine, coarse = followed
     times, states = fine.history["time"], [state for _, state in fine.frames]
+    at_steps = between = 0
     for o in observe:
         column, result = fine.history[o.name], fine.results[o.name]
         first = 1 if o.quantity == "step_size" else 0  # no step leads to the first row
         pick = {"max": np.argmax, "min": np.argmin, "final": lambda a: len(a) - 1}[o.reduce](column[first:]) + first
-        assert (result.value, result.time) == (column[pick], times[pick]), o
+        sign = {"max": 1.0, "min": -1.0, "final": 0.0}[o.reduce]
+        if result.value == column[pick]:
+            assert result.time == times[pick], o
+            near, rtol, atol, at_steps = [pick], 1e-9, 0.0, at_steps + 1
+        else:
+            atol = between_steps(column[first:])
+            assert 0.0 < sign * (result.value - column[pick]) <= atol, o
+            near, rtol = np.flatnonzero(np.abs(times - result.time) < 1e-4), 0.0
+            assert len(near) == 2 and max(sign * column[near]) >= sign * column[pick] - atol, o
+            between += 1
         single = o.quantity in ("reaction", "slack_fraction") or o.quantity.endswith("_energy")
         if single or o.body is not None or o.quantity in ("work", "step_size"):
             continue
@@ -449,11 +464,15 @@ def test_reductions_see_every_step(followed):
             there = replace(o, node=result.where)
             assert o.node is None or result.where in fine.state.system.net.web.find(o.node)
         scale = {"tension": MODULUS * AREA, "stress": MODULUS}.get(o.quantity, 1.0)
-        np.testing.assert_allclose(recomputed(there, states[pick]), result.value, rtol=1e-9, atol=1e-13 * scale)
+        off = min(abs(recomputed(there, states[n]) - result.value) for n in near)
+        # At a step by rounding; between two by no more than values change from one to the other.
+        change = np.abs(np.diff(column)).max() if len(near) > 1 else 0.0
+        assert off <= max(rtol * abs(result.value), 1e-13 * scale, atol + change), o
+    assert at_steps > 60 and between > 20
 
 
 def test_peaks_between_rows(followed):
-    """With a row every 20 steps the extremes are those of the steps, above what the rows show."""
+    """With a row every 20 steps the extremes are those of the steps and between them, above what the rows show."""
     observe, fine, coarse = followed
     above = 0
     for o in observe:
@@ -462,8 +481,12 @@ def test_peaks_between_rows(followed):
         sign = {"max": 1.0, "min": -1.0, "final": 0.0}[o.reduce]
         value, column = coarse.results[o.name].value, coarse.history[o.name]
         # The steps are the same up to the rounding of times, which a smooth motion of 200 steps hardly amplifies.
-        scale = max(np.abs(fine.history[o.name]).max(), 1e-9)
-        np.testing.assert_allclose(value, fine.results[o.name].value, rtol=0, atol=1e-8 * scale, err_msg=str(o))
+        every = fine.history[o.name]
+        rounding = 1e-8 * max(np.abs(every).max(), 1e-9)
+        if sign:
+            assert -rounding <= sign * value - (sign * every).max() <= between_steps(every) + rounding, o
+        else:
+            assert abs(value - every[-1]) <= rounding, o
         assert (sign * value >= sign * column).all()
         above += (sign * value > sign * column).all() and sign != 0.0
     assert above > 40

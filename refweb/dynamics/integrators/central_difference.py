@@ -2,9 +2,9 @@
 
     v ← v + ½h f/m,   x ← x + h v,   f ← f(t + h, x),   v ← v + ½h f/m
 
-The loop calls the kernels of all effects through typed lists and tracks peaks in every step; Python sees history rows
-only. The step comes from Gershgorin's bound on the largest frequency, 2/√(max row sum of M⁻¹K), with K's lines at their
-taut stiffness and the lines that a body can reach within the row at their contact stiffness.
+The loop calls the kernels of all effects through typed lists and tracks peaks, in every step and between steps; Python
+sees history rows only. The step comes from Gershgorin's bound on the largest frequency, 2/√(max row sum of M⁻¹K), with
+K's lines at their taut stiffness and the lines that a body can reach within the row at their contact stiffness.
 
 Below that bound a slack chain in contact can still gain energy by many orders, and look plausible afterwards. So the
 book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of the largest energy ends the run.
@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, NoEnd, OpenBook
+from .between_steps import LOOKS
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
-from .explicit_loop import BREATH, LOOKS, advance_rows, begin, take_steps
+from .explicit_loop import BREATH, advance_rows, begin, take_steps
 from .extremes import Extremes
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .records import CLOCK, Model, Observed, Running, Scheme
@@ -133,6 +134,7 @@ class CentralDifference(Integrator):
         """What a course has spent, for ``run.json``.
 
         The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
+        What the first step is looked at inside with is not counted.
         """
         follows = len(self._observed.followed) + len(self._observed.sums) > 0  # and evaluates forces where it looks
         per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
@@ -157,7 +159,7 @@ class CentralDifference(Integrator):
             starts_above(event, extremes.values[event["slot"]])
         stepping = first + np.flatnonzero(sums[:, -1])
         extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
-        extremes.recent[:, 3] = extremes.values
+        extremes.recent[:, 2] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
         book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), self._least))
         return ExplicitCourse(time=0.0, x=x, v=v, force=force, extremes=extremes, events=events, **book)

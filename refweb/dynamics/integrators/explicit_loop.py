@@ -15,6 +15,7 @@ import numpy as np
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...results.probes import PLACE
+from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside
 from .energy_book import (
     begin_powers,
     book_energies,
@@ -27,13 +28,11 @@ from .energy_book import (
     own_energy,
 )
 from .events import ended_by, note_events
-from .extremes import look, look_at_sums, quadratic_peak, take_over
+from .extremes import begin_anew, correct_within, look, note_time, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
-from .records import Inside
 from .step import (
     add_forces,
     give_impulse,
-    interpolate,
     kick_and_drift,
     last_kick,
     move_supports,
@@ -47,8 +46,6 @@ from .step_bound import safe_step
 
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
-LOOKS = 4
-"""Number of parts of a step of higher order at whose ends peaks are looked for."""
 
 
 @kernel()
@@ -74,46 +71,30 @@ def inner_stages(now, h, scheme, model, running, reaction):
 
 
 @kernel()
-def look_inside(now, h, inside, where, total, model, observed, running):
-    """Look for extremes at `LOOKS` places of a long step that ends ``now``, but its end.
-
-    They are looked for on the polynomial of degree 5 through position, velocity and acceleration at its ends. Work
-    there is that of the whole step less what the energies still gain.
-    """
-    families, inertia, extremes, sums = model.families, model.inertia, running.extremes, observed.sums
-    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
-    first, (x, v, f) = (forces[0], cells[0], data[0]), (inside.state[0], inside.state[1], inside.state[2])
-    probes, rows, numbers, signs = observed.probes, observed.rows, observed.data, observed.signs
-    energies, stored, working = families.energies, families.stored, families.working
-    worked, last = sums.shape[0] > 0 and families.powers.shape[0] > 0, 0.0
-    if worked:
-        book_energies(
-            now, running.x, running.v, inertia.mass, cells, data, energies, stored, running.work, working, total
-        )
-        last = own_energy(total, working)
-    for n in range(1, LOOKS):
-        t = now - h + h * n / LOOKS
-        interpolate(n / LOOKS, h, inside.before, running.x, running.v, inertia.inverse, running.f, x, v)
-        f[:] = 0.0
-        add_forces(t, x, v, f, inside.lines, first, families.still, forces, cells, data, outs)
-        look(t, x, v, f, inside.lines, True, where, probes, rows, numbers, signs, observed.followed, extremes)
-        if sums.shape[0]:
-            book_energies(t, x, v, inertia.mass, cells, data, energies, stored, running.work, working, total)
-            if worked:
-                total[-2] -= last - own_energy(total, working)
-            look_at_sums(t, True, sums, total, len(probes), signs, extremes)
-
-
-@kernel()
 def look_behind(model, observed, running, total):
     """Look for extremes behind a corner of motion, where velocities have jumped."""
     now, lines, where = running.clock[0].time, model.families.outs[0], np.zeros(2, dtype=np.int64)
-    x, v, f, extremes, followed = running.x, running.v, running.f, running.extremes, observed.followed
-    probes, rows, data, signs = observed.probes, observed.rows, observed.data, observed.signs
-    look(now, x, v, f, lines, False, where, probes, rows, data, signs, followed, extremes)
+    x, v, f, extremes = running.x, running.v, running.f, running.extremes
+    begin_anew(extremes)
+    look(now, x, v, f, lines, where, observed, extremes, False)
     if observed.sums.shape[0]:
-        energies_now(model, running, total)
-        look_at_sums(now, False, observed.sums, total, len(probes), signs, extremes)
+        look_at_books(now, x, v, total, extremes, False, model, observed, running)
+    begin_anew(extremes)
+
+
+@kernel()
+def look_again(now, h, fresh, smooth, inside, total, model, observed, running):
+    """Look for extremes where values turn back near the end of a step; whether steps that follow are looked at inside.
+
+    What was found inside of a ``fresh`` step of order 2 are corrections.
+    """
+    if smooth:
+        look_at_tops(now, h, True, inside, total, running.extremes, model, observed, running)
+    elif fresh:
+        correct_within(running.extremes, observed.signs)
+    else:
+        look_back(total, model, observed, running)
+    return smooth
 
 
 @kernel()
@@ -121,14 +102,13 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     """``count`` steps of size h, behind those that are taken of the row; where ``changing`` natural lengths change.
 
     It writes all of ``running`` but ``before``. A step is a kick, a drift and a kick of h times ``kicks`` and
-    ``drifts``; more of them are a method of higher order, whose long steps are looked at inside.
-
+    ``drifts``; more of them are a method of higher order, whose long steps are looked at inside, as the first one is.
     Returns the steps taken: fewer than asked for where an event ends the run.
     """
     clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse = running.x, running.v, running.f, running.work, running.impulse
-    extremes, values = running.extremes, running.extremes.values
+    extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
     power, length_force, moved = running.power, running.length_force, driven.size > 0
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers = families.still, families.viscous, families.powers
@@ -140,10 +120,10 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(reels.lengths.size if changing else 0)
     extra = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
-    looks = stages > 0 and followed.size + sums.shape[0] > 0
-    space, aside = np.empty((6, rows if looks else 0, 3)), np.empty((rows if moved else 0, 3))
-    inside = Inside(space[:3], space[3:], np.empty_like(lines) if looks else lines)
-    begun, start, awaited = clock.begun, clock.time, running.events.shape[0] > 0
+    looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
+    looks = watched and (stages > 0 or fresh > 0)
+    inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if moved else 0, 3))
+    begun, planned, start, awaited = clock.begun, clock.planned, clock.time, running.events.shape[0] > 0
     if begun == 0:
         begin_powers(start, x, v, extra, families, power)
         if changing:
@@ -182,17 +162,18 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         set_reaction(held, f, reaction)
         give_impulse(kicks[stages + 1], reaction, impulse)
         if looks:
-            look_inside(now, h, inside, where, total, model, observed, running)
+            look_inside(now, h, step == fresh, stages == 0, inside, where, total, model, observed, running)
+        turned, ending = False, begun + step == planned or math.isnan(looked[0])
+        note_time(looked, now)
         for i in followed:
             value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
+            turned = turns_back(i, value, signs[i], values[i], recent, ending) or turned
             if signs[i] * value > signs[i] * values[i]:
                 take_over(i, value, now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
-            if stages:
-                quadratic_peak(extremes, i, now, value, signs[i])
         if sums.shape[0]:
-            energies, stored, working = families.energies, families.stored, families.working
-            book_energies(now, x, v, mass, cells, data, energies, stored, work, working, total)
-            look_at_sums(now, stages > 0, sums, total, len(probes), signs, extremes)
+            turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
+        if turned or watched and step == fresh:
+            looks = look_again(now, h, step == fresh, stages > 0, inside, total, model, observed, running)
         if awaited:
             if note_events(now, h, x, v, f, lines, running.events, where, probes, probe_rows, probe_data, sums, total):
                 return step

@@ -1,13 +1,30 @@
-"""Extremes: the largest or smallest value of what is looked at, over all steps."""
+"""Extremes: the largest or smallest value of what is looked at, at steps and between them.
+
+Where the parabola through the last three values of something turns back before the last one, that is looked at where it
+does: on the motion between steps. So a peak is what is really there, also of what has kinks, jumps and bounds. What it
+exceeds the values at steps by is kept as correction, and ± is never less: run and twin may find the same. Where steps
+are of a higher order, and so the motion between them, it is what the value differs from the parabola by.
+
+The first step of a run is looked at inside, as no third value is known there, nor is what went before. Behind a jump of
+velocities the first three values are the first to tell.
+
+An oscillator in central differences, over 30 phases, has at ωh = 1/4 peaks that are off by 7.80e-3 at most, by 7.81e-3
+where the top of the parabola counts as peak, and its amplitude at steps is off by 7.82e-3 itself. But that parabola
+passes what a kink has, an eighth of a second difference, and finds less than no tension, or more than all lines slack.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from ...kernels import kernel
 from ...results.probes import PLACE
+
+EDGE = 2.0**-16
+"""Share of a step at whose distance from an end it is looked at for the rate there."""
 
 
 class Extremes(NamedTuple):
@@ -21,36 +38,77 @@ class Extremes(NamedTuple):
         Time of each [s].
     places : ndarray of int
         Row or element that a probe's stands at.
-    recent : ndarray, shape (probes + sums, 4)
-        Time and value of each when it was last looked at, twice: the tops of parabolas count as well.
+    corrections : ndarray
+        What each owes to a look between steps, 0 where it was found at a step.
+    recent : ndarray, shape (probes + sums, 3)
+        Value of each at the last three looks since its rate may have jumped, not a number before.
+    looked : ndarray, shape (3,)
+        Times of these looks [s].
     """
 
     values: np.ndarray
     times: np.ndarray
     places: np.ndarray
+    corrections: np.ndarray
     recent: np.ndarray
+    looked: np.ndarray
 
     @classmethod
     def at_start(cls, values, places):
         """Those of the values at t = 0."""
-        recent = np.full((len(values), 4), np.nan)
-        recent[:, 2], recent[:, 3] = 0.0, values
-        return cls(values, np.zeros(len(values)), places, recent)
+        recent = np.full((len(values), 3), np.nan)
+        recent[:, 2] = values
+        return cls(values, np.zeros(len(values)), places, np.zeros(len(values)), recent, np.array([np.nan, np.nan, 0]))
+
+
+@kernel(forceinline=True)
+def note_time(looked, t):
+    """Note the time of a look."""
+    looked[0], looked[1], looked[2] = looked[1], looked[2], t
+
+
+@kernel(forceinline=True)
+def turns_back(i, value, sign, extreme, recent, ending):
+    """Note a value at a look; whether it may be that a peak above the extreme lies a little before.
+
+    It lies about the value before where that is above its neighbours: the parabola of equal steps has no more than an
+    eighth of their second difference there. Where steps are ``ending``, or have begun, it may also lie about the last
+    value, or the first of three.
+    """
+    first, middle, last = sign * recent[i, 1], sign * recent[i, 2], sign * value
+    recent[i, 0], recent[i, 1], recent[i, 2] = recent[i, 1], recent[i, 2], value
+    curve = 2.0 * middle - first - last
+    between = middle > first and middle > last and middle + 0.5 * curve > sign * extreme  # never of not a number
+    return between or ending and last - middle < 0.75 * curve and max(middle, last) + curve > sign * extreme
 
 
 @kernel()
-def quadratic_peak(extremes, i, now, value, sign):
-    """Take the top of the parabola through the last three values of a probe, where it has one between them."""
-    recent = extremes.recent
-    before, low, at, high = recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3]
-    if sign * high > sign * low and sign * high > sign * value:  # never of what is not a number yet
-        rise, fall = (high - low) / (at - before), (value - high) / (now - at)
-        curve = (fall - rise) / (now - before)
-        slope = rise + curve * (at - before)
-        top = high - 0.25 * slope * slope / curve
-        if sign * top > sign * extremes.values[i]:
-            extremes.values[i], extremes.times[i] = top, at - 0.5 * slope / curve
-    recent[i, 0], recent[i, 1], recent[i, 2], recent[i, 3] = at, high, now, value
+def parabola(extremes, i):
+    """Slope at the middle of the last three looks, and half of the second derivative, of the parabola through them."""
+    before, at, now = extremes.looked[0], extremes.looked[1], extremes.looked[2]
+    low, high, value = extremes.recent[i, 0], extremes.recent[i, 1], extremes.recent[i, 2]
+    rise, fall = (high - low) / (at - before), (value - high) / (now - at)
+    curve = (fall - rise) / (now - before)
+    return rise + curve * (at - before), curve
+
+
+@kernel()
+def time_of_top(extremes, i, sign):
+    """Time between the last three looks at which their parabola has a top above the extreme; not a number if none."""
+    slope, curve = parabola(extremes, i)
+    top, when = extremes.recent[i, 1] - 0.25 * slope * slope / curve, extremes.looked[1] - 0.5 * slope / curve
+    above = sign * curve < 0.0 and sign * top > sign * extremes.values[i]
+    return when if above and extremes.looked[0] < when < extremes.looked[2] else math.nan
+
+
+@kernel()
+def correction(extremes, i, sign, t, value, smooth):
+    """What a value between the last three looks exceeds theirs by or, ``smooth``, differs from their parabola by."""
+    recent = extremes.recent[i]
+    if smooth:
+        (slope, curve), late = parabola(extremes, i), t - extremes.looked[1]
+        return abs(value - recent[1] - late * (slope + late * curve))
+    return sign * value - max(sign * recent[0], sign * recent[1], sign * recent[2])
 
 
 @kernel()
@@ -59,25 +117,45 @@ def take_over(i, value, t, x, v, f, lines, where, probe, rows, data, extremes):
     where[1] = PLACE
     probe(t, x, v, f, lines, rows, data, where)
     extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
+    extremes.corrections[i] = 0.0
 
 
 @kernel()
-def look(t, x, v, f, lines, long, where, probes, rows, data, signs, followed, extremes):
-    """Look at all that is followed, and take over what exceeds its extreme; after ``long`` steps parabolas as well."""
-    for i in followed:
+def look(t, x, v, f, lines, where, observed, extremes, ending):
+    """Look at all probes that are followed, and take over what exceeds its extreme; whether any may turn back."""
+    probes, rows, data, signs, turned = observed.probes, observed.rows, observed.data, observed.signs, False
+    note_time(extremes.looked, t)
+    for i in observed.followed:
         value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+        turned = turns_back(i, value, signs[i], extremes.values[i], extremes.recent, ending) or turned
         if signs[i] * value > signs[i] * extremes.values[i]:
             take_over(i, value, t, x, v, f, lines, where, probes[i], rows[i], data[i], extremes)
-        if long:
-            quadratic_peak(extremes, i, t, value, signs[i])
+    return turned
 
 
-@kernel(forceinline=True)
-def look_at_sums(t, long, sums, total, first, signs, extremes):
-    """As `look`, at sums of the energies ``total``; their numbers follow from ``first``."""
-    for j in range(sums.shape[0]):
-        value, i = np.dot(sums[j], total), first + j
+@kernel()
+def look_at_sums(t, total, observed, extremes, ending):
+    """As `look`, at sums of the energies ``total``; the time is to be noted before."""
+    first, signs, turned = len(observed.probes), observed.signs, False
+    for i in range(first, signs.size):
+        value = np.dot(observed.sums[i - first], total)
+        turned = turns_back(i, value, signs[i], extremes.values[i], extremes.recent, ending) or turned
         if signs[i] * value > signs[i] * extremes.values[i]:
-            extremes.values[i], extremes.times[i] = value, t
-        if long:
-            quadratic_peak(extremes, i, t, value, signs[i])
+            extremes.values[i], extremes.times[i], extremes.corrections[i] = value, t, 0.0
+    return turned
+
+
+@kernel()
+def begin_anew(extremes):
+    """Forget all values but the last: rates may have jumped there."""
+    extremes.looked[:2] = np.nan
+    extremes.recent[:, :2] = np.nan
+
+
+@kernel()
+def correct_within(extremes, signs):
+    """Where an extreme is between the last two looks, keep as correction what it exceeds both by."""
+    for i in range(signs.size):
+        if extremes.looked[1] < extremes.times[i] < extremes.looked[2]:
+            best = max(signs[i] * extremes.recent[i, 1], signs[i] * extremes.recent[i, 2])
+            extremes.corrections[i] = signs[i] * extremes.values[i] - best

@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
+import bisect
+from typing import NamedTuple
+
 import numpy as np
 
 from ...results.probes import PLACE
-from .extremes import Extremes, quadratic_peak
+from .extremes import EDGE, Extremes, note_time, turns_back
+
+ROUNDS = 6
+"""Largest number of looks at one peak."""
+
+
+class Top(NamedTuple):
+    """The highest point of a parabola."""
+
+    time: float
+    height: float
+
+
+def top_of(times, heights):
+    """The `Top` of the parabola through three points, None where it has none."""
+    (before, at, now), (low, high, value) = times, heights
+    rise, fall = (high - low) / (at - before), (value - high) / (now - at)
+    curve = (fall - rise) / (now - before)
+    slope = rise + curve * (at - before)
+    return Top(at - 0.5 * slope / curve, high - 0.25 * slope * slope / curve) if curve < 0.0 else None
 
 
 class Measurements:
@@ -63,23 +85,59 @@ class Measurements:
         values = np.array([*self.probes(sample), *(self._weights @ energies)])
         extremes = Extremes.at_start(values.copy(), np.array([*places, *[-1] * len(self._weights)], dtype=np.int64))
         stepping = self.probed + np.flatnonzero(self._weights[:, -1])
-        extremes.values[stepping] = extremes.recent[stepping, 3] = -np.inf * self._signs[stepping]
+        extremes.values[stepping] = extremes.recent[stepping, 2] = -np.inf * self._signs[stepping]
         return extremes, values
 
-    def follow(self, extremes, sample, energies):
-        """Take the values at a sample over into the extremes; ``energies(sample)`` is what sums weigh."""
-        for i in self._followed:
-            if self._beats(extremes, i, value := self.probe(i, sample), sample.time):
-                extremes.places[i] = self._place(i, sample)
-            quadratic_peak(extremes, i, sample.time, value, self._signs[i])
-        if len(self._weights):
-            for i, value in enumerate(self._weights @ energies(sample), self.probed):
-                self._beats(extremes, i, value, sample.time)
-                quadratic_peak(extremes, i, sample.time, value, self._signs[i])
+    def look(self, extremes, sample, energies):
+        """Take the values at a sample over into the extremes; numbers of what may turn back.
 
-    def _beats(self, extremes, i, value, t):
-        """Note a value that is more extreme than all before; whether it is."""
-        if not self._signs[i] * value > self._signs[i] * extremes.values[i]:
-            return False
-        extremes.values[i], extremes.times[i] = value, t
-        return True
+        ``energies(sample)`` is what sums weigh.
+        """
+        note_time(extremes.looked, sample.time)
+        values = {i: self.probe(i, sample) for i in self._followed}
+        if len(self._weights):
+            values |= enumerate(self._weights @ energies(sample), self.probed)
+        turned = []
+        for i, value in values.items():
+            if turns_back(i, value, self._signs[i], extremes.values[i], extremes.recent, True):
+                turned.append(i)
+            self._take_over(extremes, i, value, sample)
+        return turned
+
+    def follow(self, extremes, middle, end, sample_at, energies):
+        """Look at a piece of a step: at its middle, its end and, by ``sample_at(time)``, where values turn back."""
+        self.look(extremes, middle, energies)
+        for i in self.look(extremes, end, energies):
+            self._search_top(extremes, i, lambda t: (s := sample_at(t), self.value(i, s, energies)))  # noqa: B023
+
+    def _take_over(self, extremes, i, value, sample, correction=0.0):
+        """Note a value that is more extreme than all before."""
+        if self._signs[i] * value > self._signs[i] * extremes.values[i]:
+            extremes.values[i], extremes.times[i], extremes.corrections[i] = value, sample.time, correction
+            if i < self.probed:
+                extremes.places[i] = self._place(i, sample)
+
+    def _search_top(self, extremes, i, look_at):
+        """Look for a peak between the last three looks, by parabolas through the highest value and its neighbours."""
+        sign, times, heights = self._signs[i], extremes.looked.tolist(), (self._signs[i] * extremes.recent[i]).tolist()
+        least, best = EDGE * (times[2] - times[0]), None
+        for _ in range(ROUNDS):
+            highest = int(np.argmax(heights))
+            n = min(max(highest, 1), len(times) - 2)
+            top = top_of(times[n - 1 : n + 2], heights[n - 1 : n + 2])
+            if top is None or not times[0] - 0.25 / EDGE * least < top.time < times[-1] + 0.25 / EDGE * least:
+                break
+            t = min(max(top.time, times[0] + least), times[-1] - least)
+            if min(abs(t - other) for other in times) < 0.5 * least:
+                break
+            sample, value = look_at(t)
+            at = bisect.bisect(times, t)
+            times.insert(at, t)
+            heights.insert(at, sign * value)
+            if sign * value > max(heights[:at] + heights[at + 1 :]):
+                best = sample, value, abs(top.height - sign * value)
+            if abs(top.height - sign * value) <= 1e-14 * abs(value):
+                break
+        if best is not None:
+            sample, value, off = best
+            self._take_over(extremes, i, value, sample, off)

@@ -3,7 +3,8 @@
 A step is a chain of kicks b h f/m and drifts a h v, the same forwards and backwards, of order 4 or 6 where forces
 follow from displacement alone and are smooth. A kink, of a line that goes slack or a body that touches, costs the step
 that it lies in its order. The splittings are symplectic, so that energy does not drift, and keep momenta to rounding.
-Largest values are looked for four times a step and on parabolas in between: they are of order 4, or 2 at a kink.
+Largest values are looked for four times a step, and where parabolas through these turn back, on a polynomial of degree
+5 in between: an oscillator has them to 6e-10 with safety 0.5, and what has a kink to order 2.
 
 Dead loads may follow tables of time: steps end at the corners of these, and between them time is a coordinate that
 goes with the drifts, in which a force is taken where its drifts have come to. Their work is what their potential

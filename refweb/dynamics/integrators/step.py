@@ -155,3 +155,20 @@ def interpolate(s, h, old, x, v, inverse, f, here, speed):
             a0, a1 = h * h * old[2, q, k], h * h * inverse[q, k] * f[q, k]
             here[q, k] = old[0, q, k] + way * far + b0 * v0 + b1 * v1 + c0 * a0 + c1 * a1
             speed[q, k] = (more * far + db0 * v0 + db1 * v1 + dc0 * a0 + dc1 * a1) / h
+
+
+@kernel(forceinline=True)
+def interpolate_kicks(s, h, old, x, v, inverse, f, here, speed):
+    """As `interpolate`, for a kick, a drift and a kick.
+
+    Velocities at its ends are no rates of positions there, but of order 2 off. So positions lie on the cubic through
+    those at either end with the accelerations there, and velocities on that through velocities and accelerations.
+    """
+    r = 1.0 - s
+    bend0, bend1 = h * h * s * r * (1.0 + r) / 6.0, h * h * s * r * (1.0 + s) / 6.0
+    way, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
+    for q in range(x.shape[0]):
+        for k in range(3):
+            a0, a1 = old[2, q, k], inverse[q, k] * f[q, k]
+            here[q, k] = old[0, q, k] + s * (x[q, k] - old[0, q, k]) - bend0 * a0 - bend1 * a1
+            speed[q, k] = old[1, q, k] + way * (v[q, k] - old[1, q, k]) + rate0 * a0 + rate1 * a1

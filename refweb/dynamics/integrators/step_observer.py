@@ -16,6 +16,7 @@ from ...errors import InputError, NoEnd
 from .energy_book import DRIFT, refuse_open
 from .event_search import search
 from .events import event_rows, starts_above
+from .extremes import EDGE, begin_anew
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator
 from .measurements import Measurements
 from .simpson_book import Rates, SimpsonBook
@@ -320,8 +321,7 @@ class StepObserver(Integrator):
             stop = search(course.events, piece, lambda slot, sample: self._value(piece, slot, sample), self._sample_at)
             if stop < end:
                 piece = self._piece(course, stop)
-        for sample in (piece.middle, piece.end):
-            self._measurements.follow(course.extremes, sample, lambda sample: self._book.energies_within(piece, sample))
+        self._look(course.extremes, piece)
         course.work, course.impulse = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind
@@ -329,6 +329,20 @@ class StepObserver(Integrator):
             self._book.note_largest(course, self._book.energies(piece.end, course.work, course.step))
         if piece.jump and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(course)
+
+    def _look(self, extremes, piece):
+        """Look for extremes in a piece, and behind a jump at its end."""
+
+        def energies(sample):
+            return self._book.energies_within(piece, sample)
+
+        end = piece.end
+        if piece.jump:
+            end = self._sample_at(end.time - EDGE * (end.time - piece.begin))
+        self._measurements.follow(extremes, piece.middle, end, self._sample_at, energies)
+        if piece.jump:
+            self._measurements.look(extremes, piece.end, energies)
+            begin_anew(extremes)
 
     def _value(self, piece, slot, sample):
         """Value of a probe or a sum within a piece."""

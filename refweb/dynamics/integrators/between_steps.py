@@ -1,0 +1,187 @@
+"""Looks of the compiled loop that no plain step has: at the motion between steps, and at the book of energies.
+
+The motion in a step of higher order is the polynomial of degree 5 through position, velocity and acceleration at its
+ends. Of a kick, a drift and a kick the state before is that of the step taken back, which costs an evaluation of
+forces: nothing is kept for it in all the steps that have no peak.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import copy_rows, kernel
+from .energy_book import book_energies, own_energy
+from .extremes import EDGE, Extremes, correction, look, look_at_sums, take_over, time_of_top
+from .records import Inside
+from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
+
+LOOKS = 4
+"""Number of parts of a step of higher order at whose ends peaks are looked for."""
+SAME_PEAK = 1e-3
+"""Share of a step within which peaks of two observables are looked at at once."""
+BEHIND = 0.51
+"""Share of a step by which its motion is taken to go on before its start, where a peak about that is looked for."""
+
+
+@kernel()
+def room_inside(rows, lines):
+    """Space for looks inside, of no size where there are no rows."""
+    space = np.empty((6, rows, 3))
+    return Inside(space[:3], space[3:], np.empty_like(lines) if rows else lines)
+
+
+@kernel()
+def look_at_books(t, x, v, total, extremes, ending, model, observed, running):
+    """Look for extremes of energies at the end of a step."""
+    families = model.families
+    book_energies(
+        t, x, v, model.inertia.mass, families.cells, families.data, families.energies, families.stored, running.work,
+        families.working, total,
+    )  # fmt: skip
+    return look_at_sums(t, total, observed, extremes, ending)
+
+
+@kernel()
+def book_within(t, now, x, v, total, model, running):
+    """Write energies at a state ahead of the last one; work there is that until ``now`` less what they still gain."""
+    families, mass, last = model.families, model.inertia.mass, 0.0
+    cells, data, energies, stored, working = (
+        families.cells, families.data, families.energies, families.stored, families.working
+    )  # fmt: skip
+    if families.powers.shape[0]:
+        book_energies(now, running.x, running.v, mass, cells, data, energies, stored, running.work, working, total)
+        last = own_energy(total, working)
+    book_energies(t, x, v, mass, cells, data, energies, stored, running.work, working, total)
+    if families.powers.shape[0]:
+        total[-2] -= last - own_energy(total, working)
+
+
+@kernel()
+def forces_at(t, x, v, f, lines, model):
+    """Write all forces at a state and a time to f, and what lines show; natural lengths become those of that time."""
+    families, motions = model.families, model.motions
+    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    for i in range(len(motions.kernels)):
+        motions.kernels[i](t, x, v, f, motions.cells[i], motions.data[i], motions.outs[i])
+    if model.reels.lengths.size:
+        set_lengths(t, model.reels, data[0])
+    f[:] = 0.0
+    add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), families.still, forces, cells, data, outs)
+    for i in families.viscous:
+        forces[i](t, x, v, f, cells[i], data[i], outs[i])
+
+
+@kernel()
+def step_back(t, h, end, start, lines, model):
+    """Take a kick, a drift and a kick of size h back, from a state ``end`` to that at time t.
+
+    Forces that follow from velocity see that of the middle of the step.
+    """
+    inverse = model.inertia.inverse
+    for r in range(inverse.shape[0]):
+        for k in range(3):
+            start[1, r, k] = end[1, r, k] - 0.5 * h * inverse[r, k] * end[2, r, k]
+            start[0, r, k] = end[0, r, k] - h * start[1, r, k]
+    forces_at(t, start[0], start[1], start[2], lines, model)
+    for r in range(inverse.shape[0]):
+        for k in range(3):
+            start[1, r, k] -= 0.5 * h * inverse[r, k] * start[2, r, k]
+
+
+@kernel()
+def state_within(t, now, h, x, v, f, smooth, inside, model):
+    """Write the state at a time in a step of size h that ends ``now`` at x, v, f, and what lines show.
+
+    The step is of a higher order, and its motion ``smooth``, or a kick, a drift and a kick.
+    """
+    here, inverse, share = inside.state, model.inertia.inverse, 1.0 - (now - t) / h
+    if smooth:
+        interpolate(share, h, inside.before, x, v, inverse, f, here[0], here[1])
+    else:
+        interpolate_kicks(share, h, inside.before, x, v, inverse, f, here[0], here[1])
+    forces_at(t, here[0], here[1], here[2], inside.lines, model)
+
+
+@kernel()
+def take_peak(t, now, smooth, inside, total, extremes, model, observed, running):
+    """Take over what exceeds its extreme at a state between the last three looks, which ``inside`` holds."""
+    (x, v, f), lines, where = (inside.state[0], inside.state[1], inside.state[2]), inside.lines, np.zeros(2, np.int64)
+    probes, rows, data, signs = observed.probes, observed.rows, observed.data, observed.signs
+    for i in observed.followed:
+        value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+        if signs[i] * value > signs[i] * extremes.values[i]:
+            take_over(i, value, t, x, v, f, lines, where, probes[i], rows[i], data[i], extremes)
+            extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
+    if observed.sums.shape[0]:
+        first, here = len(probes), total.copy()  # events are to see that of the step
+        book_within(t, now, x, v, here, model, running)
+        for i in range(first, signs.size):
+            value = np.dot(observed.sums[i - first], here)
+            if signs[i] * value > signs[i] * extremes.values[i]:
+                extremes.values[i], extremes.times[i] = value, t
+                extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
+
+
+@kernel()
+def look_at_tops(now, h, smooth, inside, total, extremes, model, observed, running):
+    """Look where parabolas turn back, in a step that ends ``now`` and is looked at inside, or a little before."""
+    last = -math.inf
+    for i in range(observed.signs.size):
+        t = time_of_top(extremes, i, observed.signs[i])
+        if abs(t - last) > SAME_PEAK * h:  # never of not a number
+            state_within(t, now, h, running.x, running.v, running.f, smooth, inside, model)
+            take_peak(t, now, True, inside, total, extremes, model, observed, running)
+            last = t
+
+
+@kernel()
+def look_back(total, model, observed, running):
+    """Look where parabolas turn back, in the last two steps."""
+    extremes, last = running.extremes, -math.inf
+    before, at, now = extremes.looked[0], extremes.looked[1], extremes.looked[2]
+    rows, inverse, lines = running.x.shape[0], model.inertia.inverse, model.families.outs[0]
+    inside, ends = room_inside(rows, lines), np.empty((3, 3, rows, 3))
+    for i in range(observed.signs.size):
+        t = time_of_top(extremes, i, observed.signs[i])
+        if abs(t - last) > SAME_PEAK * (now - at):
+            if last == -math.inf:
+                copy_rows(running.x, ends[0, 0])
+                copy_rows(running.v, ends[0, 1])
+                copy_rows(running.f, ends[0, 2])
+                step_back(at, now - at, ends[0], ends[1], inside.lines, model)
+            n, begin, end = 0, at, now
+            if at - t > BEHIND * (now - at):
+                n, begin, end = 1, before, at
+                step_back(before, at - before, ends[1], ends[2], inside.lines, model)
+            note_state(ends[n + 1, 0], ends[n + 1, 1], ends[n + 1, 2], inverse, inside.before)
+            state_within(t, end, end - begin, ends[n, 0], ends[n, 1], ends[n, 2], False, inside, model)
+            take_peak(t, now, False, inside, total, extremes, model, observed, running)
+            last = t
+    if last > -math.inf and model.reels.lengths.size:
+        set_lengths(now, model.reels, model.families.data[0])
+
+
+@kernel()
+def look_inside(now, h, fresh, alone, inside, where, total, model, observed, running):
+    """Look for extremes at `LOOKS` places of a step that ends ``now``, but its end.
+
+    Of a ``fresh`` step it looks at an `EDGE` from its start as well, and from its end where the step is looked at
+    ``alone``: where no other is, its inside is no look ahead of the next one.
+    """
+    extremes, x, v = running.extremes, inside.state[0], inside.state[1]
+    if alone:
+        values, times, places, corrections = extremes.values, extremes.times, extremes.places, extremes.corrections
+        extremes = Extremes(values, times, places, corrections, extremes.recent.copy(), extremes.looked.copy())
+    for n in range(0 if fresh else 1, LOOKS + 1 if alone else LOOKS):
+        t = now - h + h * (EDGE if n == 0 else n / LOOKS if n < LOOKS else 1.0 - EDGE)
+        state_within(t, now, h, running.x, running.v, running.f, not alone, inside, model)
+        turned = look(t, x, v, inside.state[2], inside.lines, where, observed, extremes, fresh)
+        if observed.sums.shape[0]:
+            book_within(t, now, x, v, total, model, running)
+            turned = look_at_sums(t, total, observed, extremes, fresh) or turned
+        if turned:
+            look_at_tops(now, h, not alone, inside, total, extremes, model, observed, running)
+    if model.reels.lengths.size:
+        set_lengths(now, model.reels, model.families.data[0])
