@@ -106,6 +106,29 @@ def test_a_peak_in_the_first_step(method, late):
     assert abs(result.time - late * h) < 0.05 * h
 
 
+@pytest.mark.parametrize("method", ["central-difference", "cvode"])
+def test_a_peak_behind_a_jump(method):
+    """An end of a line goes out and back at a constant speed each: strain is largest at the corner, and not above.
+
+    The parabola through values on both sides of the corner would pass it. Behind the second corner, where the end goes
+    out for a while again, nothing is larger either.
+    """
+    way = [(0.0, 0.0, 0.0, 0.0), (3.3e-4, 1e-3, 0.0, 0.0), (5e-4, 0.0, 0.0, 0.0), (6e-4, 5e-4, 0.0, 0.0)]
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [1, 1, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2])
+    case = refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
+        effects=[refweb.Motion(node=1, displacement=way), refweb.PointMass(node=2, mass=1.0)],
+        supports=refweb.Supports(nodes=[0]),
+        solve=refweb.Dynamic(duration=6e-4, method=method),
+        output=refweb.Output(interval=6e-4),
+        observe=[refweb.Observe(name="strain", quantity="strain", line=0, reduce="max")],
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    strain = refweb.run(case).results["strain"]
+    np.testing.assert_allclose([strain.value, strain.time], [1e-3, 3.3e-4], rtol=1e-9)
+
+
 def test_order_of_a_peak():
     """Peaks of central differences are of order 2, at each phase: at steps they are not, as they jump between these."""
     steps = 1e-3 * 0.5 ** np.arange(4)
