@@ -44,17 +44,21 @@ def look_at_books(t, x, v, total, extremes, ending, model, observed, running):
 
 
 @kernel()
-def book_within(t, now, x, v, total, model, running):
-    """Write energies at a state ahead of the last one; work there is that until ``now`` less what they still gain."""
+def book_within(t, now, x, v, smooth, total, model, running):
+    """Write energies at a state ahead of the last one.
+
+    Work there is that until ``now`` less what they still gain, where the motion is ``smooth``; else it stays: in a
+    kick, a drift and a kick, energies between have an error of their own where something touches.
+    """
     families, mass, last = model.families, model.inertia.mass, 0.0
     cells, data, energies, stored, working = (
         families.cells, families.data, families.energies, families.stored, families.working
     )  # fmt: skip
-    if families.powers.shape[0]:
+    if smooth and families.powers.shape[0]:
         book_energies(now, running.x, running.v, mass, cells, data, energies, stored, running.work, working, total)
         last = own_energy(total, working)
     book_energies(t, x, v, mass, cells, data, energies, stored, running.work, working, total)
-    if families.powers.shape[0]:
+    if smooth and families.powers.shape[0]:
         total[-2] -= last - own_energy(total, working)
 
 
@@ -116,7 +120,7 @@ def take_peak(t, now, smooth, inside, total, extremes, model, observed, running)
             extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
     if observed.sums.shape[0]:
         first, here = len(probes), total.copy()  # events are to see that of the step
-        book_within(t, now, x, v, here, model, running)
+        book_within(t, now, x, v, smooth, here, model, running)
         for i in range(first, signs.size):
             value = np.dot(observed.sums[i - first], here)
             if signs[i] * value > signs[i] * extremes.values[i]:
@@ -179,7 +183,7 @@ def look_inside(now, h, fresh, alone, inside, where, total, model, observed, run
         state_within(t, now, h, running.x, running.v, running.f, not alone, inside, model)
         turned = look(t, x, v, inside.state[2], inside.lines, where, observed, extremes, fresh)
         if observed.sums.shape[0]:
-            book_within(t, now, x, v, total, model, running)
+            book_within(t, now, x, v, not alone, total, model, running)
             turned = look_at_sums(t, total, observed, extremes, fresh) or turned
         if turned:
             look_at_tops(now, h, not alone, inside, total, extremes, model, observed, running)
