@@ -164,6 +164,9 @@ def print_run(summary, more=()):
         rows.append(("solver", text))
     if solver["energy_drift"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} steps, energy drift {solver['energy_drift']:.1e}"
+        text += f", of momentum {solver['momentum_drift']:.1e}"
+        if integrated := solver.get("integrated_impulses"):
+            text += f" with {', '.join(integrated)} as integrated"
         rows.append(("solver", text))
     rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
     rows += [("warning", text) for text in summary["warnings"]]

@@ -21,7 +21,10 @@ class NoEnd(SolverError):
 
 
 class OpenBook(NoEnd):
-    """The energy of a run drifted away from the work done on it; ``drift`` says how far, over its largest energy."""
+    """The energy of a run drifted away from the work done on it, or its momentum from the impulses that it was given.
+
+    ``drift`` says how far, over the largest energy or momentum.
+    """
 
     def __init__(self, message, drift=float("inf")):
         super().__init__(message)

@@ -13,6 +13,8 @@ all its digits, which it loses when positions are the unknowns.
 `BOUND`        ``(reach, speed, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of |K|
                [N/m], for all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most
 `LINES`        ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
+`IMPULSE`      ``(t, x, cells, data, total)``: adds ∫F dt [N s], F the sum of the forces of all cells, to ``total
+               (3,)``, but for a constant
 =============  ==========================================================================================
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
@@ -54,6 +56,7 @@ _common = (_f, _array(_f, 2), _array(_f, 2))
 FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2))
 ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
 BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_i, 2), _array(_f, 2))
+IMPULSE = ENERGY
 LINES = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
 

@@ -9,7 +9,7 @@ import refweb
 from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.errors import OpenBook
 from validation.hard_cases import hard_cases
-from validation.hard_cases.balances import energy_left, momentum_left, unbalanced
+from validation.hard_cases.balances import energy_left, momentum_left, turning_left, unbalanced
 from validation.hard_cases.hard_cases import STATIC, STATICS, attempt, matrix
 from validation.hard_cases.random_scenes import near_the_limit, outcome, random_net
 
@@ -92,7 +92,7 @@ def check_runs(seeds):
             refused += 1
             continue
         assert energy_left(solution) <= 1.001 * DRIFT, seed
-        assert momentum_left(solution) <= 1e-9, seed
+        assert momentum_left(solution) <= 1e-9 and turning_left(solution) <= 1e-9, seed
     assert refused < 0.2 * len(seeds)
 
 

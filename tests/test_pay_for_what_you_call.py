@@ -47,7 +47,8 @@ LOAD_STEPS = {"statics.simulation", "statics.remarks"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
-DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "events", "extremes")}
+DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book")}
+DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("events", "extremes")}
 LOOP = ("central_difference", "explicit_loop", "between_steps", "records", "step", "step_bound")
 EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP}
 AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
@@ -206,9 +207,10 @@ TABLES = {
     "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
     "temperature": {"expansion": 1e-5, "change": 10.0},
 }
-LISTED = ("force", "energy", "bound", "bound of damping", "motion", "lengths", "work of lengths", "probe")
+LISTED = ("force", "energy", "bound", "bound of damping", "motion", "lengths", "work of lengths", "impulse", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
+KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
 KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}

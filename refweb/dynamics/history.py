@@ -15,10 +15,7 @@ from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
 from ..results.state import State
 from .integrators.events import Event
-from .integrators.integrator import AXES, History, Sum
-
-VECTORS = ("momentum", "support_impulse")
-"""Last columns of ``history.csv``, each with its axes."""
+from .integrators.integrator import AXES, VECTORS, History, Sum
 
 
 def _scales_of_warnings(net):
@@ -82,7 +79,8 @@ class Watch:
         energies = ["kinetic_energy", *own, *work, "total_energy"]
         self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in self._observables)]
         self.columns += [f"{name} [J]" for name in energies]
-        self.columns += [f"{name}_{axis} [N s]" for name in VECTORS for axis in AXES]
+        self._vectors = len(VECTORS) - all(family.internal for family in system.families)
+        self.columns += [f"{name}_{axis} [N s]" for name in VECTORS[: self._vectors] for axis in AXES]
         self._weights = self._weights_of_columns(energies)
 
     def _add_events(self, events):
@@ -110,7 +108,8 @@ class Watch:
             else:
                 columns.append(unit.sums @ o.observable.weights(self.system))
         columns += [unit.sums @ weights(self.system, name) for name in energies]
-        return np.column_stack([*columns, unit.momentum, unit.impulse])
+        vectors = unit.momentum, unit.impulse, unit.outer_impulse
+        return np.column_stack([*columns, *vectors[: self._vectors]])
 
     def table(self, history):
         """Rows of a `History` as rows of ``history.csv``, shape (rows, columns).

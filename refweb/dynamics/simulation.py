@@ -222,7 +222,10 @@ class Simulation:
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
             for event, time in zip(self.scene.event, course.events["time"], strict=True)
         ]
-        spent = dict(nsteps=course.nsteps, energy_drift=course.drift, **self.integrator.spent(course))
+        spent = dict(nsteps=course.nsteps, **course.drifts, **self.integrator.spent(course))
+        outer = (f for f in self.system.families if not f.internal and f.impulse is None)
+        if integrated := sorted({family.name for family in outer}):
+            spent["integrated_impulses"] = integrated
         choice = {} if self._ways is None else self._ways.told()
         solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None

@@ -89,6 +89,9 @@ A force with a potential has ``energy=energy, book="spring_energy"`` instead of 
 and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps stable, not accurate: something stiff may need a
 smaller ``safety``. ``definite`` asks for a part of the stiffness that is positive semidefinite, such as none.
 
+The book of momentum integrates the force of an effect along the steps, which only tells whether a method gives what it
+has. It sees what steps miss where ``impulse=impulse`` brings ∫F dt as a kernel, and nothing of what is ``internal``.
+
 A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
 `refweb.effects.length_factor`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
 returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every

@@ -66,6 +66,12 @@ class Family:
         Bound on the row sums of |−∂f/∂v|.
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
+    impulse : kernel, optional
+        What the forces of all cells have given until a time, exact in time and displacement, for the book of momentum;
+        None where there is no such formula: then it is integrated along the steps. Where forces depend on velocity it
+        is linear in displacement.
+    moment_free : bool
+        Whether forces that are not internal have no moment about the centre of mass of all that there is.
     symmetric : bool
         Whether stiffness and damping are symmetric.
     at_rest : bool
@@ -90,6 +96,8 @@ class Family:
     damping: Callable | None = None
     damping_bound: Callable | None = None
     internal: bool = False
+    impulse: Callable | None = None
+    moment_free: bool = False
     symmetric: bool = True
     at_rest: bool = True
     times: tuple = ()

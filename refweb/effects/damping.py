@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real
@@ -150,6 +150,13 @@ def drag(t, x, v, f, cells, data, out):
             f[row, k] -= data[c, 0] * v[row, k]
 
 
+@kernel(IMPULSE)
+def drag_impulse(t, x, cells, data, total):
+    for c in range(cells.shape[0]):
+        for k in range(3):
+            total[k] -= data[c, 0] * x[cells[c, 0], k]
+
+
 @kernel(STIFFNESS)
 def drag_damping(t, x, v, blocks, cells, data, definite):
     blocks[:] = 0.0
@@ -237,6 +244,7 @@ class Damping(Table):
                     power=0,
                     damping=drag_damping,
                     damping_bound=drag_bound,
+                    impulse=drag_impulse,
                     at_rest=False,
                 )
             )

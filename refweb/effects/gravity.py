@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import ENERGY, FORCE, kernel
+from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from ..tables import Table, vector
 from .base import Family, column
 
@@ -23,6 +23,13 @@ def energy(t, x, cells, data, out):
     for c in range(cells.shape[0]):
         row = cells[c, 0]
         out[c] = -(data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2])
+
+
+@kernel(IMPULSE)
+def impulse(t, x, cells, data, total):
+    for c in range(cells.shape[0]):
+        for i in range(3):
+            total[i] += t * data[c, i]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,4 +59,6 @@ class Gravity(Table):
             force=force,
             energy=energy,
             book="potential_energy",
+            impulse=impulse,
+            moment_free=True,
         )

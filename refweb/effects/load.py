@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import ENERGY, FORCE, kernel
+from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from ..tables import Table, nodes, rows, vector
 from .base import column
-from .outer_load import factor_at, outer_load
+from .outer_load import factor_at, factor_until, outer_load
 
 
 @kernel(FORCE)
@@ -27,6 +27,14 @@ def energy(t, x, cells, data, out):
         row = cells[c, 0]
         work = data[c, 0] * x[row, 0] + data[c, 1] * x[row, 1] + data[c, 2] * x[row, 2]
         out[c] = -factor_at(t, data[c], 3) * work
+
+
+@kernel(IMPULSE)
+def impulse(t, x, cells, data, total):
+    times = factor_until(t, data[0], 3) if cells.shape[0] else 0.0
+    for c in range(cells.shape[0]):
+        for i in range(3):
+            total[i] += times * data[c, i]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,4 +68,5 @@ class Load(Table):
         """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
         data = np.tile(self.force, (len(loaded), 1))
-        return outer_load(net, "load", column(loaded), data, self.factor, force=force, energy=energy)
+        own = dict(force=force, energy=energy, impulse=impulse)
+        return outer_load(net, "load", column(loaded), data, self.factor, **own)

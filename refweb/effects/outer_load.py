@@ -11,7 +11,7 @@ import numpy as np
 
 from ..kernels import kernel
 from .base import Family
-from .time_tables import flattened, interpolate
+from .time_tables import flattened, integrate, interpolate
 
 
 @kernel()
@@ -20,6 +20,14 @@ def factor_at(t, data, start):
     if data[start + 3] > 0.0:
         return interpolate(t, data, start + 3, 2, 1)[0]
     return data[start + 1] + data[start + 2] * t
+
+
+@kernel()
+def factor_until(t, data, start):
+    """∫ of the factor until time t [s], but for a constant; all cells of a load have one factor."""
+    if data[start + 3] > 0.0:
+        return integrate(t, data, start + 3, 2, 1)
+    return (data[start + 1] + 0.5 * data[start + 2] * t) * t
 
 
 def outer_load(net, name, cells, data, factor, **kernels):

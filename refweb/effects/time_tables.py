@@ -30,6 +30,23 @@ def interpolate(t, data, start, width, column):
     return data[here + column] - slope * (data[here] - t), slope
 
 
+@kernel()
+def integrate(t, data, start, width, column):
+    """∫ of one column from the first time of the table to t, exact for what `interpolate` gives."""
+    rows, first, total = int(data[start]), start + 1, 0.0
+    if t < data[first]:
+        return data[first + column] * (t - data[first])
+    for k in range(1, rows):
+        here = first + k * width
+        before = here - width
+        if t < data[here]:
+            value, _ = interpolate(t, data, start, width, column)
+            return total + 0.5 * (data[before + column] + value) * (t - data[before])
+        total += 0.5 * (data[before + column] + data[here + column]) * (data[here] - data[before])
+    last = first + (rows - 1) * width
+    return total + data[last + column] * (t - data[last])
+
+
 def flattened(table):
     """A table as the list of numbers that `interpolate` reads."""
     return [float(len(table)), *(value for row in table for value in row)]

@@ -69,6 +69,10 @@ def energy_left(solution):
     kinetic = 0.5 * (state.system.net.mass[:, None] * state.v**2).sum()
     stored = tensions(solution)[2]
     others = sum(history.get(name, [0.0])[-1] for name in ("contact_energy", "dissipated_energy"))
+    for effect in solution.scene.effects:
+        if isinstance(effect, refweb.Gravity):
+            net = state.system.net
+            others -= net.mass[net.heavy] @ state.x[net.heavy] @ np.array(effect.acceleration)
     work = history["work"][-1] if "work" in history else 0.0
     start = history["total_energy"][0]
     largest = max(np.abs(history[name]).max() for name in history if name.endswith("energy"))
@@ -77,7 +81,10 @@ def energy_left(solution):
 
 
 def momentum_left(solution):
-    """Momentum of all that is free less what it was and what was given to it, over the largest."""
+    """Momentum of all that is free less what it was and what was given to it, over the largest.
+
+    Given by supports, dead loads, gravity and damping in proportion to mass, which is that of displacements.
+    """
     history, state, worst = solution.history, solution.state, 0.0
     system, end = state.system, state.time
     linear = slice(system.rows - system.net.spins)  # turning bodies have a row of their own for that
@@ -87,7 +94,12 @@ def momentum_left(solution):
         if isinstance(effect, refweb.Load):
             times, factors = np.transpose(effect.factor) if effect.factor else ([0.0], [1.0])
             within = np.unique([0.0, *np.clip(times, 0.0, end), end])
-            given += trapezoid(np.interp(within, times, factors), within) * np.array(effect.force)
+            nodes = len(system.net.web.find(effect.node))
+            given += nodes * trapezoid(np.interp(within, times, factors), within) * np.array(effect.force)
+        if isinstance(effect, refweb.Gravity):
+            given += end * mass.sum() * np.array(effect.acceleration)
+        if isinstance(effect, refweb.Damping):
+            given -= effect.rate * mass[: system.net.nodes] @ state.x[: system.net.nodes]
     largest = max((mass * np.linalg.norm(v, axis=1)).sum(), np.linalg.norm(given))
     for k, axis in enumerate("xyz"):
         now = (mass * np.where(system.supported[linear, k], 0.0, v[:, k])).sum()
@@ -95,3 +107,28 @@ def momentum_left(solution):
         largest = max(largest, np.abs(history[f"momentum_{axis}"]).max(), np.abs(pushed).max())
         worst = max(worst, abs(now - start - pushed[-1] - given[k]))
     return worst / largest if largest > 0 else worst
+
+
+def turning_left(solution):
+    """Angular momentum about the centre of mass less what it was, over that of its parts; along what rings leave free.
+
+    It is kept where nothing is held and no force from outside but gravity acts; elsewhere nothing is left.
+    """
+    effects, state = solution.scene.effects, solution.state
+    system = state.system
+    outer = [effect for effect in effects if isinstance(effect, refweb.Load | refweb.Damping)]
+    if system.supported.any() or any(not isinstance(effect, refweb.Damping) or effect.rate for effect in outer):
+        return 0.0
+    net, linear = system.net, system.rows - system.net.spins
+    normals = [body.shape.normal for body in net.bodies if body.shape.planar]
+
+    def turning(places, v):
+        mass, centre = net.mass[:linear, None], net.mass[:linear] @ places / net.mass[:linear].sum()
+        around = np.cross(places - centre, mass * v[:linear])
+        spun = net.mass[linear:, None] * v[linear:]
+        return around.sum(axis=0) + spun.sum(axis=0), np.linalg.norm(around, axis=1).sum()
+
+    first, _ = turning(net.points[:linear], system.initial_velocity())
+    last, size = turning(net.points[:linear] + state.x[:linear], state.v)
+    left = last - first if not normals else np.array([(last - first) @ normals[0] / np.linalg.norm(normals[0])])
+    return np.abs(left).max() / size if size > 0 else 0.0

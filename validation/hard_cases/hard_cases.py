@@ -9,8 +9,9 @@ Each is solved by every method that takes it; a number proves each result:
   positions and natural lengths by the law alone, assembled with numpy line by line.
 - dynamics: the balance of energy of the last state, over the largest energy there was. Kinetic and strain energy come
   from positions, velocities and the law alone; what contact stores, what is lost and the work done are the run's. With
-  it the balance of momentum: that of all masses, less that at the start, less the impulse of the supports and of dead
-  loads, over the largest momentum.
+  it the balance of momentum: that of all masses, less that at the start, less the impulse of the supports, of dead
+  loads, of gravity and of damping in proportion to mass, over the largest momentum; of a free web that of angular
+  momentum as well.
 
 What is no result is a refusal, and its reason is listed. Which method refuses which case, and why, is foreseen in the
 table of cases: a method that refuses another, or takes one that it should refuse, fails the row of its group.
@@ -38,7 +39,7 @@ from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.errors import OpenBook
 
 from ..harness.case import Case, Row, Table
-from .balances import energy_left, momentum_left, unbalanced
+from .balances import energy_left, momentum_left, turning_left, unbalanced
 from .random_scenes import near_the_limit, outcome, random_net
 
 STATIC = ("newton", "relaxation")
@@ -225,6 +226,21 @@ def oscillating(phase):
     return hit(ball, web=HELD, stiffness=STIFFNESS, duration=0.017)
 
 
+def teeth(count, width=1e-9, impulse=0.02):
+    """A web that is given an impulse [N s] in so many parts, each far below a step and at no multiple of one."""
+    factor = [(0.0, 0.0)]
+    for begin in 0.001 + 0.018 * np.sqrt(np.arange(1, count + 1) / (count + 1.0)):
+        factor += [(begin, 0.0), (begin + width, 1.0 / (count * width)), (begin + 2.0 * width, 0.0)]
+    load = refweb.Load(node="centre", force=(0.0, 0.0, impulse), factor=[tuple(map(float, row)) for row in factor])
+    return free(load, supports=RIM)
+
+
+def stepped(width, force=20.0):
+    """A load that is there within a time, and gone as fast, on a web without supports."""
+    factor = [(0.0051, 0.0), (0.0051 + width, 1.0), (0.0082, 1.0), (0.0082 + width, 0.0)]
+    return free(refweb.Load(node="centre", force=(3.0, 0.0, force), factor=factor))
+
+
 def thrown(web, supports, velocity=UP, node=1, **more):
     """Nodes of a web held, one of the others thrown."""
     held = refweb.Supports(nodes=list(supports))
@@ -237,6 +253,13 @@ CRITICAL = 0.2 / (7e7 / 200.0) ** 0.5
 """Time constant of damping that is critical for the highest frequency 2c/L of lines of 0.2 m [s]."""
 HUB = tuple(float(x) for x in -NODE + [0.0, 0.0, -0.101])
 OUTWARD = [refweb.Velocity(node=i, value=(5.0 * (i - 1.5), 0.0, 0.0)) for i in range(4)]
+TURNING = [refweb.Velocity(node=0, value=(1.0, -0.5, 0.3)), refweb.Velocity(node=7, value=(0.2, 2.0, -1.0))]
+RING = ball(
+    shape="ring",
+    normal=UP,
+    position=(float(window().web().points[:, 0].min() - NODE[0]) - 0.101, 0.05, 0.0),
+    velocity=(2.0, 0.5, 0.0),
+)
 JUMP = refweb.Motion(node=[0], displacement=[[0.0, 0.0, 0.0, 0.0], [1e-5, 0.0, 0.0, 1e-3], [1.0, 0.0, 0.0, 1e-3]])
 MOTIONS = {
     "impact at v [m/s]": {
@@ -282,6 +305,15 @@ MOTIONS = {
         300.0: trembling(300, refused={"central-difference": "energy drift"}),
     },
     "peak between steps, phase ahead of it": {p: oscillating(-p) for p in (1.4, 0.7, 0.1, 0.01)},
+    "given from outside": {
+        "a load in 40 teeth of 1 ns": teeth(40),
+        "a load for 3 ms, at once": stepped(1e-9),
+        "a web that falls and turns": free(HANGING, *TURNING),
+        "a web that is dragged as it falls": free(HANGING, *TURNING, refweb.Damping(rate=100.0),
+                                                  refused=not_explicit("damping")),
+        "a ring that rubs along a free web": hit(RING, contact=dict(friction=0.3), supports=refweb.Supports(nodes=[]),
+                                                 refused=not_explicit("contact")),
+    },
     "motion": {
         "all lines snap taut": free(*OUTWARD, web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [], natural_length=1.1),
                                     duration=0.2),
@@ -441,12 +473,12 @@ def case(quick):
     tables.append(Table("Statics: reasons of refusals", ["number", "reason"], reasons))
 
     def prove(solution):
-        return max(energy_left(solution), momentum_left(solution))
+        return max(energy_left(solution), momentum_left(solution), turning_left(solution))
 
     reason = "the budget of energy of a run"
     more, cells, reasons = matrix(MOTIONS, DYNAMIC, prove, DRIFT, reason, quick)
     rows += more
-    tables.append(Table("Dynamics: energy or momentum left", ["case", *DYNAMIC], cells))
+    tables.append(Table("Dynamics: energy, momentum or angular momentum left", ["case", *DYNAMIC], cells))
     tables.append(Table("Dynamics: reasons of refusals", ["number", "reason"], reasons))
     rows += [struck(), peaks()]
     for method in ("central-difference",) if quick else ("central-difference", "cvode", "ida"):

@@ -24,6 +24,7 @@ from .events import event_rows, starts_above
 from .explicit_loop import BREATH, advance_rows, begin, take_steps
 from .extremes import Extremes
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
+from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
 from .records import CLOCK, Model, Observed, Running, Scheme
 from .step_bound import safe_step
 
@@ -162,7 +163,10 @@ class CentralDifference(Integrator):
         extremes.recent[:, 2] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
         book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), self._least))
-        return ExplicitCourse(time=0.0, x=x, v=v, force=force, extremes=extremes, events=events, **book)
+        ledger = Ledger.empty()
+        open_ledger(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
+        seen = dict(extremes=extremes, events=events)
+        return ExplicitCourse(time=0.0, x=x, v=v, force=force, ledger=ledger, **seen, **book)
 
     def save(self, course):
         """The `ExplicitCourse` as arrays by name, for a checkpoint."""
@@ -206,7 +210,7 @@ class CentralDifference(Integrator):
             clock[name] = getattr(course, name)
         clock["least"] = self._least
         families, changing = len(self.system.families), len(self._model.reels.lengths)
-        state = (course.x, course.v, course.force, course.before, course.work, course.impulse)
+        state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = np.zeros(families), np.zeros((2, changing))
         return Running(clock, *state, course.extremes, course.events, *carried)
 
@@ -307,5 +311,6 @@ class CentralDifference(Integrator):
         return f"use a smaller step_size than {step:g}" if step else f"use a smaller safety than {self.safety:g}"
 
     def refuse_drift(self, course):
-        """Refuse a whole run whose energy drift exceeds `DRIFT`; `OpenBook`."""
+        """Refuse a whole run whose energy drift exceeds `DRIFT`, or that of momentum `CLOSURE`; `OpenBook`."""
         refuse_open(course, DRIFT, self._remedy)
+        refuse_open_momentum(course, CLOSURE, self._remedy)

@@ -60,6 +60,7 @@ class Cvode(Sundials):
         super().__init__(system, *observed, **tolerances)
         self.family = family
         self.max_order = self.order = max_order or {"bdf": 2, "adams": 12}[family]
+        self.restarts = family == "adams"
         self._choose(linear_solver, "block")
         self._consistent = system.net.consistent_minus_lumped is not None
         if self._consistent and self.linear_solver == "sparse":

@@ -30,6 +30,7 @@ from .energy_book import (
 from .events import ended_by, note_events
 from .extremes import begin_anew, correct_within, look, note_time, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
+from .momentum_book import add_half_steps, note_momentum, push_on, set_push
 from .step import (
     add_forces,
     give_impulse,
@@ -49,8 +50,8 @@ BREATH = 10_000_000
 
 
 @kernel()
-def inner_stages(now, h, scheme, model, running, reaction):
-    """All kicks and drifts of a step of higher order but the last drift, with work and the impulse of the supports.
+def inner_stages(now, h, scheme, model, running, reaction, push, extra):
+    """All kicks and drifts of a step of higher order but the last drift, with work and the impulses of forces.
 
     Time goes with the drifts, and in the potential that is booked with the kicks.
     """
@@ -62,11 +63,14 @@ def inner_stages(now, h, scheme, model, running, reaction):
         kick, drift = scheme.kicks[n] * h, scheme.drifts[n] * h
         drifted, kicked = drifted + drift, kicked + kick
         give_impulse(kick, reaction, running.impulse)
+        give_impulse(kick, push, running.ledger.pushed)
         book_potential(1.0, kicked, x, families, running.work)
         kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
         set_reaction(held, f, reaction)
+        if model.outside.pushing.size:
+            set_push(drifted, x, v, model.outside, families, extra, push)
     book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
 
 
@@ -98,6 +102,19 @@ def look_again(now, h, fresh, smooth, inside, total, model, observed, running):
 
 
 @kernel()
+def begin_forces(t, changing, extra, reaction, push, model, running):
+    """Write powers, force of supports and push from outside at the time t that steps begin at."""
+    x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
+    if running.clock[0].begun == 0:
+        begin_powers(t, x, v, extra, families, running.power)
+    if changing:
+        reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
+    set_reaction(model.inertia.held, running.f, reaction)
+    if outside.pushing.size:
+        set_push(t, x, v, outside, families, extra, push)
+
+
+@kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
     """``count`` steps of size h, behind those that are taken of the row; where ``changing`` natural lengths change.
 
@@ -118,23 +135,20 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
     half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(reels.lengths.size if changing else 0)
-    extra = np.zeros((rows if powers.shape[0] or viscous.size else 0, 3))
+    pushing, push, pushed = model.outside.pushing.size > 0, np.zeros(3), running.ledger.pushed
+    extra = np.zeros((rows if powers.shape[0] or viscous.size or pushing else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     looks = watched and (stages > 0 or fresh > 0)
     inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if moved else 0, 3))
     begun, planned, start, awaited = clock.begun, clock.planned, clock.time, running.events.shape[0] > 0
-    if begun == 0:
-        begin_powers(start, x, v, extra, families, power)
-        if changing:
-            reels.by_length[0](start, x, reels.nodes, reels.lines, length_force[0])
-    set_reaction(held, f, reaction)
+    begin_forces(start + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = start + (begun + step) * h
         if looks:
             note_state(x, v, f, inverse, inside.before)
         if stages:
-            inner_stages(now, h, scheme, model, running, reaction)
+            inner_stages(now, h, scheme, model, running, reaction, push, extra)
         if moved:
             note_motion(driven, mass, x, v, f, before)
         kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
@@ -161,6 +175,8 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         give_impulse(kicks[stages], reaction, impulse)
         set_reaction(held, f, reaction)
         give_impulse(kicks[stages + 1], reaction, impulse)
+        if pushing:
+            push_on(now, kicks[stages], kicks[stages + 1], x, v, model.outside, families, extra, push, pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, inside, where, total, model, observed, running)
         turned, ending = False, begun + step == planned or math.isnan(looked[0])
@@ -214,7 +230,7 @@ def energies_now(model, running, total):
 
 @kernel()
 def write_row(row, model, observed, running, total):
-    """Write time, probes, energies, work, step size, momentum and impulse of the supports.
+    """Write time, probes, energies, work, step size, momentum and impulses; hold momentum against these.
 
     Returns the energy, and the sum of all energies without regard to sign [J].
     """
@@ -231,11 +247,12 @@ def write_row(row, model, observed, running, total):
     for i in range(total.size):
         row[at] = total[i]
         at += 1
-    for k in range(3):
-        row[at + k], row[at + 3 + k] = 0.0, running.impulse[k]
-        for r in range(inertia.linear):
+    p = np.zeros_like(v)
+    for r in range(v.shape[0]):
+        for k in range(3):
             if inertia.inverse[r, k] > 0.0:
-                row[at + k] += inertia.mass[r] * v[r, k]
+                p[r, k] = inertia.mass[r] * v[r, k]
+    note_momentum(clock.time, running.x, p, running.impulse, model.outside, running.ledger, 0.0, row[at:])
     return energy, stored
 
 
@@ -294,6 +311,9 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
                 if not plan(end, changing, scheme, model, running):
                     return -1
             clock.step = total[-1] = (end - clock.time) / clock.planned
+            halved = 0.25 * clock.step**2 if model.outside.damped.size else 0.0
+            if halved > 0.0 and not begun:
+                add_half_steps(-halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             count = min(clock.planned - begun, max(left, 1))
             taken = take_steps(count, clock.step, changing, scheme, model, observed, running, total)
             stopped, left = ended_by(events), left - taken
@@ -303,6 +323,8 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
                 return n
             clock.time = end if clock.begun == clock.planned else clock.time + clock.begun * clock.step
             clock.begun = 0
+            if halved > 0.0:
+                add_half_steps(halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             if model.inertia.driven.size and turn_supports(clock.time, model, running):
                 look_behind(model, observed, running, total)
             if clock.time < times[n]:  # a corner: what is stored may be gone again at the row

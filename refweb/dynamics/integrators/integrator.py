@@ -20,12 +20,17 @@ import numpy as np
 
 from .events import ended_by
 from .extremes import Extremes
+from .momentum_book import Ledger
 
 SAME = 1e-12
 """Share of a time within which another is the same: corners of tables, rows and ends of steps are sums."""
 MAX_STEPS_PER_ROW = 1e8
 """Largest number of steps that a history row may take."""
 AXES = "xyz"
+VECTORS = ("momentum", "support_impulse", "outer_impulse")
+"""Last columns of a `History`, each with its axes."""
+GROUPS = {"extremes": Extremes, "ledger": Ledger}
+"""Fields of a `Course` that are records of arrays."""
 
 
 class Sum(NamedTuple):
@@ -61,6 +66,8 @@ class Course:
         Work of each family that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
+    ledger : refweb.dynamics.integrators.momentum_book.Ledger
+        The book of momentum.
     nsteps : int
         Steps taken.
     step : float
@@ -82,6 +89,7 @@ class Course:
     events: np.ndarray
     work: np.ndarray
     impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    ledger: Ledger = field(default_factory=Ledger.empty)
     nsteps: int = 0
     step: float = 0.0
     energy: float = 0.0
@@ -99,18 +107,27 @@ class Course:
         """Largest |ΔE − work| over the largest energy [1]."""
         return float(self.worst / self.largest) if self.largest > 0.0 else 0.0
 
+    @property
+    def drifts(self):
+        """How far the books are open, for ``run.json``; None for angular momentum that is not kept."""
+        linear, angular = self.ledger.drifts.tolist()
+        angular = angular if self.ledger.largest[1] > 0.0 else None
+        return dict(energy_drift=self.drift, momentum_drift=linear, angular_momentum_drift=angular)
+
     def arrays(self):
         """All of it as arrays by name, for a checkpoint; a field whose metadata says ``saved=False`` is left out."""
         kept = {f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("saved", True)}
-        kept |= {f"extremes_{name}": array for name, array in kept.pop("extremes")._asdict().items()}
+        for group in GROUPS:
+            kept |= {f"{group}_{name}": array for name, array in kept.pop(group)._asdict().items()}
         return {name: np.asarray(value) for name, value in kept.items()}
 
     @classmethod
     def of_arrays(cls, arrays):
         """The course of a checkpoint."""
         given = {name: array if array.ndim else array.item() for name, array in arrays.items()}
-        extremes = Extremes(*(given.pop(f"extremes_{name}") for name in Extremes._fields))
-        return cls(extremes=extremes, **given)
+        for group, kind in GROUPS.items():
+            given[group] = kind(*(given.pop(f"{group}_{name}") for name in kind._fields))
+        return cls(**given)
 
 
 @dataclass(frozen=True)
@@ -136,7 +153,7 @@ class History:
         """Rows of zeros for a number of probes and the families of a system."""
         names = ["time", *(f"probe {i}" for i in range(probed)), *(family.name for family in families)]
         names += ["kinetic_energy", "work", "step_size"]
-        names += [f"{vector}_{axis}" for vector in ("momentum", "support_impulse") for axis in AXES]
+        names += [f"{vector}_{axis}" for vector in VECTORS for axis in AXES]
         return cls(tuple(names), np.zeros((rows, len(names))), probed)
 
     def __len__(self):
@@ -159,7 +176,7 @@ class History:
     @property
     def sums(self):
         """What a `Sum` weighs: energy of each family, kinetic energy [J], work [J], step size [s]."""
-        return self.values[:, 1 + self.probed : -2 * len(AXES)]
+        return self.values[:, 1 + self.probed : -len(VECTORS) * len(AXES)]
 
     @property
     def energies(self):
@@ -179,11 +196,16 @@ class History:
     @property
     def momentum(self):
         """Momentum of all that is free [N s], shape (rows, 3)."""
-        return self.values[:, -2 * len(AXES) : -len(AXES)]
+        return self.values[:, -3 * len(AXES) : -2 * len(AXES)]
 
     @property
     def impulse(self):
         """Impulse of the supports on the net [N s], shape (rows, 3)."""
+        return self.values[:, -2 * len(AXES) : -len(AXES)]
+
+    @property
+    def outer_impulse(self):
+        """Impulse of all else that acts from outside [N s], shape (rows, 3)."""
         return self.values[:, -len(AXES) :]
 
 
@@ -286,7 +308,7 @@ class Integrator(Protocol):
         """
 
     def refuse_drift(self, course: Course) -> None:
-        """Refuse a course that is complete, where its energy drift exceeds what a result may have; `OpenBook`."""
+        """Refuse a course that is complete, where its books are open by more than a result may have; `OpenBook`."""
 
     def spent(self, course: Course) -> dict:
         """What a course has spent, for ``run.json``.

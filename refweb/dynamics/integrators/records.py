@@ -15,6 +15,7 @@ from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, rec
 from ...results.probes import INTEGERS, PROBE
 from .energy_book import no_energy
 from .extremes import Extremes
+from .momentum_book import Ledger, Outside
 from .step_bound import no_bound
 
 CLOCK = np.dtype(
@@ -232,11 +233,13 @@ class Model(NamedTuple):
     motions: Motions
     reels: Reels
     corners: np.ndarray
+    outside: Outside
 
     @classmethod
     def of(cls, system):
         """That of a `refweb.system.system.System`."""
-        return cls(Inertia.of(system), Families.of(system), Motions.of(system), Reels.of(system), system.corners)
+        parts = (part.of(system) for part in (Inertia, Families, Motions, Reels))
+        return cls(*parts, system.corners, Outside.of(system))
 
 
 @record
@@ -292,6 +295,8 @@ class Running(NamedTuple):
         Work of each family and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports [N s].
+    ledger : refweb.dynamics.integrators.momentum_book.Ledger
+        The book of momentum.
     extremes : refweb.dynamics.integrators.extremes.Extremes
         Extremes of probes and sums.
     events : ndarray of `refweb.dynamics.integrators.events.EVENT`
@@ -309,6 +314,7 @@ class Running(NamedTuple):
     before: np.ndarray
     work: np.ndarray
     impulse: np.ndarray
+    ledger: Ledger
     extremes: Extremes
     events: np.ndarray
     power: np.ndarray

@@ -14,6 +14,7 @@ import numpy as np
 from ...errors import NoEnd, OpenBook
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
 from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
+from .momentum_book import Outside, note_momentum, open_ledger
 
 UNEVEN = 1e-3
 """Largest share of the energy by which the work in a piece may differ between Simpson's and the trapezoidal rule."""
@@ -49,8 +50,8 @@ class Rates(NamedTuple):
     ----------
     power : ndarray, shape (families + 1,)
         Power of each family and, last, of motion [W].
-    reaction : ndarray, shape (3,)
-        Force of the supports [N].
+    reaction, push : ndarray, shape (3,)
+        Force of the supports [N], and of what acts from outside without a formula of its impulse.
     lengths : ndarray
         Natural lengths [m]; none where nothing changes them.
     length_force : ndarray
@@ -59,8 +60,17 @@ class Rates(NamedTuple):
 
     power: np.ndarray
     reaction: np.ndarray
+    push: np.ndarray
     lengths: np.ndarray
     length_force: np.ndarray
+
+
+class Booked(NamedTuple):
+    """Work of each family and, last, of motion [J]; impulse of the supports, and of what `Rates.push` is [N s]."""
+
+    work: np.ndarray
+    impulse: np.ndarray
+    pushed: np.ndarray
 
 
 class Jump(NamedTuple):
@@ -77,8 +87,8 @@ class Piece(NamedTuple):
     ----------
     begin : float
         Time at its start [s].
-    work, impulse : ndarray
-        Work of each family and of motion, and impulse of the supports, until then.
+    before : Booked
+        What is booked until then.
     step : float
         Size of the step that it is a part of [s].
     middle, end : Sample
@@ -92,8 +102,7 @@ class Piece(NamedTuple):
     """
 
     begin: float
-    work: np.ndarray
-    impulse: np.ndarray
+    before: Booked
     step: float
     middle: Sample
     end: Sample
@@ -102,17 +111,18 @@ class Piece(NamedTuple):
     jump: Jump | None
 
     def booked(self, t):
-        """Work, and impulse of the supports, at a time within."""
+        """What is `Booked` until a time within."""
         width = self.end.time - self.begin
         s = (t - self.begin) / width
         a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
         start, _, last = self.rates
         mean = Rates(*(a * p + b * q + c * r for p, q, r in zip(*self.rates, strict=True)))
-        work, impulse = self.work + width * mean.power, self.impulse + width * mean.reaction
+        more = Booked(mean.power, mean.reaction, mean.push)
+        work, impulse, pushed = (past + width * rate for past, rate in zip(self.before, more, strict=True))
         work[-1] += mean.length_force @ (last.lengths - start.lengths)
         if self.jump and t == self.end.time:
             work[-1], impulse = work[-1] + self.jump.energy, impulse + self.jump.momentum
-        return work, impulse
+        return Booked(work, impulse, pushed)
 
     @property
     def unevenness(self):
@@ -130,10 +140,14 @@ class SimpsonBook:
         What acts.
     hold : callable
         ``hold(x, v)`` moves a state to the nearest one that the equations allow.
+    fast : float
+        Velocity [m/s] below which nothing is held to be moving.
     """
 
-    def __init__(self, system, hold):
+    def __init__(self, system, hold, fast):
         self.system, self._hold, self._least = system, hold, least_energy(system.net)
+        self._linear = system.rows - system.net.spins
+        self._still = system.net.mass[: self._linear].sum() * fast
         families = system.families
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
@@ -145,6 +159,8 @@ class SimpsonBook:
         self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
         self._working = system.working
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
+        self._outside = Outside.of(system)
+        self._pushing = [families[i] for i in self._outside.pushing]
         self._held, self._fixed = system.supported, np.flatnonzero(system.supported)
 
     def sample(self, t, x, v):
@@ -169,7 +185,15 @@ class SimpsonBook:
         if system.line_drives:
             lengths = system.natural_length(sample.time), system.length_force(sample.time, sample.x)
         reaction = np.bincount(self._fixed % 3, sample.force.ravel()[self._fixed], 3)
-        return Rates(sample.power, -reaction, *lengths)
+        return Rates(sample.power, -reaction, self._push(sample), *lengths)
+
+    def _push(self, sample):
+        """Force from outside that has no formula of its impulse [N], shape (3,)."""
+        total = np.zeros(3)
+        for family in self._pushing:
+            rows = self.system.force_of(family, sample.time, sample.x, sample.v)
+            total += rows[: self._linear].sum(axis=0)
+        return total
 
     def piece(self, course, middle, end):
         """The `Piece` from where a course is, by the samples in its middle and at its end.
@@ -188,7 +212,8 @@ class SimpsonBook:
             jump = Jump(self.kinetic(after) - self.kinetic(before), self.momentum(after) - self.momentum(before))
         rates = course.rates, self.rates(middle), self.rates(last)
         behind = self.rates(end)
-        return Piece(course.time, course.work, course.impulse, course.step, middle, end, rates, behind, jump)
+        before = Booked(course.work, course.impulse, course.ledger.pushed.copy())
+        return Piece(course.time, before, course.step, middle, end, rates, behind, jump)
 
     def uneven(self, course, piece):
         """Whether powers change too much within a piece."""
@@ -201,8 +226,11 @@ class SimpsonBook:
 
     def momentum(self, v):
         """Momentum of what is free [N s], shape (3,)."""
-        moving = self.system.mass.momentum(np.where(self._held, 0.0, v))
-        return moving[: self.system.rows - self.system.net.spins].sum(axis=0)
+        return self._momenta(v)[: self._linear].sum(axis=0)
+
+    def _momenta(self, v):
+        """M v of what is free, by row [N s]."""
+        return self.system.mass.momentum(np.where(self._held, 0.0, v))
 
     def energies(self, sample, work, step):
         """Energy of each family, kinetic energy, work [J] and step size [s], for the work of each family."""
@@ -219,9 +247,16 @@ class SimpsonBook:
         return self.energies(sample, piece.booked(sample.time)[0], piece.step)
 
     def open(self, course, energies):
-        """Note the energy at the start of a course."""
+        """Note the energy and the momentum at the start of a course."""
+        open_ledger(course.x, self._momenta(course.v), self._outside, course.ledger)
         own = self._own(energies)
         course.energy, course.largest = own.sum(), max(np.abs(own).sum(), self._least)
+
+    def impulses(self, course):
+        """Momentum, impulse of the supports and of all else from outside [N s], shape (9,), held against each other."""
+        row, momenta = np.zeros(9), self._momenta(course.v)
+        note_momentum(course.time, course.x, momenta, course.impulse, self._outside, course.ledger, self._still, row)
+        return row
 
     def note_largest(self, course, energies):
         """Note the largest energy of a course."""

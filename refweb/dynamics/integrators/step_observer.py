@@ -19,6 +19,7 @@ from .events import event_rows, starts_above
 from .extremes import EDGE, begin_anew
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator
 from .measurements import Measurements
+from .momentum_book import allowed, refuse_open_momentum
 from .simpson_book import Rates, SimpsonBook
 from .step_limits import StepLimits
 from .tolerances import scales
@@ -118,7 +119,8 @@ class StepObserver(Integrator):
         self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
         self.stats = dict(nfev=0, njev=0, nlu=0)
         self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
-        self._book, self._limits = SimpsonBook(system, self.hold), StepLimits(system)
+        still = max(fast, self.atol_velocity / rtol)
+        self._book, self._limits = SimpsonBook(system, self.hold, still), StepLimits(system)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a method brings
@@ -264,8 +266,9 @@ class StepObserver(Integrator):
         return history
 
     def refuse_drift(self, course):
-        """Refuse a whole run whose energy drift exceeds `refweb.dynamics.integrators.energy_book.DRIFT`; `OpenBook`."""
+        """Refuse a whole run whose energy drifts by more than `DRIFT`, or its momentum than `allowed`; `OpenBook`."""
         refuse_open(course, DRIFT, self._remedy)
+        refuse_open_momentum(course, allowed(self.rtol), self._remedy)
 
     def _enter(self, course):
         """Begin at the state of a course."""
@@ -322,7 +325,7 @@ class StepObserver(Integrator):
             if stop < end:
                 piece = self._piece(course, stop)
         self._look(course.extremes, piece)
-        course.work, course.impulse = piece.booked(piece.end.time)
+        course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind
         if self._limits.at_corner(course.time):  # what is stored there may be gone again at the row
@@ -352,7 +355,7 @@ class StepObserver(Integrator):
         """Write a row, and check the book of energies."""
         sample = self._book.sample(course.time, course.x, course.v)
         energies, probes = self._book.energies(sample, course.work, course.step), self._measurements.probes(sample)
-        row[:] = [course.time, *probes, *energies, *self._book.momentum(course.v), *course.impulse]
+        row[:] = [course.time, *probes, *energies, *self._book.impulses(course)]
         self._book.close(course, energies, before, self._remedy)
 
     @property

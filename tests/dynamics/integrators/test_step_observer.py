@@ -8,7 +8,7 @@ from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.event_search import search
 from refweb.dynamics.integrators.events import Event, event_rows
 from refweb.dynamics.integrators.ida import Ida
-from refweb.dynamics.integrators.simpson_book import Jump, Piece, Rates, Sample
+from refweb.dynamics.integrators.simpson_book import Booked, Jump, Piece, Rates, Sample
 from refweb.dynamics.integrators.step_limits import TRAVEL, StepLimits
 
 BEGIN, END = 0.3, 0.7
@@ -19,14 +19,15 @@ def sample(t):
     return Sample(t, *[np.zeros((0, 3))] * 3, np.zeros((0, 2)), np.zeros(0))
 
 
-def piece(power, reaction=lambda t: np.zeros(3), length=lambda t: 0.0, pull=lambda t: 0.0, jump=None):
+def piece(power, push=lambda t: np.zeros(3), length=lambda t: 0.0, pull=lambda t: 0.0, jump=None):
     """A piece whose rates are functions of time."""
     middle = 0.5 * (BEGIN + END)
     rates = tuple(
-        Rates(np.array([power(t), 0.0]), reaction(t), np.array([length(t)]), np.array([pull(t)]))
+        Rates(np.array([power(t), 0.0]), push(t), 2.0 * push(t), np.array([length(t)]), np.array([pull(t)]))
         for t in (BEGIN, middle, END)
     )
-    return Piece(BEGIN, np.array([2.0, 5.0]), np.ones(3), 0.5, sample(middle), sample(END), rates, rates[2], jump)
+    before = Booked(np.array([2.0, 5.0]), np.ones(3), np.zeros(3))
+    return Piece(BEGIN, before, 0.5, sample(middle), sample(END), rates, rates[2], jump)
 
 
 @pytest.mark.parametrize("t", [BEGIN, 0.35, 0.5, 0.69, END])
@@ -35,22 +36,23 @@ def test_parabolas_are_integrated(t):
     whole = lambda t: t - 2.0 * t**2 + 3.0 * t**3  # noqa: E731
     push = np.array([1.0, -2.0, 0.5])
     found = piece(lambda t: 1.0 - 4.0 * t + 9.0 * t**2, lambda t: t * push, lambda t: 3.0 * t, lambda t: t)
-    work, impulse = found.booked(t)
+    work, impulse, pushed = found.booked(t)
     assert work[0] == pytest.approx(2.0 + whole(t) - whole(BEGIN), rel=1e-14)
     assert work[1] == pytest.approx(5.0 + 1.5 * (t**2 - BEGIN**2), rel=1e-14)
     np.testing.assert_allclose(impulse, 1.0 + 0.5 * push * (t**2 - BEGIN**2), rtol=1e-14)
+    np.testing.assert_allclose(pushed, push * (t**2 - BEGIN**2), rtol=1e-13)
 
 
 def test_simpson_has_cubics_at_the_end():
-    work, _ = piece(lambda t: t**3).booked(END)
+    work = piece(lambda t: t**3).booked(END).work
     assert work[0] == pytest.approx(2.0 + 0.25 * (END**4 - BEGIN**4), rel=1e-14)
 
 
 def test_a_jump_counts_at_the_end_alone():
     found = piece(lambda t: 0.0, jump=Jump(7.0, np.array([1.0, 2.0, 3.0])))
-    assert found.booked(0.69)[0].tolist() == [2.0, 5.0]
-    work, impulse = found.booked(END)
-    assert work.tolist() == [2.0, 12.0] and impulse.tolist() == [2.0, 3.0, 4.0]
+    assert found.booked(0.69).work.tolist() == [2.0, 5.0]
+    work, impulse, pushed = found.booked(END)
+    assert work.tolist() == [2.0, 12.0] and impulse.tolist() == [2.0, 3.0, 4.0] and not pushed.any()
 
 
 def test_unevenness_is_the_difference_of_two_rules():
