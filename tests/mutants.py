@@ -209,8 +209,8 @@ MUTANTS = [
     Mutant("dynamics/integrators/simpson_book", "np.bincount(self._fixed % 3,", "np.bincount(self._fixed // 3 % 3,"),
     Mutant(
         "dynamics/integrators/explicit_loop",
-        "if inertia.inverse[r, k] > 0.0:\n                row[at + k]",
-        "if inertia.mass[r] > 0.0:\n                row[at + k]",
+        "if inertia.inverse[r, k] > 0.0:\n                p[r, k]",
+        "if inertia.mass[r] > 0.0:\n                p[r, k]",
     ),
     Mutant("dynamics/integrators/energy_book", "DRIFT = 1e-2", "DRIFT = 2e-2"),
     Mutant("dynamics/integrators/energy_book", "work[last] -= 0.5 * (before", "work[last] -= (before"),

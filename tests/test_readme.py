@@ -74,7 +74,7 @@ def check_what_it_prints(solution):
         assert 0.1 < float(error) * scale / result.error < 10.0, (name, result)
         if result.error < 0.02 * abs(result.value):
             assert float(when) == pytest.approx(result.time, rel=0.01), (name, result)
-    steps, drift = re.search(r"(\w\S*): (\d+) steps, energy drift (\S+)", box).group(2, 3)
+    steps, drift = re.search(r"(\w\S*): (\d+) steps, energy drift ([^\s,]+)", box).group(2, 3)
     assert int(steps) == solution.solver["nsteps"] and drift == f"{solution.solver['energy_drift']:.1e}"
 
 

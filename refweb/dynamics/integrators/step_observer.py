@@ -281,10 +281,11 @@ class StepObserver(Integrator):
     def _take_step(self, course, end):
         """One step of the method, not beyond a corner of a table, nor further than a body can be passed."""
         stop = self._limits.stop(course.time, course.x, course.v, end)
-        if self.restarts and course.nsteps and self._limits.at_corner(course.time):
-            self._enter(course)
-        self._wrong = None
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
+        if self.restarts and course.nsteps and self._limits.at_corner(course.time):
+            self._enter(course)  # and the first step is chosen whatever the rows are
+            ahead = course.time + max(1e3 * course.step, 1e-6 * course.time)
+        self._wrong = None
         with self._told(course):
             reached = self.step(stop, ahead)
             if not reached > course.reached:
