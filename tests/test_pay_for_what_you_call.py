@@ -157,7 +157,11 @@ SCENES["by relaxation"] = brief("catenary", method="relaxation")
 SCENES["by relaxation"]["cable"] |= {"law": "linear"}
 
 
-@pytest.mark.parametrize("name", SCENES)
+ALIKE = ("triangle-impact", "hexagon-impact", "square-oblique-impact", "triangle-load", "hexagon-load")
+"""Scenes that call for what others of the same kind call for, on another web."""
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in ALIKE)) for n in SCENES])
 def test_a_run_loads_what_its_scene_calls_for(name):
     given = SCENES[name]
     modules, outside = called(given)

@@ -21,6 +21,8 @@ BDF, ADAMS = (dict(method="cvode", family=family, rtol=1e-8) for family in ("bdf
 IDA = dict(method="ida", rtol=1e-8)
 METHODS = [EXPLICIT, BDF, ADAMS, IDA]
 NAMES = ["central-difference", "bdf", "adams", "ida"]
+ROUGH = [EXPLICIT, {**BDF, "rtol": 1e-6}, ADAMS, {**IDA, "rtol": 1e-6}]
+"""Those of order 2 are off by a hundred to the power 2/3 times as much, some 22 times, in a fifth of the steps."""
 
 
 def cable(law="tension-only", density=0.0, **changes):
@@ -243,7 +245,7 @@ def test_an_oscillator_passes_values(solve):
 
 def test_time_of_an_event_converges_with_the_tolerance():
     """As the motion itself does: by the power 2/3 with steps of order 2."""
-    off, tolerances = [], (1e-4, 1e-6, 1e-8)
+    off, tolerances = [], (1e-4, 1e-5, 1e-6, 1e-7)
     events = [refweb.Event(name="up", kind="threshold", observe="x", value=0.5 / RATE)]
     for rtol in tolerances:
         solution = refweb.run(oscillator(events, {**BDF, "rtol": rtol}, [PLACE], 10.0 / RATE))
@@ -281,7 +283,7 @@ STOPPED = [refweb.Event(name="down", kind="threshold", observe="x", value=-0.5 /
 DOWN = (np.pi + np.arcsin(0.5)) / RATE
 
 
-@pytest.mark.parametrize("solve", METHODS, ids=NAMES)
+@pytest.mark.parametrize("solve", ROUGH, ids=NAMES)
 def test_a_run_stops_at_its_event(solve, tmp_path):
     """Last row, last frame, checkpoint and results are those of its time; what would have come later has not."""
     before = refweb.Event(name="up", kind="threshold", observe="x", value=0.5 / RATE)
@@ -289,8 +291,8 @@ def test_a_run_stops_at_its_event(solve, tmp_path):
     again = refweb.Observe(name="y", quantity="displacement", node=1, component="x", reduce="min")
     stopped = oscillator([after, *STOPPED, before], solve, [PLACE, again], 8.0 / RATE, interval=0.3 / RATE, frames=4)
     kept, written = refweb.run(stopped), refweb.run(stopped, out=tmp_path / "out")
-    event = agrees(kept, "down", DOWN, within=PHASE / RATE)
-    agrees(kept, "up", np.arcsin(0.5) / RATE, within=PHASE / RATE)
+    event = agrees(kept, "down", DOWN, within=30.0 * PHASE / RATE)
+    agrees(kept, "up", np.arcsin(0.5) / RATE, within=30.0 * PHASE / RATE)
     assert times(kept)["back"] is None and kept.events == written.events and kept.status == "solved"
     end = event["time"]
     for history in (kept.history, written.history):
@@ -361,7 +363,7 @@ def test_the_first_of_two_that_stop():
             assert found["second"] is None and abs(found["first"] - np.arcsin(0.5) / RATE) < 1e-2 / RATE
 
 
-@pytest.mark.parametrize("solve", METHODS, ids=NAMES)
+@pytest.mark.parametrize("solve", ROUGH, ids=NAMES)
 def test_errors_come_from_the_twin(solve):
     """Without one there are none; with one the time of the run itself is the same."""
     events = [refweb.Event(name="up", kind="threshold", observe="x", value=0.5 / RATE), *STOPPED]

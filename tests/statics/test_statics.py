@@ -34,6 +34,7 @@ GAP = 1e-10
 PAPER = dict(modulus=7e7, area=1e-4, density=200.0)
 MESHES = ("triangle", "square", "hexagon")
 SMOOTHINGS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+EACH = [1e-2, *(pytest.param(smoothing, marks=pytest.mark.slow) for smoothing in (1e-3, 1e-4, 1e-5)), 1e-6, 0.0]
 EPS = np.finfo(float).eps
 
 
@@ -82,7 +83,7 @@ def deflection(mesh, found):
     return found.x[paper_web(mesh).centre, 2]
 
 
-@pytest.mark.parametrize("smoothing", [*SMOOTHINGS, 0.0])
+@pytest.mark.parametrize("smoothing", EACH)
 @pytest.mark.parametrize("mesh", MESHES)
 def test_paper_webs_from_flat(mesh, smoothing):
     """The work promised for every web and smoothing: 25 factorizations from flat, 35 without smoothing, then 8 each.
@@ -99,7 +100,7 @@ def test_paper_webs_from_flat(mesh, smoothing):
         assert [f.stats["smallest_pivot"] for f in found] == [1] * 5
 
 
-@pytest.mark.parametrize("smoothing", [*SMOOTHINGS, 0.0])
+@pytest.mark.parametrize("smoothing", EACH)
 @pytest.mark.parametrize("step", range(5))
 def test_paper_webs_compared(smoothing, step):
     """As in the paper: the hexagon web yields most and is stressed least."""
@@ -125,7 +126,7 @@ def test_smoothing_converges_to_tension_only_at_first_order(mesh):
     print(f"{mesh}: fitted order {order:.4f}")
     assert abs(order - 1) <= 0.02
     # Over the whole series the error falls from each η to the next.
-    series = [abs(deflection(mesh, paper_series(mesh, eta)[0][0]) - limit) for eta in SMOOTHINGS]
+    series = [abs(deflection(mesh, solve(paper_system(mesh, eta))[0]) - limit) for eta in SMOOTHINGS[::2]]
     assert (np.diff(series) < 0).all()
 
 

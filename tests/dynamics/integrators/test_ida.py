@@ -302,11 +302,11 @@ def test_pendulum(order, rtol):
 
 
 def test_a_chain_of_links_keeps_its_lengths():
-    """20 links swing from horizontal for 2 s, with a whip at its end: lengths to 1e-10, energy to 1e-5."""
+    """20 links swing from horizontal for 1 s, with a whip at its end: lengths to 1e-10, energy to 1e-5."""
     system = chain(20, True)
     solver = Ida(system, rtol=1e-6, max_order=5)
     run, worst = solver.start(), []
-    for time in np.linspace(0.0, 2.0, 41)[1:]:
+    for time in np.linspace(0.0, 1.0, 21)[1:]:
         solver.advance(run, [time])
         worst.append((stretch(system, run.x), np.abs(system.constraints[0].speed(run.x, run.v)).max()))
     assert np.max(worst) < 1e-10 and run.drift < 1e-5
