@@ -17,6 +17,9 @@ from .settings import START_STATES
 from .system.system import System
 from .tables import Table
 
+MAX_WINDOWS = 1e5
+"""Largest number of windows, of observables that are averaged, that a run is long."""
+
 
 def build(web, cable, effects, supports, support, solve, output, accuracy, observables, events, folder):
     """The system of the parts of a scene.
@@ -66,7 +69,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
         _check_links(solve)
     _check_start(solve, accuracy)
     system.initial_velocity()
-    _check_observables(observables, system)
+    _check_observables(observables, system, solve)
     for i, event in enumerate(events):
         with refused_at(f"[[event]] {i + 1}"):
             _check_event(event, [earlier.name for earlier in events[:i]], observables, system)
@@ -179,17 +182,31 @@ def _check_start(solve, accuracy):
         )
 
 
-def _check_observables(observables, system):
+def _check_observables(observables, system, solve):
     """Refuse observables that the system does not have, and columns of one name."""
     own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
     columns = dict.fromkeys(own, "a column of its own")
     for i, observable in enumerate(observables):
         with refused_at(f"[[observe]] {i + 1}"):
             observable.on(system)
+            _check_average(observable.average, solve)
             if (stands := columns.get(observable.name)) is not None:
                 name = shown(observable.name)
                 raise InputError(f"name = {name} is {stands} of history.csv: names are unique")
         columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
+
+
+def _check_average(average, solve):
+    """Refuse a window that is never full in a run, and one that slides through it in too many cells."""
+    if average is None:
+        return
+    if average > solve.duration:
+        raise InputError(f"average = {average:g} must be ≤ duration = {solve.duration:g} [s]: no window would be full")
+    if average * MAX_WINDOWS < solve.duration:
+        raise InputError(
+            f"average = {average:g} must be ≥ {solve.duration / MAX_WINDOWS:g} [s], the duration over {MAX_WINDOWS:g}: "
+            "over so little the mean is the value; leave it out"
+        )
 
 
 def _check_event(event, earlier, observables, system):
@@ -206,3 +223,8 @@ def _check_event(event, earlier, observables, system):
         raise InputError(f"line = {event.line} must be 0 … {len(system.net.web.lines) - 1}")
     if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
         raise InputError(f"observe = {shown(event.observe)} is no observable, {nearest(event.observe, names)}")
+    if event.kind == "threshold" and (average := observables[names.index(event.observe)].average) is not None:
+        raise InputError(
+            f"observe = {shown(event.observe)} is a mean, average = {average:g}, and events are found by values of an "
+            "instant: name an observable without average"
+        )

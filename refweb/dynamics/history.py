@@ -130,12 +130,19 @@ class Watch:
             value, when, where = float(last[1 + i]), course.time, None
             at = self._slot(o)
             if at is not None and o.reduce != "final":
-                value, when = float(extremes.values[at]), float(extremes.times[at])
-            if o in self._probed:
+                if o.name not in self.unfilled(course):
+                    value, when = float(extremes.values[at]), float(extremes.times[at])
+            if o in self._probed and o.average is None:
                 final = o.reduce == "final"
                 where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[at]))
             results[o.name] = Result(value, None, o.unit, when, where)
         return results
+
+    def unfilled(self, course):
+        """Names of the observables whose largest or smallest mean is that of no full window: the run ended before."""
+        values = course.extremes.values
+        extreme = [o for o in self._probed if o.average is not None and o.reduce != "final"]
+        return [o.name for o in extreme if np.isinf(values[self._slot(o)])]
 
     def corrections(self, course):
         """What extremes exceed the values at steps by, by name of the observable; ± is no less."""

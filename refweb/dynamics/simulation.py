@@ -213,7 +213,7 @@ class Simulation:
     def _note(self, course):
         """Take the state of a run over into the solution."""
         solution, watch = self.solution, self.watch
-        self._largest_stress = watch.largest_stress(course)
+        self._largest_stress, self._unfilled = watch.largest_stress(course), watch.unfilled(course)
         if (used := watch.utilisation(course)) is not None:
             solution.utilisation = used
         if np.isfinite(course.x).all():
@@ -250,6 +250,9 @@ class Simulation:
         if self._largest_stress is not None:
             yield from floor_remark(self.system.net, self._largest_stress)
         yield from strength_remark(self.solution.utilisation)
+        for name in self._unfilled:
+            end = self._tables[-1][-1, 0]
+            yield f"{name} is the mean of the whole run: it ended at t = {end:.6g} s, before a window was full"
 
 
 def _check_step(scene):

@@ -39,12 +39,15 @@ class Probe(NamedTuple):
         More of them.
     sign : float
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
+    average : float
+        Length of a window [s] whose mean is looked at instead of the value, 0 for none.
     """
 
     kernel: Callable
     rows: list | np.ndarray
     data: np.ndarray
     sign: float = 0.0
+    average: float = 0.0
 
 
 @kernel()

@@ -88,12 +88,17 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
 
 
 def _observable(scene, name):
-    """What is compared: the observable of a name, or the first that a state alone determines."""
+    """What is compared: the observable of a name, or the first that the state of an instant alone determines."""
     if name is None:
-        return next(o for o in (*scene.observables, *default()) if not o.observable.booked)
+        return next(o for o in (*scene.observables, *default()) if not (o.observable.booked or o.average))
     names = {o.name: o for o in scene.observables}
     if name not in names:
         raise InputError(f"observe = {shown(name)} is no observable of the scene, {nearest(name, names)}")
+    if names[name].average is not None:
+        raise InputError(
+            f"observe = {shown(name)} is a mean, average = {names[name].average:g}: methods are compared by values of "
+            "an instant; name an observable without average"
+        )
     if names[name].observable.booked:
         known = [quantity for quantity, entry in OBSERVABLES.items() if not load(entry).booked]
         raise InputError(

@@ -12,12 +12,13 @@ import math
 import numpy as np
 
 from ...kernels import copy_rows, kernel
+from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
 from .extremes import EDGE, Extremes, correction, look, look_at_sums, take_over, time_of_top
 from .records import Inside
 from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
 
-LOOKS = 4
+LOOKS = PARTS
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
 SAME_PEAK = 1e-3
 """Share of a step within which peaks of two observables are looked at at once."""
@@ -182,6 +183,8 @@ def look_inside(now, h, fresh, alone, inside, where, total, model, observed, run
         t = now - h + h * (EDGE if n == 0 else n / LOOKS if n < LOOKS else 1.0 - EDGE)
         state_within(t, now, h, running.x, running.v, running.f, not alone, inside, model)
         turned = look(t, x, v, inside.state[2], inside.lines, where, observed, extremes, fresh)
+        if n > 0 and not alone and observed.windows.slots.size:
+            look_for_means(n, t, x, v, inside.state[2], inside.lines, where, observed, running.averages)
         if observed.sums.shape[0]:
             book_within(t, now, x, v, not alone, total, model, running)
             turned = look_at_sums(t, total, observed, extremes, fresh) or turned

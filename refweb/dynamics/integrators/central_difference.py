@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, NoEnd, OpenBook
+from .averages import begin_averages
 from .between_steps import LOOKS
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
@@ -137,7 +138,8 @@ class CentralDifference(Integrator):
         The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
         What the first step is looked at inside with is not counted.
         """
-        follows = len(self._observed.followed) + len(self._observed.sums) > 0  # and evaluates forces where it looks
+        looks = self._observed.followed, self._observed.sums, self._observed.windows.slots
+        follows = any(len(one) for one in looks)  # and evaluates forces where it looks
         per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
         return dict(nfev=per_step * course.nsteps + 1, njev=0, nlu=0)
 
@@ -160,12 +162,13 @@ class CentralDifference(Integrator):
             starts_above(event, extremes.values[event["slot"]])
         stepping = first + np.flatnonzero(sums[:, -1])
         extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+        averages = begin_averages(self._observed.windows, extremes)
         extremes.recent[:, 2] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
         book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), self._least))
         ledger = Ledger.empty()
         open_ledger(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
-        seen = dict(extremes=extremes, events=events)
+        seen = dict(extremes=extremes, events=events, averages=averages)
         return ExplicitCourse(time=0.0, x=x, v=v, force=force, ledger=ledger, **seen, **book)
 
     def save(self, course):
@@ -212,7 +215,7 @@ class CentralDifference(Integrator):
         families, changing = len(self.system.families), len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = np.zeros(families), np.zeros((2, changing))
-        return Running(clock, *state, course.extremes, course.events, *carried)
+        return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
     def advance(self, course, times):
         """Take a course to each of some times; equal steps lead to each.

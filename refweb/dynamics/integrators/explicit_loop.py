@@ -15,6 +15,7 @@ import numpy as np
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...results.probes import PLACE
+from .averages import average, look_for_means, write_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside
 from .energy_book import (
     begin_powers,
@@ -81,6 +82,7 @@ def look_behind(model, observed, running, total):
     x, v, f, extremes = running.x, running.v, running.f, running.extremes
     begin_anew(extremes)
     look(now, x, v, f, lines, where, observed, extremes, False)
+    look_for_means(0, now, x, v, f, lines, where, observed, running.averages)
     if observed.sums.shape[0]:
         look_at_books(now, x, v, total, extremes, False, model, observed, running)
     begin_anew(extremes)
@@ -118,9 +120,8 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
 def take_steps(count, h, changing, scheme, model, observed, running, total):
     """``count`` steps of size h, behind those that are taken of the row; where ``changing`` natural lengths change.
 
-    It writes all of ``running`` but ``before``. A step is a kick, a drift and a kick of h times ``kicks`` and
-    ``drifts``; more of them are a method of higher order, whose long steps are looked at inside, as the first one is.
-    Returns the steps taken: fewer than asked for where an event ends the run.
+    It writes ``running`` but ``before``, and returns the steps taken: fewer where an event ends the run. A step of more
+    than a kick, a drift and a kick of h times ``kicks`` and ``drifts`` is looked at inside, as the first one is.
     """
     clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
@@ -139,12 +140,12 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     extra = np.zeros((rows if powers.shape[0] or viscous.size or pushing else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
-    looks = watched and (stages > 0 or fresh > 0)
+    awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
+    looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
     inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if moved else 0, 3))
-    begun, planned, start, awaited = clock.begun, clock.planned, clock.time, running.events.shape[0] > 0
-    begin_forces(start + begun * h, changing and begun == 0, extra, reaction, push, model, running)
+    begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
-        now = start + (begun + step) * h
+        now = clock.time + (begun + step) * h
         if looks:
             note_state(x, v, f, inverse, inside.before)
         if stages:
@@ -190,6 +191,8 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
             looks = look_again(now, h, step == fresh, stages > 0, inside, total, model, observed, running)
+        if averaged:
+            average(now, x, v, f, lines, where, stages > 0, observed, running.averages, extremes)
         if awaited:
             if note_events(now, h, x, v, f, lines, running.events, where, probes, probe_rows, probe_data, sums, total):
                 return step
@@ -242,6 +245,7 @@ def write_row(row, model, observed, running, total):
             clock.time, running.x, v, running.f, families.outs[0], observed.rows[i], observed.data[i], where
         )  # fmt: skip
         at += 1
+    write_means(row, observed.windows, running.averages, running.extremes)
     energy, stored = energies_now(model, running, total)
     total[-1] = clock.step
     for i in range(total.size):

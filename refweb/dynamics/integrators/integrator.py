@@ -3,7 +3,8 @@
 A method is a class that has what `Integrator` lists; `refweb.registry.INTEGRATORS` gives it its name in scenes. It is
 made of a system and of what is to be looked at:
 
-* `refweb.results.probes.Probe`, one scalar of the state each, in the rows and, with a sign, as extreme of all steps;
+* `refweb.results.probes.Probe`, one scalar of the state each, in the rows and, with a sign, as extreme of all steps; or
+  its mean over a window that slides along the run, in the same places;
 * `Sum`, the same of energies, work and step size;
 * `refweb.dynamics.integrators.events.Event`, a moment at which one of these passes a level.
 
@@ -18,6 +19,7 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from .averages import Averages
 from .events import ended_by
 from .extremes import Extremes
 from .momentum_book import Ledger
@@ -29,7 +31,7 @@ MAX_STEPS_PER_ROW = 1e8
 AXES = "xyz"
 VECTORS = ("momentum", "support_impulse", "outer_impulse")
 """Last columns of a `History`, each with its axes."""
-GROUPS = {"extremes": Extremes, "ledger": Ledger}
+GROUPS = {"extremes": Extremes, "ledger": Ledger, "averages": Averages}
 """Fields of a `Course` that are records of arrays."""
 
 
@@ -68,6 +70,8 @@ class Course:
         Impulse of the supports on the net [N s].
     ledger : refweb.dynamics.integrators.momentum_book.Ledger
         The book of momentum.
+    averages : refweb.dynamics.integrators.averages.Averages
+        Means over windows, of the probes that have one.
     nsteps : int
         Steps taken.
     step : float
@@ -90,6 +94,7 @@ class Course:
     work: np.ndarray
     impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
     ledger: Ledger = field(default_factory=Ledger.empty)
+    averages: Averages = field(default_factory=Averages.at_start)
     nsteps: int = 0
     step: float = 0.0
     energy: float = 0.0

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...results.probes import PLACE
+from .averages import PARTS, Windows, begin_averages, slide, write_means
 from .extremes import EDGE, Extremes, note_time, turns_back
 
 ROUNDS = 6
@@ -56,6 +57,8 @@ class Measurements:
         ]
         self._weights = np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3)
         self._signs = np.array([float(one.sign) for one in (*probes, *sums)])
+        self._windows = Windows.of(probes)
+        self._signs[self._windows.slots] = 0.0
         self._followed = np.flatnonzero(self._signs[: self.probed])
         self._where = np.zeros(2, dtype=np.int64)
 
@@ -80,13 +83,14 @@ class Measurements:
         return self.probe(slot, sample) if slot < self.probed else self._weights[slot - self.probed] @ energies(sample)
 
     def at_start(self, sample, energies):
-        """The `Extremes` at t = 0, where no step has been taken, and the values there."""
+        """The `Extremes` at t = 0, where no step has been taken, the `Averages` and the values there."""
         places = [self._place(i, sample) for i in range(self.probed)]
         values = np.array([*self.probes(sample), *(self._weights @ energies)])
         extremes = Extremes.at_start(values.copy(), np.array([*places, *[-1] * len(self._weights)], dtype=np.int64))
+        averages = begin_averages(self._windows, extremes)
         stepping = self.probed + np.flatnonzero(self._weights[:, -1])
         extremes.values[stepping] = extremes.recent[stepping, 2] = -np.inf * self._signs[stepping]
-        return extremes, values
+        return extremes, averages, values
 
     def look(self, extremes, sample, energies):
         """Take the values at a sample over into the extremes; numbers of what may turn back.
@@ -109,6 +113,25 @@ class Measurements:
         self.look(extremes, middle, energies)
         for i in self.look(extremes, end, energies):
             self._search_top(extremes, i, lambda t: (s := sample_at(t), self.value(i, s, energies)))  # noqa: B023
+
+    def average(self, course, piece, end, sample_at):
+        """Slide windows through a piece of a step that ends with the sample ``end``, ahead of a jump."""
+        averages, slots = course.averages, self._windows.slots
+        if not len(slots):
+            return
+        inside = (piece.begin + (end.time - piece.begin) * part / PARTS for part in range(1, PARTS))
+        for part, sample in enumerate((*map(sample_at, inside), end), 1):
+            averages.within[:, part] = [self.probe(i, sample) for i in slots]
+        for n in range(len(slots)):
+            slide(n, piece.end.time, True, self._windows, averages, course.extremes)
+        averages.looked[0] = piece.end.time
+        if piece.jump:
+            averages.within[:, 0] = [self.probe(i, piece.end) for i in slots]
+
+    def write_means(self, row, course):
+        """Write means to a row of a history, in the places of their probes."""
+        if len(self._windows.slots):
+            write_means(row, self._windows, course.averages, course.extremes)
 
     def _take_over(self, extremes, i, value, sample, correction=0.0):
         """Note a value that is more extreme than all before."""

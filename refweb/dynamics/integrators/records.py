@@ -13,6 +13,7 @@ from numba.typed import List
 
 from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, record, typed_list
 from ...results.probes import INTEGERS, PROBE
+from .averages import Averages, Windows
 from .energy_book import no_energy
 from .extremes import Extremes
 from .momentum_book import Ledger, Outside
@@ -253,9 +254,11 @@ class Observed(NamedTuple):
     sums : ndarray, shape (sums, families + 3)
         Weights of each sum.
     signs : ndarray, shape (probes + sums,)
-        1 for the largest value, −1 for the smallest, 0 for neither.
+        1 for the largest value, −1 for the smallest, 0 for neither, as for probes that have a window.
     followed : ndarray of int
         Probes whose sign is not 0.
+    windows : refweb.dynamics.integrators.averages.Windows
+        Windows of the probes that are averaged.
     """
 
     probes: List
@@ -264,11 +267,13 @@ class Observed(NamedTuple):
     sums: np.ndarray
     signs: np.ndarray
     followed: np.ndarray
+    windows: Windows
 
     @classmethod
     def of(cls, probes, sums, families):
         """Probes and sums over a number of families."""
-        signs = np.array([float(one.sign) for one in (*probes, *sums)])
+        windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
+        signs[windows.slots] = 0.0
         return cls(
             probes=typed_list(PROBE, [probe.kernel for probe in probes]),
             rows=typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
@@ -276,6 +281,7 @@ class Observed(NamedTuple):
             sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3),
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
+            windows=windows,
         )
 
 
@@ -301,6 +307,8 @@ class Running(NamedTuple):
         Extremes of probes and sums.
     events : ndarray of `refweb.dynamics.integrators.events.EVENT`
         What each event has come to.
+    averages : refweb.dynamics.integrators.averages.Averages
+        Means over windows.
     power : ndarray, shape (families,)
         Power of each family at the last step [W].
     length_force : ndarray, shape (2, changing)
@@ -317,6 +325,7 @@ class Running(NamedTuple):
     ledger: Ledger
     extremes: Extremes
     events: np.ndarray
+    averages: Averages
     power: np.ndarray
     length_force: np.ndarray
 

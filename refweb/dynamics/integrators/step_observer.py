@@ -215,8 +215,9 @@ class StepObserver(Integrator):
         system.drive(0.0, x, v)
         sample, work = self._book.sample(0.0, x, v), np.zeros(len(system.families) + 1)
         energies = self._book.energies(sample, work, 0.0)
-        extremes, values = self._measurements.at_start(sample, energies)
-        course = self.course_type(time=0.0, x=x, v=v, extremes=extremes, events=self._events.copy(), work=work)
+        extremes, averages, values = self._measurements.at_start(sample, energies)
+        seen = dict(extremes=extremes, averages=averages, events=self._events.copy())
+        course = self.course_type(time=0.0, x=x, v=v, work=work, **seen)
         for event in course.events:
             starts_above(event, values[event["slot"]])
         self._book.open(course, energies)
@@ -325,7 +326,7 @@ class StepObserver(Integrator):
             stop = search(course.events, piece, lambda slot, sample: self._value(piece, slot, sample), self._sample_at)
             if stop < end:
                 piece = self._piece(course, stop)
-        self._look(course.extremes, piece)
+        self._look(course, piece)
         course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind
@@ -334,16 +335,17 @@ class StepObserver(Integrator):
         if piece.jump and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(course)
 
-    def _look(self, extremes, piece):
-        """Look for extremes in a piece, and behind a jump at its end."""
+    def _look(self, course, piece):
+        """Look for extremes and means in a piece, and behind a jump at its end."""
 
         def energies(sample):
             return self._book.energies_within(piece, sample)
 
-        end = piece.end
+        extremes, end = course.extremes, piece.end
         if piece.jump:
             end = self._sample_at(end.time - EDGE * (end.time - piece.begin))
         self._measurements.follow(extremes, piece.middle, end, self._sample_at, energies)
+        self._measurements.average(course, piece, end, self._sample_at)
         if piece.jump:
             self._measurements.look(extremes, piece.end, energies)
             begin_anew(extremes)
@@ -357,6 +359,7 @@ class StepObserver(Integrator):
         sample = self._book.sample(course.time, course.x, course.v)
         energies, probes = self._book.energies(sample, course.work, course.step), self._measurements.probes(sample)
         row[:] = [course.time, *probes, *energies, *self._book.impulses(course)]
+        self._measurements.write_means(row, course)
         self._book.close(course, energies, before, self._remedy)
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...errors import InputError
 from ...messages import nearest, shown
 from ...registry import OBSERVABLES, load
-from ...tables import Table, choice, component, field, node_number, nodes, text
+from ...tables import Table, choice, component, field, node_number, nodes, real, text
 
 SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 """Sign of the peaks that a probe follows, by ``reduce``."""
@@ -40,13 +40,22 @@ class Observe(Table):
         Axis of a nodal quantity; without it the magnitude.
     reduce : {"max", "min", "final"}
         Reduction over time.
+    average : float, optional
+        Length of a window [s], in dynamics: the mean over it counts in place of the value, which in a web of many waves
+        has digits where an instant has none. The window slides along the run and ends at the instant: rows of the
+        history hold the mean until their time, and ``reduce`` takes its value of that mean, which stands at no node or
+        line. Until a window is full the mean is that of what has passed, at t = 0 the value itself; the largest and the
+        smallest are those of full windows alone. Of several nodes or lines it is the mean of the largest value, not
+        the largest of means. Energies, work and step size take none: they are booked over steps, where impulses and
+        work between two instants are known already, and not looked at in each.
 
     Raises
     ------
     InputError
-        For an unknown quantity, a node, body, line or axis that the quantity does not have, a node beside a body, and a
-        name with commas or quotes or above 80 characters; from ``on``, for what the net does not have, an energy whose
-        effect is not in the scene, and in statics what needs velocity, or work that depends on the path.
+        For an unknown quantity, a node, body, line or axis that the quantity does not have, a node beside a body, a
+        name with commas or quotes or above 80 characters, a window that is not above 0, and one of a booked quantity;
+        from ``on``, for what the net does not have, an energy whose effect is not in the scene, and in statics what
+        needs velocity, work that depends on the path, and a window.
     """
 
     name: str = text(most=80)
@@ -56,6 +65,7 @@ class Observe(Table):
     line: int | None = field(node_number, None)
     component: int | None = component(None)
     reduce: str = choice("max", "min", "final", default="final")
+    average: float | None = real(None, above=0.0, unit="s")
 
     def check(self):
         """Refuse a node, line or component that the quantity does not have."""
@@ -69,6 +79,10 @@ class Observe(Table):
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
         if self.node is not None and self.body is not None:
             raise InputError(f"node = {shown(self.node)} and body = {shown(self.body)} exclude each other")
+        if self.average is not None and self.observable.booked:
+            raise InputError(
+                f'average = {self.average:g} has no meaning for the booked quantity = "{self.quantity}": leave it out'
+            )
 
     @property
     def observable(self):
@@ -84,6 +98,8 @@ class Observe(Table):
         """Refuse what the system does not have."""
         if system.net.quasi_static and self.observable.dynamic:
             raise InputError(f'quantity = "{self.quantity}" has no meaning in statics')
+        if system.net.quasi_static and self.average is not None:
+            raise InputError(f"average = {self.average:g} has no meaning in statics: leave it out")
         self.observable.on(system)
 
     def value(self, state):
@@ -99,8 +115,8 @@ class Observe(Table):
         return self.observable.error(state, equilibrium)
 
     def probe(self, system):
-        """The `refweb.results.probes.Probe` that follows it, with the sign of its peaks."""
-        return self.observable.probe(system)._replace(sign=SIGN[self.reduce])
+        """The `refweb.results.probes.Probe` that follows it, with the sign of its peaks and its window."""
+        return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)
 
 
 def default():

@@ -1,0 +1,210 @@
+"""Means of values over windows that slide along a run.
+
+The mean of a value q over the window of length w that ends at t is (I(t) − I(t − w))/w, with I the integral of q. I and
+q are kept at `CELLS` times of a window, spaced evenly from t = 0 on, whatever the steps are; at any other time the
+cubic through I and its rate q at the ends of a cell tells I. In a step q is a polynomial: linear where the motion is of
+order 2, else of degree 4 through its values at `PARTS` equal parts. No value is looked at more than once for it.
+
+Before t = w the mean is that of what has passed, I(t)/t, and the value itself at t = 0. Largest and smallest means are
+those of full windows alone. They are looked for at the ends of cells, at rows and, where the rate of the mean,
+(q(t) − q(t − w))/w, changes its sign between two of these, on the cubic through means and rates there. What that is off
+the parabola through the rates is kept as correction: ± is no less. It shows what many steps in a cell leave open.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels import kernel
+
+CELLS = 1024
+"""Number of cells of a window. The mean of a sine over a whole period is off its largest value by 4e-12 of that."""
+PARTS = 4
+"""Number of equal parts of a step of higher order at whose ends a value is looked at."""
+NEAR = 1e-12
+"""Share of a time within which a step that ends before the end of a cell is taken to meet it."""
+
+
+class Windows(NamedTuple):
+    """What means are asked for.
+
+    Attributes
+    ----------
+    slots : ndarray of int, shape (averaged,)
+        Number of the probe of each.
+    widths : ndarray
+        Length of each window [s].
+    signs : ndarray
+        1 for the largest mean of all full windows, −1 for the smallest, 0 for neither.
+    """
+
+    slots: np.ndarray
+    widths: np.ndarray
+    signs: np.ndarray
+
+    @classmethod
+    def of(cls, probes):
+        """Those of probes that have a window."""
+        slots = np.array([i for i, probe in enumerate(probes) if probe.average], dtype=np.int64)
+        widths = np.array([float(probes[i].average) for i in slots])
+        return cls(slots, widths, np.array([float(probes[i].sign) for i in slots]))
+
+
+class Averages(NamedTuple):
+    """What is known of means at the last look.
+
+    Attributes
+    ----------
+    integrals, values : ndarray, shape (averaged, CELLS + 1)
+        Integral, but for a constant, and value at the ends of the last cells; that of cell k, which is the first time
+        of all for k = 0, stands at k modulo CELLS + 1.
+    passed : ndarray of int, shape (averaged,)
+        Number of the last cell that is passed.
+    integral : ndarray, shape (averaged,)
+        Integral at the last look, but for the same constant.
+    within : ndarray, shape (averaged, PARTS + 1)
+        Value at the last look, then at the ends of equal parts of the step behind it.
+    latest : ndarray, shape (averaged, 2)
+        Mean at the end of the last cell and its rate [1/s] of it, where a window was full there.
+    looked : ndarray, shape (1,)
+        Time of the last look [s].
+    """
+
+    integrals: np.ndarray
+    values: np.ndarray
+    passed: np.ndarray
+    integral: np.ndarray
+    within: np.ndarray
+    latest: np.ndarray
+    looked: np.ndarray
+
+    @classmethod
+    def at_start(cls, values=()):
+        """Those of the values at t = 0; by default none."""
+        count, values = len(values), np.asarray(values, dtype=float)
+        kept, within = np.zeros((count, CELLS + 1)), np.zeros((count, PARTS + 1))
+        kept[:, 0] = within[:, 0] = values
+        passed, none = np.zeros(count, dtype=np.int64), np.zeros((count, 2))
+        return cls(np.zeros_like(kept), kept, passed, np.zeros(count), within, none, np.zeros(1))
+
+
+def begin_averages(windows, extremes):
+    """The `Averages` of probes whose extremes are their values at t = 0; these become those of no window."""
+    averages, extreme = Averages.at_start(extremes.values[windows.slots]), windows.signs != 0.0
+    extremes.values[windows.slots[extreme]] = -np.inf * windows.signs[extreme]
+    return averages
+
+
+@kernel()
+def coefficients(values, smooth):
+    """Those of the polynomial over the share of a step through values at its ends or, ``smooth``, its parts."""
+    if not smooth:
+        return values[0], values[4] - values[0], 0.0, 0.0, 0.0
+    d1, d2 = values[1] - values[0], values[2] - 2.0 * values[1] + values[0]
+    d3 = values[3] - 3.0 * (values[2] - values[1]) - values[0]
+    d4 = values[4] - 4.0 * (values[3] + values[1]) + 6.0 * values[2] + values[0]
+    c1, c2 = d1 - d2 / 2.0 + d3 / 3.0 - d4 / 4.0, d2 / 2.0 - d3 / 2.0 + 11.0 / 24.0 * d4
+    return values[0], 4.0 * c1, 16.0 * c2, 64.0 * (d3 / 6.0 - d4 / 4.0), 256.0 / 24.0 * d4
+
+
+@kernel()
+def compare(n, begin, end, mean, rate, windows, averages, extremes):
+    """Take over a mean at the time ``end``, or one since that of the latest, ``begin``, that exceeds the extreme."""
+    slot, sign, span = windows.slots[n], windows.signs[n], end - begin
+    top, when, correction = mean, end, 0.0
+    first, last = sign * span * averages.latest[n, 1], sign * span * rate
+    if span > 0.0 and first > 0.0 and last < 0.0:
+        rise = sign * (mean - averages.latest[n, 0])
+        cubic, square = first + last - 2.0 * rise, 3.0 * rise - 2.0 * first - last
+        share = first / (math.sqrt(max(square * square - 3.0 * cubic * first, 0.0)) - square)
+        height = ((cubic * share + square) * share + first) * share
+        if height > max(rise, 0.0):
+            top, when = averages.latest[n, 0] + sign * height, begin + share * span
+            correction = abs(height - 0.5 * first * first / (first - last))
+    if sign * top > sign * extremes.values[slot]:
+        extremes.values[slot], extremes.times[slot], extremes.corrections[slot] = top, when, correction
+
+
+@kernel()
+def end_cell(n, integral, value, windows, averages, extremes):
+    """Pass the end of a cell, at which the integral is that from the last look on."""
+    averages.passed[n] += 1
+    passed, width, cell = averages.passed[n], windows.widths[n], windows.widths[n] / CELLS
+    integral += averages.integral[n]
+    if passed >= CELLS:
+        begin = (passed + 1) % (CELLS + 1)  # that of the cell a window before
+        mean, rate = (integral - averages.integrals[n, begin]) / width, (value - averages.values[n, begin]) / width
+        if windows.signs[n] != 0.0:
+            since = (passed - 1 if passed > CELLS else passed) * cell
+            compare(n, since, passed * cell, mean, rate, windows, averages, extremes)
+        averages.latest[n, 0], averages.latest[n, 1] = mean, rate
+    at = passed % (CELLS + 1)
+    averages.integrals[n, at], averages.values[n, at] = integral, value
+    if passed % CELLS == 0:  # integrals begin anew: of a long run they would lose digits
+        averages.integral[n] -= integral
+        for k in range(CELLS + 1):
+            averages.integrals[n, k] -= integral
+
+
+@kernel()
+def slide(n, now, smooth, windows, averages, extremes):
+    """Slide a window to the end of a step, whose values ``within`` holds."""
+    begin, cell, values = averages.looked[0], windows.widths[n] / CELLS, averages.within[n]
+    h, (c0, c1, c2, c3, c4) = now - begin, coefficients(values, smooth)
+    at = (averages.passed[n] + 1) * cell
+    while at <= now * (1.0 + NEAR):
+        s = (at - begin) / h
+        integral = h * s * (c0 + s * (c1 / 2.0 + s * (c2 / 3.0 + s * (c3 / 4.0 + s * c4 / 5.0))))
+        value = c0 + s * (c1 + s * (c2 + s * (c3 + s * c4)))
+        end_cell(n, integral, value, windows, averages, extremes)
+        at = (averages.passed[n] + 1) * cell
+    averages.integral[n] += h * (c0 + c1 / 2.0 + c2 / 3.0 + c3 / 4.0 + c4 / 5.0)
+    values[0] = values[PARTS]
+
+
+@kernel()
+def mean_now(n, windows, averages):
+    """The mean at the last look and, of a full window, its rate [1/s] of it."""
+    t, passed, width = averages.looked[0], averages.passed[n], windows.widths[n]
+    if not t > 0.0:
+        return averages.within[n, 0], 0.0
+    if passed < CELLS:
+        return averages.integral[n] / t, 0.0
+    cell, low, high = width / CELLS, (passed + 1) % (CELLS + 1), (passed + 2) % (CELLS + 1)
+    s, first, last = t / cell - passed, averages.values[n, low], averages.values[n, high]
+    gained = averages.integrals[n, high] - averages.integrals[n, low]
+    past = s * s * (3.0 - 2.0 * s) * gained + cell * s * (1.0 - s) * ((1.0 - s) * first - s * last)
+    value = 6.0 * s * (1.0 - s) * gained / cell + (1.0 - s) * (1.0 - 3.0 * s) * first - s * (2.0 - 3.0 * s) * last
+    return (averages.integral[n] - averages.integrals[n, low] - past) / width, (averages.within[n, 0] - value) / width
+
+
+@kernel()
+def write_means(row, windows, averages, extremes):
+    """Write means to a row of a history, in the places of their probes; no extreme is less than those."""
+    for n in range(windows.slots.size):
+        mean, rate = mean_now(n, windows, averages)
+        row[1 + windows.slots[n]] = mean
+        if windows.signs[n] != 0.0 and averages.passed[n] >= CELLS:
+            begin = averages.passed[n] * windows.widths[n] / CELLS
+            compare(n, begin, averages.looked[0], mean, rate, windows, averages, extremes)
+
+
+@kernel()
+def look_for_means(part, t, x, v, f, lines, where, observed, averages):
+    """Look at all values that are averaged, at the end of a part of a step; 0 is its start."""
+    slots = observed.windows.slots
+    for n in range(slots.size):
+        i = slots[n]
+        averages.within[n, part] = observed.probes[i](t, x, v, f, lines, observed.rows[i], observed.data[i], where)
+
+
+@kernel()
+def average(now, x, v, f, lines, where, smooth, observed, averages, extremes):
+    """Slide all windows to the end of a step."""
+    look_for_means(PARTS, now, x, v, f, lines, where, observed, averages)
+    for n in range(observed.windows.slots.size):
+        slide(n, now, smooth, observed.windows, averages, extremes)
+    averages.looked[0] = now
