@@ -17,7 +17,7 @@ from .settings import START_STATES
 from .system.system import System
 from .tables import Table
 
-MAX_WINDOWS = 1e5
+MAX_WINDOWS = 1e4
 """Largest number of windows, of observables that are averaged, that a run is long."""
 
 
