@@ -77,13 +77,9 @@ def print_scene(scene, system):
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     corners = []
     if solve.kind == "dynamic" and len(system.corners):
-        from .dynamics.schedule import FEW_CORNERS
+        from .dynamics.schedule import remarks_on_corners
 
-        if len(system.corners) > FEW_CORNERS:
-            from .dynamics.corners import corner_remark
-
-            told = corner_remark(scene.replace(solve=solve), system)
-            corners = [("corners", told)] if told else []
+        corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
     _box(
         scene.title,
         [

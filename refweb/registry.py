@@ -82,6 +82,10 @@ class Method(NamedTuple):
         """Name of the key that trades accuracy for time."""
         return self.keys[0]
 
+    def keys_of(self, solve):
+        """Those of its keys that a `refweb.Dynamic` gives, as its integrator takes them."""
+        return {key: value for key in self.keys if (value := getattr(solve, key)) is not None}
+
 
 _STEPS, _TOLERANCES = ("safety", "step_size"), ("rtol", "atol_position", "atol_velocity")
 INTEGRATORS = {

@@ -28,8 +28,7 @@ def corner_remark(scene, system):
         return ""
     apart = f"{len(corners)} corners of tables, {end / len(corners):.3g} s apart on average, end steps"
     method = INTEGRATORS[scene.solve.method]
-    keys = {key: value for key in method.keys if (value := getattr(scene.solve, key)) is not None}
-    integrator = load(method.integrator)(system, **keys)
+    integrator = load(method.integrator)(system, **method.keys_of(scene.solve))
     if not hasattr(integrator, "steps_in"):
         return f"{apart}: {scene.solve.method} takes at least as many"
     rows = row_times(scene)

@@ -108,9 +108,7 @@ class Ways:
         """Whether a method takes the scene."""
         method = INTEGRATORS[solve.method]
         try:
-            load(method.integrator)(
-                self._system, **{key: value for key in method.keys if (value := getattr(solve, key))}
-            )
+            load(method.integrator)(self._system, **method.keys_of(solve))
         except InputError:
             return False
         return True

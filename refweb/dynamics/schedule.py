@@ -56,6 +56,15 @@ def row_times(scene):
     return times
 
 
+def remarks_on_corners(scene, system):
+    """What corners of tables cost, in words, where they are more than `FEW_CORNERS` and change the steps of a run."""
+    if len(system.corners) <= FEW_CORNERS:
+        return []
+    from .corners import corner_remark
+
+    return [told] if (told := corner_remark(scene, system)) else []
+
+
 def times_between(times):
     """Times that cut rows which are fewer than `FEW` into about `COMPARED` parts [s], equal in each row."""
     parts = -(-COMPARED // max(len(times) - 1, 1)) if len(times) <= FEW else 1

@@ -14,7 +14,7 @@ from .accuracy_loop import Standing, follow
 from .history import Watch
 from .initial_state import Start, equilibrium, remarks_on, stored
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
-from .schedule import FEW_CORNERS, Schedule, blocks
+from .schedule import Schedule, blocks, remarks_on_corners
 
 NO_TWIN = (
     "the run whose last state it starts from came to its end without a twin: ± holds what this run adds, not what the "
@@ -87,10 +87,8 @@ class Simulation:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
-        if kept is None and len(system.corners) > FEW_CORNERS:
-            from .corners import corner_remark
-
-            solution.warnings += [told] if (told := corner_remark(scene, system)) else []
+        if kept is None:
+            solution.warnings += remarks_on_corners(scene, system)
         if scene.solve.start != "equilibrium" and kept is None:
             solution.warnings += remarks_on(self.begin, system)
 
@@ -112,7 +110,7 @@ class Simulation:
     def integrator_at(self, knob):
         """The integrator that the scene asks for, at a value of its knob."""
         method, solve, watch = INTEGRATORS[self.scene.solve.method], self.scene.solve, self.watch
-        keys = {key: value for key in method.keys if (value := getattr(solve, key)) is not None} | {method.knob: knob}
+        keys = method.keys_of(solve) | {method.knob: knob}
         return load(method.integrator)(self.system, watch.probes, watch.sums, watch.events, **keys)
 
     def follow(self, folder, tell):

@@ -96,21 +96,27 @@ def test_order_under_dead_loads(order):
     assert held and np.abs(gained - given - run.impulse).max() < 1e-12 * np.abs(run.impulse).max()
 
 
+def spring(effect, observe, **solve):
+    """A mass of 1 kg on a linear spring of 7e3 N/m, what sets it moving, and what is looked at for 0.3 s."""
+    return refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=7e7, area=1e-4, density=0.0),
+        effects=[refweb.PointMass(node=1, mass=1.0), effect],
+        support=[refweb.Supports(nodes=1, components=["y", "z"])],
+        observe=observe,
+        solve=refweb.Dynamic(duration=0.3, method="explicit", **solve),
+        accuracy=refweb.Accuracy(error="none"),
+        output=refweb.Output(interval=0.3),
+    )
+
+
 @pytest.mark.parametrize("order", ORDERS)
 def test_largest_work_between_steps(order):
     """A mass on a spring that a force is let go on, x = F/k (1 − cos ωt): the work is at most 2 F²/k, of order 4."""
     errors, shares = [], np.array([0.8, 0.4, 0.2])
     for share in shares:
-        scene = refweb.Scene(
-            web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
-            cable=refweb.Cable(law="linear", modulus=7e7, area=1e-4, density=0.0),
-            effects=[refweb.PointMass(node=1, mass=1.0), refweb.Load(node=1, force=(7.0, 0.0, 0.0))],
-            support=[refweb.Supports(nodes=1, components=["y", "z"])],
-            observe=[refweb.Observe(name="done", quantity="work", reduce="max")],
-            solve=refweb.Dynamic(duration=0.3, method="explicit", order=order, safety=share),
-            accuracy=refweb.Accuracy(error="none"),
-            output=refweb.Output(interval=0.3),
-        )
+        done = refweb.Observe(name="done", quantity="work", reduce="max")
+        scene = spring(refweb.Load(node=1, force=(7.0, 0.0, 0.0)), [done], order=order, safety=share)
         errors.append(abs(refweb.run(scene).results["done"].value / (2.0 * 7.0**2 / 7e3) - 1.0))
     assert errors[-1] < 1e-4 and np.polyfit(np.log(shares), np.log(errors), 1)[0] > 3.0, errors
 
@@ -220,21 +226,13 @@ def test_peaks_between_steps(order):
     """A mass on a linear spring: largest displacement, speed and energy, at which no step ends, of order 4."""
     rate, errors, shares = np.sqrt(7e3), [], np.array([0.8, 0.4, 0.2])
     for share in shares:
-        scene = refweb.Scene(
-            web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
-            cable=refweb.Cable(law="linear", modulus=7e7, area=1e-4, density=0.0),
-            effects=[refweb.PointMass(node=1, mass=1.0), refweb.Velocity(node=1, value=(1.0, 0.0, 0.0))],
-            support=[refweb.Supports(nodes=1, components=["y", "z"])],
-            observe=[
-                refweb.Observe(name="x", quantity="displacement", node=1, component="x", reduce="max"),
-                refweb.Observe(name="v", quantity="velocity", node=1, component="x", reduce="min"),
-                refweb.Observe(name="stored", quantity="strain_energy", reduce="max"),
-            ],
-            solve=refweb.Dynamic(duration=0.3, method="explicit", order=order, safety=share),
-            accuracy=refweb.Accuracy(error="none"),
-            output=refweb.Output(interval=0.3),
-        )
-        results = refweb.run(scene).results
+        observe = [
+            refweb.Observe(name="x", quantity="displacement", node=1, component="x", reduce="max"),
+            refweb.Observe(name="v", quantity="velocity", node=1, component="x", reduce="min"),
+            refweb.Observe(name="stored", quantity="strain_energy", reduce="max"),
+        ]
+        thrown = refweb.Velocity(node=1, value=(1.0, 0.0, 0.0))
+        results = refweb.run(spring(thrown, observe, order=order, safety=share)).results
         exact = {"x": 1.0 / rate, "v": -1.0, "stored": 0.5}
         errors.append([abs(results[name].value / value - 1.0) for name, value in exact.items()])
         assert results["x"].time * rate % (2.0 * np.pi) == pytest.approx(0.5 * np.pi, abs=0.05)
