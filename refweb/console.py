@@ -77,7 +77,7 @@ def print_scene(scene, system):
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     corners = []
     if solve.kind == "dynamic" and len(system.corners):
-        from .dynamics.schedule import remarks_on_corners
+        from .dynamics.corners import remarks_on_corners
 
         corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
     _box(

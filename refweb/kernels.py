@@ -89,16 +89,46 @@ class _CacheByName(FunctionCache):
         return signature, codegen.magic_tuple(), self._py_func.__qualname__
 
 
-def _njit(function, signature, options):
+class _CacheOfBodies(FunctionCache):
+    """Machine code of a function without its entry from Python, kept beside that with one."""
+
+    def _index_key(self, signature, codegen):
+        return signature, codegen.magic_tuple(), self._py_func.__qualname__, "body"
+
+
+def _with_signature(function, signature, options):
+    dispatcher = _with_entry(function, options)
+    dispatcher.compile(signature)
+    dispatcher.disable_compile()
+    return dispatcher
+
+
+def _with_entry(function, options):
     dispatcher = numba.njit(**options)(function)
     captured = [cell.cell_contents for cell in function.__closure__ or ()]
     if any(isinstance(value, Dispatcher) for value in captured):
         dispatcher._cache = _CacheByName(function)
     else:
         dispatcher.enable_caching()
-    if signature is not None:
-        dispatcher.compile(signature)
-        dispatcher.disable_compile()
+    return dispatcher
+
+
+def _body(function, options):
+    dispatcher = numba.njit(**options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    dispatcher._cache = _CacheOfBodies(function)
+    return dispatcher
+
+
+def _with_body(function, options):
+    """A kernel that Python and kernels may call: these its body alone, which is compiled apart.
+
+    The entry from Python takes apart all that it is given: for kernels that take records of a hundred arrays it is two
+    fifths of the time that the explicit loop takes to compile, and only the outermost of them is called from Python.
+    """
+    dispatcher = _with_entry(function, options)
+    body = functools.cache(lambda: _compile(lambda function: _body(function, options), function))
+    dispatcher.get_call_template = lambda args, kws: body().get_call_template(args, kws)
+    dispatcher.get_overload = lambda signature: body().get_overload(signature)
     return dispatcher
 
 
@@ -142,7 +172,9 @@ def kernel(signature=None, **options):
     Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
     """
     options = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
-    return lambda function: _compile(lambda named: _njit(named, signature, options), _named(function))
+    if signature is None:
+        return lambda function: _compile(lambda named: _with_body(named, options), _named(function))
+    return lambda function: _compile(lambda named: _with_signature(named, signature, options), _named(function))
 
 
 def record(cls):

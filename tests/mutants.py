@@ -220,7 +220,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/averages", "if passed >= CELLS:", "if passed > 0:"),
     Mutant("dynamics/integrators/tolerances", "near = 1e-3 * length.min()", "near = 1e-1 * length.min()"),
     Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
-    Mutant("dynamics/twin_error", "SPREAD = 3.0", "SPREAD = 1.5"),
+    Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "factor = 1.0 / (1.0 - share)", "factor = 1.0"),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
     Mutant("dynamics/history", 'scales["stress"] = 1.0 / net.area', 'scales["stress"] = net.area'),

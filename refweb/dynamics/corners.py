@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..registry import INTEGRATORS, load
-from .schedule import FEW_CORNERS, row_times
+from .schedule import row_times
+
+FEW_CORNERS = 20
+"""Corners of tables within a run, above which what they cost is told."""
 
 TOLD = 1.5
 """Factor on the number of steps from which it is told."""
 
 
-def corner_remark(scene, system):
-    """What corners of tables make of the steps of a run, in words; empty where they change little.
+def remarks_on_corners(scene, system):
+    """What corners of tables make of the steps of a run, a list of at most one sentence: none where it is little.
 
     Parameters
     ----------
@@ -25,17 +28,16 @@ def corner_remark(scene, system):
     corners = system.corners
     corners = corners[(corners > 0.0) & (corners < end)]
     if len(corners) <= FEW_CORNERS:
-        return ""
+        return []
     apart = f"{len(corners)} corners of tables, {end / len(corners):.3g} s apart on average, end steps"
     method = INTEGRATORS[scene.solve.method]
     integrator = load(method.integrator)(system, **method.keys_of(scene.solve))
     if not hasattr(integrator, "steps_in"):
-        return f"{apart}: {scene.solve.method} takes at least as many"
+        return [f"{apart}: {scene.solve.method} takes at least as many"]
     rows = row_times(scene)
     plain = integrator.steps_in(np.diff(rows)).sum()
     steps = integrator.steps_in(np.diff(np.union1d(rows, corners))).sum()
     if len(corners) < plain and steps < TOLD * plain:
-        return ""
-    return (
-        f"{apart}: {steps:.3g} steps, where stability and rows ask for {plain:.3g}, {steps / plain:.3g} times the work"
-    )
+        return []
+    work = f"{steps / plain:.3g} times the work"
+    return [f"{apart}: {steps:.3g} steps, where stability and rows ask for {plain:.3g}, {work}"]

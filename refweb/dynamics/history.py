@@ -17,6 +17,9 @@ from ..results.state import State
 from .integrators.events import Event
 from .integrators.integrator import AXES, VECTORS, History, Sum
 
+SPREAD = 3.0
+"""± of a result over its error if the method has its order."""
+
 
 def _scales_of_warnings(net):
     """What refweb warns of, by name: tension times a scale of each element, of which the largest value counts."""
@@ -144,10 +147,18 @@ class Watch:
         extreme = [o for o in self._probed if o.average is not None and o.reduce != "final"]
         return [o.name for o in extreme if np.isinf(values[self._slot(o)])]
 
-    def corrections(self, course):
-        """What extremes exceed the values at steps by, by name of the observable; ± is no less."""
+    def corrections(self, course, tolerance=0.0):
+        """What extremes exceed the values at steps by, by name of the observable; ± is no less.
+
+        A method that keeps a relative ``tolerance`` may find an extreme of an instant no better than that: run and twin
+        that agree more closely do so by chance.
+        """
         slots = {o.name: self._slot(o) for o in self._observables if o.reduce != "final"}
-        return {name: float(course.extremes.corrections[at]) for name, at in slots.items()}
+        extremes = course.extremes
+        return {
+            name: max(float(extremes.corrections[at]), SPREAD * tolerance * abs(float(extremes.values[at])))
+            for name, at in slots.items()
+        }
 
     def _slot(self, observable):
         """Number of the probe or, behind the probes, of the sum of an observable; None where none is looked at."""

@@ -11,8 +11,6 @@ import numpy as np
 BLOCK = 0.1
 """Time that a block of rows is meant to take [s]: between two of them a run can be interrupted, and tells where it is.
 """
-FEW_CORNERS = 20
-"""Corners of tables of which nothing is told: they cost next to nothing."""
 FEW, COMPARED = 10, 20
 """Number of rows below which a run and its twin are compared between rows as well, and at about how many times then."""
 MOST_ROWS = 10_000
@@ -54,15 +52,6 @@ def row_times(scene):
         return np.append(times, duration)
     times[-1] = duration
     return times
-
-
-def remarks_on_corners(scene, system):
-    """What corners of tables cost, in words, where they are more than `FEW_CORNERS` and change the steps of a run."""
-    if len(system.corners) <= FEW_CORNERS:
-        return []
-    from .corners import corner_remark
-
-    return [told] if (told := corner_remark(scene, system)) else []
 
 
 def times_between(times):

@@ -14,7 +14,7 @@ from .accuracy_loop import Standing, follow
 from .history import Watch
 from .initial_state import Start, equilibrium, remarks_on, stored
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
-from .schedule import Schedule, blocks, remarks_on_corners
+from .schedule import Schedule, blocks
 
 NO_TWIN = (
     "the run whose last state it starts from came to its end without a twin: ± holds what this run adds, not what the "
@@ -87,7 +87,9 @@ class Simulation:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
-        if kept is None:
+        if kept is None and len(system.corners):
+            from .corners import remarks_on_corners
+
             solution.warnings += remarks_on_corners(scene, system)
         if scene.solve.start != "equilibrium" and kept is None:
             solution.warnings += remarks_on(self.begin, system)
@@ -181,7 +183,9 @@ class Simulation:
                 tell((last + 1) / len(times))
         finally:
             self._note(course)
-        return Ended(self.watch.results(course, self._tables[-1][-1]), self.watch.corrections(course), course)
+        tolerance = self.standing.knob if integrator.knob == "rtol" else 0.0
+        corrections = self.watch.corrections(course, tolerance)
+        return Ended(self.watch.results(course, self._tables[-1][-1]), corrections, course)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin: time, then the observables in their order."""

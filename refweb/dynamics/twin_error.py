@@ -12,11 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..results.solution import Result
+from .history import SPREAD
 from .integrators.integrator import Course
 from .schedule import blocks
-
-SPREAD = 3.0
-"""± of a result over its error if the method has its order."""
 
 
 class TwinRun(NamedTuple):
@@ -122,15 +120,16 @@ def with_errors(results, corrections, twin, own, other, order=2.0):
     error, so that the error is twice the difference where that order holds (``order`` is that factor for the steps
     really taken). The error of CVODE and IDA goes with the tolerance to the power 2/3 at order 2, and faster at higher
     ones. Higher orders count as 2 here: peaks, contact and slack lines leave no more of them, for which the threefold
-    is taken as well. An extreme between steps is known no better than what it exceeds the values at steps by: run and
-    twin may find it alike. How often ± contains the truth is counted by ``python -m validation coverage``.
+    is taken as well. An extreme between steps is known no better than what it exceeds the values at steps by, and one
+    of CVODE or IDA no better than `SPREAD` times their relative tolerance: run and twin may find it alike. How often ±
+    contains the truth is counted by ``python -m validation coverage``.
 
     Parameters
     ----------
     results, twin : dict of str to refweb.results.solution.Result
         Of either run.
     corrections : dict of str to float
-        What extremes exceed the values at steps by.
+        What ± of extremes is at least.
     own, other : ndarray, shape (rows, columns)
         Rows of either history: time, then the observables in their order. Those of equal times are compared: the last
         ones differ where an event ends either run.

@@ -11,7 +11,7 @@ import pytest
 
 import refweb
 from refweb.dynamics import method_choice
-from refweb.dynamics.corners import corner_remark
+from refweb.dynamics.corners import remarks_on_corners
 from refweb.results.files import as_toml
 
 BEGIN = 0.0123
@@ -166,7 +166,7 @@ def trembling(corners, **solve):
 def test_more_corners_than_steps_are_told(solve):
     """The steps told are those taken, and those without the table; it is a warning of the run as well."""
     given, plain = trembling(1500, **solve), trembling(1500, **solve).replace(effects=())
-    told = corner_remark(given, given.build())
+    (told,) = remarks_on_corners(given, given.build())
     solution, without = refweb.run(given), refweb.run(plain)
     taken, asked = solution.solver["nsteps"], without.solver["nsteps"]
     found = re.fullmatch(
@@ -190,9 +190,9 @@ def test_few_corners_are_not_told(capsys, tmp_path):
         (tmp_path / "scene.toml").write_text(as_toml(given.to_dict()), encoding="utf-8")
         assert main(["check", str(tmp_path / "scene.toml")]) in (None, 0)
         out = capsys.readouterr().out
-        assert ("corners" in out) == said and bool(corner_remark(given, given.build())) == said
+        assert ("corners" in out) == said and bool(remarks_on_corners(given, given.build())) == said
     implicit = trembling(1500, method="cvode")
-    assert corner_remark(implicit, implicit.build()).endswith("end steps: cvode takes at least as many")
+    assert remarks_on_corners(implicit, implicit.build())[0].endswith("end steps: cvode takes at least as many")
 
 
 def test_auto_counts_corners(monkeypatch):

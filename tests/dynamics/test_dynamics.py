@@ -19,11 +19,10 @@ from scipy.integrate import DOP853
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics import schedule, simulation
-from refweb.dynamics.history import Watch
+from refweb.dynamics.history import SPREAD, Watch
 from refweb.dynamics.integrators import central_difference
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.integrators.integrator import History
-from refweb.dynamics.twin_error import SPREAD
 from refweb.results.state import State
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
