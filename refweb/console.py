@@ -77,9 +77,12 @@ def print_scene(scene, system):
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     corners = []
     if solve.kind == "dynamic" and len(system.corners):
-        from .dynamics.corners import remarks_on_corners
+        from .dynamics.schedule import FEW_CORNERS
 
-        corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
+        if len(system.corners) > FEW_CORNERS:
+            from .dynamics.corners import remarks_on_corners
+
+            corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
     _box(
         scene.title,
         [
@@ -118,6 +121,14 @@ def _results_over_time(results):
     return grid
 
 
+def _between(least, most, unit):
+    """An interval in words; an end of None is infinite."""
+    if least is None or most is None:
+        ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", least), ("below", most)) if end is not None]
+        return "".join(ends) or "on its axis"
+    return f"from {least:.6g} to {most:.6g} {unit}"
+
+
 def _horizon(horizon):
     """How long a motion is determined, in words."""
     ended = [(k, time) for k, time in horizon["digits"] if time is not None]
@@ -139,6 +150,9 @@ def print_run(summary, more=()):
     if summary["results"]:
         if any(r["error"] is None for r in summary["results"].values()):
             rows.append(("", "a value without ± has no known error"))
+        for name, r in summary["results"].items():
+            if r.get("interval") is not None:
+                rows.append(("", f"{name} lies anywhere {_between(*r['interval'], r['unit'])}"))
         for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
             found = {n: r for n, r in summary["results"].items() if r.get(key) is not None}
             if found:

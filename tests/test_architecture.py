@@ -197,6 +197,7 @@ def test_one_table_names_the_effects():
         "results.state",
         "statics.interior_point",
         "statics.duality_bound",
+        "statics.floating",
         "system.system",
     }
     assert all(names == {"effects.elasticity"} for names in found.values())

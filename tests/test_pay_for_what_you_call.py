@@ -44,7 +44,7 @@ EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable
 TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium", "system.unsupported_parts"}
 LOAD_STEPS = {"statics.simulation", "statics.remarks"}
-NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.energy_search"}
+NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.floating", "statics.energy_search"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book")}
@@ -122,12 +122,13 @@ def called(given):
     if solve["kind"] == "dynamic" and given.get("accuracy", {}).get("error") != "none":
         modules.add("dynamics.twin_error")
     if rests:
+        modules.add("statics.remarks")
         if method != "relaxation":
             modules |= NEWTON
         if "frame" in given:
             modules |= TANGENT | {"statics.critical_speed"}
         elif tension_only:
-            modules |= TANGENT | {"statics.duality_bound"}
+            modules |= TANGENT | {"statics.duality_bound", "statics.floating"}
         if given.keys() & {"pressure", "thrust"}:
             modules.add("statics.residual_search")
     if modules >= TANGENT:

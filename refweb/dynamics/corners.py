@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..registry import INTEGRATORS, load
-from .schedule import row_times
-
-FEW_CORNERS = 20
-"""Corners of tables within a run, above which what they cost is told."""
+from .schedule import FEW_CORNERS, row_times
 
 TOLD = 1.5
 """Factor on the number of steps from which it is told."""

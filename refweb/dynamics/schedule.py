@@ -11,6 +11,8 @@ import numpy as np
 BLOCK = 0.1
 """Time that a block of rows is meant to take [s]: between two of them a run can be interrupted, and tells where it is.
 """
+FEW_CORNERS = 20
+"""Corners of tables of which nothing is told: they cost next to nothing."""
 FEW, COMPARED = 10, 20
 """Number of rows below which a run and its twin are compared between rows as well, and at about how many times then."""
 MOST_ROWS = 10_000

@@ -14,7 +14,7 @@ from .accuracy_loop import Standing, follow
 from .history import Watch
 from .initial_state import Start, equilibrium, remarks_on, stored
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
-from .schedule import Schedule, blocks
+from .schedule import FEW_CORNERS, Schedule, blocks
 
 NO_TWIN = (
     "the run whose last state it starts from came to its end without a twin: ± holds what this run adds, not what the "
@@ -87,7 +87,7 @@ class Simulation:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
-        if kept is None and len(system.corners):
+        if kept is None and len(system.corners) > FEW_CORNERS:
             from .corners import remarks_on_corners
 
             solution.warnings += remarks_on_corners(scene, system)
@@ -151,8 +151,12 @@ class Simulation:
 
     def _settle(self, tell):
         """Begin at the equilibrium."""
+        from ..statics.remarks import remark_on_open
+
         found = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
         self.begin = Start(found.x)
+        if text := remark_on_open(State(self.system, 0.0, found.x), found):
+            self.solution.warnings.append(f"of the equilibrium it starts from: {text}")
         if found.stats.get("smallest_pivot") == -1:
             self.solution.warnings.append(
                 "the equilibrium it starts from is a saddle (a pivot of its tangent is negative): the motion "

@@ -28,7 +28,8 @@ class Result(NamedTuple):
 
     ``error`` is that of the solution of the scene as it stands. In statics ``smoothing`` is how far a smooth law's η
     moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
-    elements; None where it was not looked for.
+    elements; None where it was not looked for. ``interval`` are the least and the largest value in all equilibria,
+    where parts of the web float; an end that nothing holds is infinite.
     """
 
     value: float
@@ -38,10 +39,13 @@ class Result(NamedTuple):
     where: int | None
     smoothing: float | None = None
     discretisation: float | None = None
+    interval: tuple[float, float] | None = None
 
     def plain(self):
-        """As a dict, without the errors that were not looked for."""
+        """As a dict, without the errors that were not looked for; an end of an interval that is infinite is None."""
         extra = {key: value for key in ("smoothing", "discretisation") if (value := getattr(self, key)) is not None}
+        if self.interval is not None:
+            extra["interval"] = [end if np.isfinite(end) else None for end in self.interval]
         return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
 
 

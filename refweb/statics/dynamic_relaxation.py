@@ -127,8 +127,10 @@ class Relaxation:
         state = Equilibrium(t, x, per_cell.tension.copy(), f, stats)
         if system.convex:
             from .duality_bound import duality_bound
+            from .floating import between_slack_lines
 
             state.duality_bound = duality_bound(system, state)
+            state.floating = between_slack_lines(system, state)
         return state
 
     def _inverse_mass(self, t):

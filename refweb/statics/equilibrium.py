@@ -48,7 +48,9 @@ class Equilibrium:
         Of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional
         Displacements by which x may be off [m]: the first what is left of the residual, the others what the rounding of
-        forces may come to; None where the tangent is singular.
+        forces may come to, but for moves at no cost; None where no tangent is at hand.
+    floating : refweb.statics.floating.Floating, optional
+        What may move at no cost; None where nothing does, or nothing tells.
     """
 
     step: float
@@ -58,6 +60,7 @@ class Equilibrium:
     stats: dict = field(default_factory=dict)
     duality_bound: object = None
     deviations: object = None
+    floating: object = None
 
 
 def check_supported(system, t):

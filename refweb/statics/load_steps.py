@@ -47,11 +47,13 @@ def solve(system, load_steps, progress=None):
     newton, x = Newton(system, progress, load_steps[0]), np.zeros((system.rows, 3))
     for k, t in enumerate(load_steps):
         state = _equilibrium(newton, t, x, warm=k > 0)
-        state.deviations = newton.deviations(state)
         if system.convex:
             from .duality_bound import duality_bound
+            from .floating import between_slack_lines
 
             state.duality_bound = duality_bound(system, state, newton.factor)
+            state.floating = between_slack_lines(system, state)
+        state.deviations = newton.deviations(state)
         x = state.x
         yield state
 

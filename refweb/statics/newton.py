@@ -22,6 +22,7 @@ from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor, Lu
 from .energy_search import EnergySearch
 from .equilibrium import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
+from .floating import NullSpace
 
 
 class Iterate(NamedTuple):
@@ -208,11 +209,20 @@ class Newton:
         """`Equilibrium.deviations`: what the tangent makes of the residual and of rounding, of either sign at random.
 
         Rounding of a line's ends and of its tension leaves a force of machine precision times T + k |x| at its nodes.
+        Moves at no cost are left out; where no duality bound tells what floats, the null space of the tangent does.
         """
         system, net, sign = self.system, self.system.net, state.stats.get("smallest_pivot")
+        tiny = 1e-12 * self.axial
         if sign is None:
-            self.factor.update(self._matrix(state.step, state.x, 1e-12 * self.axial, False))
+            self.factor.update(self._matrix(state.step, state.x, tiny, False))
             state.stats["nlu"] += 1
+        solve = self.factor.solve
+        if sign != 1 and len(system.free):
+            null = NullSpace(self.factor, tiny * system.pattern.matrix(self.geometric))
+            if state.duality_bound is None:
+                state.floating = null.floating(system)
+            if state.floating is not None:
+                solve = null.solve
         stiffness = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(state.step)
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
         size = np.zeros(system.rows)
@@ -221,7 +231,7 @@ class Newton:
         forces = [state.force.ravel()[system.free], *(signs * np.repeat(size, 3)[system.free])]
         found = np.zeros((len(forces), system.rows, 3))
         for deviation, force in zip(found, forces, strict=True):
-            if sign == 0 or (p := self.factor.solve(force)) is None:
+            if (p := solve(force)) is None:
                 return None
             deviation.ravel()[system.free] = p
         return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark, strength_remark
 
@@ -25,7 +27,26 @@ class Remarks:
             yield made[-1][1] + (f" (load step {steps})" if len(made) < self._steps else "")
 
 
-def remarks_on(state, stats, utilisation):
+def open_rows(state, equilibrium):
+    """Nodes whose position an equilibrium leaves open: those that float, else those that only slack lines hold."""
+    return state.slack_nodes if equilibrium.floating is None else equilibrium.floating.rows
+
+
+def remark_on_open(state, equilibrium):
+    """What a reader has to know of positions that an equilibrium leaves open; empty where there are none."""
+    open_ = open_rows(state, equilibrium)
+    if not len(open_):
+        return ""
+    some = ", ".join(map(str, open_[:4])) + (", ..." if len(open_) > 4 else "")
+    how = "stand in parts that only slack lines hold"
+    if np.isin(open_, state.slack_nodes).all():
+        how = "hang on slack lines only"
+    elif equilibrium.floating.parts is None:
+        how = "can move at no cost"
+    return f"{len(open_)} nodes {how}, their positions are not unique: {some}"
+
+
+def remarks_on(state, stats, utilisation, equilibrium):
     """Of an equilibrium: pairs of a kind and a text."""
     net = state.system.net
     for text in floor_remark(net, float(state.stress.max())):
@@ -37,8 +58,7 @@ def remarks_on(state, stats, utilisation):
         if state.system.rotating:
             reason = "the web would leave this state by itself; start from a web that is deflected"
         yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
-    if stats["slack_nodes"]:
-        some = ", ".join(map(str, state.slack_nodes[:4])) + (", ..." if len(state.slack_nodes) > 4 else "")
-        yield "slack", f"{stats['slack_nodes']} nodes hang on slack lines only, their positions are not unique: {some}"
+    if text := remark_on_open(state, equilibrium):
+        yield "slack", text
     for text in strength_remark(utilisation):
         yield "strength", text

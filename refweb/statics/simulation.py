@@ -12,7 +12,7 @@ from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.solution import SOLVER, Result
 from ..results.state import State
-from .remarks import Remarks, remarks_on
+from .remarks import Remarks, open_rows, remarks_on
 
 
 class Simulation:
@@ -88,7 +88,7 @@ class Simulation:
         stats = {key: found.stats.get(key) for key in SOLVER} | {
             "method": scene.solve.method,
             "duality_gap": found.duality_bound.gap if found.duality_bound else None,
-            "slack_nodes": len(state.slack_nodes),
+            "slack_nodes": len(open_rows(state, found)),
         }
         self._totals = {key: total + stats[key] for key, total in self._totals.items()}
         solution.steps.append({"step": found.step, "results": results, "solver": stats})
@@ -96,7 +96,7 @@ class Simulation:
         solution.state = state
         if (used := state.utilisation) is not None:
             solution.utilisation = float(used.max()), int(used.argmax())
-        self._remarks.note(found.step, remarks_on(state, stats, solution.utilisation))
+        self._remarks.note(found.step, remarks_on(state, stats, solution.utilisation, found))
         return row
 
     def _results(self, found, state, smoothing):
@@ -108,7 +108,7 @@ class Simulation:
         if smoothing is not None:
             smoothed = smoothing.errors(found, [value.value for value in values])
         return {
-            o.name: Result(value.value, error, o.unit, found.step, value.where, moved)
+            o.name: Result(value.value, error, o.unit, found.step, value.where, moved, None, o.interval(state, found))
             for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)
         }
 

@@ -7,10 +7,11 @@ import numpy as np
 from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
+from ..statics.remarks import remark_on_open
 from .pencil import STRAIN
 
 
-def remarks_on(here, state):
+def remarks_on(here, state, equilibrium):
     """What a reader of the modes of an equilibrium has to know: pairs of a kind and a text."""
     net = state.system.net
     if here.unstable:
@@ -21,8 +22,8 @@ def remarks_on(here, state):
         )
     if here.zero:
         yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
-    if count := len(state.slack_nodes):
-        yield "slack", f"{count} nodes hang on slack lines only, their positions are not unique"
+    if text := remark_on_open(state, equilibrium):
+        yield "slack", text
     kinked = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
     if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
         yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"

@@ -15,7 +15,7 @@ from ..results.solution import SOLVER, Result, as_history
 from ..results.state import State
 from ..scene import Scene
 from ..solution import Solution
-from ..statics.remarks import Remarks
+from ..statics.remarks import Remarks, open_rows
 from ..tables import checked, integer
 from .mode_remarks import left_out, remarks_on
 from .spectrum import spectrum
@@ -173,12 +173,12 @@ def _follow(found, rest, number, tell):
             "method": method,
             "duality_gap": equilibrium.duality_bound.gap if equilibrium.duality_bound else None,
             "smallest_pivot": -1 if here.unstable else 0 if here.zero else 1,
-            "slack_nodes": len(found.state.slack_nodes),
+            "slack_nodes": len(open_rows(found.state, equilibrium)),
         }
         totals = {key: totals[key] + stats[key] for key in totals}
         found.solver = {**stats, **totals}
         found.steps.append({"step": here.step, "results": _results(here), "solver": stats, **_described(here)})
-        remarks.note(here.step, remarks_on(here, found.state))
+        remarks.note(here.step, remarks_on(here, found.state, equilibrium))
         found.warnings = list(remarks.texts())
 
 

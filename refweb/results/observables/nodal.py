@@ -56,12 +56,40 @@ class Nodal(Observable):
         consecutive = len(rows) == 1 or (np.diff(rows) == 1).all()
         return [component, rows[0], rows[-1] + 1] if consecutive else [component, -1, -1, *rows]
 
-    def error(self, state, equilibrium):
-        """None at a node that only slack lines hold, whose position is not unique."""
-        return None if self.of(state).where in state.slack_nodes else super().error(state, equilibrium)
+
+class Place(Nodal):
+    """A vector of each row that its position makes: open where the row floats."""
+
+    def floats(self, state, equilibrium):
+        """Whether the row with the largest value may move at no cost, or another one pass it."""
+        floating = equilibrium.floating
+        if floating is None:
+            return bool(np.isin(self.rows(state.system), state.slack_nodes).any())
+        rows, component = self.rows(state.system), self.observe.component
+        axes = slice(None) if component is None else [component]
+        open_ = floating.free[rows][:, axes].any(axis=1)
+        if not open_.any():
+            return False
+        sizes = self.sizes(self.vectors(state)[rows])
+        if open_[np.argmax(sizes)] or floating.parts is None:
+            return True
+        least, largest = floating.parts.reach[:, rows] + (self.vectors(state) - state.position)[rows]
+        most = np.linalg.norm(np.maximum(-least, largest), axis=1) if component is None else largest[:, component]
+        return bool((most[open_] > sizes.max()).any())
+
+    def interval(self, state, equilibrium):
+        """How far one row can go along one axis, see `refweb.statics.floating.Parts.limits`."""
+        rows, axis, floating = self.rows(state.system), self.observe.component, equilibrium.floating
+        if floating is None or floating.parts is None or axis is None or len(rows) > 1 or not floating.free[rows, axis]:
+            return None
+        limits = floating.parts.limits(rows[0], axis)
+        if limits is None:
+            return None
+        shift = float((self.vectors(state) - state.position)[rows[0], axis])
+        return tuple(float(limit) + shift for limit in limits)
 
 
-class Displacement(Nodal):
+class Displacement(Place):
     """Displacement from the reference position."""
 
     unit = "m"
@@ -78,7 +106,7 @@ class Displacement(Nodal):
         return Probe(displacement, self.numbers(rows), np.zeros((len(rows), 3)))
 
 
-class Position(Nodal):
+class Position(Place):
     """Place in space."""
 
     unit = "m"

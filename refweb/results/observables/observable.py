@@ -61,9 +61,10 @@ class Observable:
         """± of the value in a `refweb.statics.equilibrium.Equilibrium`, None where none is known.
 
         An estimate from the equilibrium's deviations: what the residual makes of the value, three times what rounding
-        makes of it, and the rounding of the value itself.
+        makes of it, and the rounding of the value itself. None is known of a value that changes where parts of the net
+        float.
         """
-        if equilibrium.deviations is None:
+        if equilibrium.deviations is None or self.floats(state, equilibrium):
             return None
         value, changes = self.of(state).value, []
         for deviation in equilibrium.deviations:
@@ -72,3 +73,19 @@ class Observable:
             there = type(state)(state.system, state.time, state.x + share * deviation)
             changes.append(abs(self.of(there).value - value) / share if share > 0.0 else 0.0)
         return float(changes[0] + 3.0 * max(changes[1:]) + 2.0 * np.finfo(float).eps * abs(value))
+
+    def floats(self, state, equilibrium):
+        """Whether moves at no cost change the value, beside what other moves of their size change."""
+        if equilibrium.floating is None:
+            return False
+        value, share = self.of(state).value, 1e-7 * state.system.natural_length(state.time).min()
+        some = np.random.default_rng(0).uniform(-1.0, 1.0, state.x.shape) * ~state.system.supported
+
+        def change(move):
+            return abs(self.of(type(state)(state.system, state.time, state.x + share * move)).value - value)
+
+        return max(map(change, equilibrium.floating.moves)) > 1e-4 * change(some)
+
+    def interval(self, state, equilibrium):
+        """Least and largest value in all equilibria, where parts of the net float; None where that is not known."""
+        return None

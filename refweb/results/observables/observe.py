@@ -114,6 +114,10 @@ class Observe(Table):
         """
         return self.observable.error(state, equilibrium)
 
+    def interval(self, state, equilibrium):
+        """Least and largest value in all equilibria, where the value is open and these are known."""
+        return self.observable.interval(state, equilibrium)
+
     def probe(self, system):
         """The `refweb.results.probes.Probe` that follows it, with the sign of its peaks and its window."""
         return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)
