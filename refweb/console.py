@@ -171,6 +171,8 @@ def print_run(summary, more=()):
         text += f", residual {solver['residual']:.1e}"
         if solver["duality_gap"] is not None:
             text += f", duality gap {solver['duality_gap']:.1e} J"
+        if (above := solver.get("above_lowest")) is not None:
+            text += f", at most {above:.1e} J above the lowest state" if above else ", the lowest state, proven"
         rows.append(("solver", text))
     if solver["energy_drift"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} steps, energy drift {solver['energy_drift']:.1e}"

@@ -10,8 +10,8 @@ import numpy as np
 from ..messages import nearest
 
 SOLVER = dict.fromkeys(
-    "method nsteps nfev njev nlu residual duality_gap smallest_pivot slack_nodes energy_drift momentum_drift "
-    "angular_momentum_drift".split()
+    "method nsteps nfev njev nlu residual duality_gap above_lowest smallest_pivot slack_nodes energy_drift "
+    "momentum_drift angular_momentum_drift".split()
 )
 """What a solver reports; None for what it does not know."""
 

@@ -76,6 +76,10 @@ def _equilibrium(newton, t, x, warm):
                 state = _by_stiffening(newton, t, x, spent)
             else:  # slack lines that push fold up, one after another
                 state = _by_patience(newton, t, x)
+    if law != TENSION_ONLY and newton.system.dead:
+        from .lowest import lowest
+
+        state = lowest(newton, state)
     if not (convex or newton.follows):
         state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
     _add(state.stats, spent)

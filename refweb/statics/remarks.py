@@ -60,5 +60,13 @@ def remarks_on(state, stats, utilisation, equilibrium):
         yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
+    if starts := equilibrium.stats.get("starts"):
+        apart = max(starts) - min(starts)
+        if apart > 1e-9 * max(map(abs, starts)):
+            yield (
+                "starts",
+                f"two starts lead to two equilibria, {apart:.3g} J apart: this is the lower one, a third may be "
+                'lower still; law = "tension-only" has no such states',
+            )
     for text in strength_remark(utilisation):
         yield "strength", text

@@ -83,12 +83,15 @@ def check_results(results):
 
 def check_solver(solver):
     counts = ["nsteps", "nfev", "njev", "nlu"]
-    bounds = ["residual", "duality_gap", "smallest_pivot", "slack_nodes"]
+    bounds = ["residual", "duality_gap", "above_lowest", "smallest_pivot", "slack_nodes"]
     drifts = ["energy_drift", "momentum_drift", "angular_momentum_drift"]
     assert list(solver) == ["method", *counts, *bounds, *drifts] and solver["method"] == "newton"
     assert all(type(solver[key]) is int and solver[key] > 0 for key in counts)
     assert 0.0 <= solver["residual"] <= 1e-9 and solver["duality_gap"] > 0.0
-    assert all(solver[key] is None for key in ("smallest_pivot", *drifts)) and type(solver["slack_nodes"]) is int
+    assert (
+        all(solver[key] is None for key in ("above_lowest", "smallest_pivot", *drifts))
+        and type(solver["slack_nodes"]) is int
+    )
 
 
 def test_run_json(written, web):

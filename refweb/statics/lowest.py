@@ -1,0 +1,119 @@
+"""Whether an equilibrium is the one of the lowest energy, and the lower of two where that is not proven.
+
+Of a law whose tension rises with the strain ε and is 0 at ε = 0, the energy W(ε) is at least W(max(ε, 0)), which is
+convex in the positions. Under dead loads a state in which no line pushes is the lowest of that convex potential, and so
+of the potential itself: proven, at no cost. Where lines push, another start is tried: the equilibrium of the same net
+without smoothing, whose energy is convex, and from there Newton's method to the law's own. Forces s of lines that
+balance the loads, as those of that equilibrium do, bound what a state x may lie above the lowest, in the way of
+`refweb.statics.duality_bound`, by
+
+    Σ L (W(ε) + |s| (1 + ε_s) − W(ε_s)) − s·d,
+
+a sum of terms that are never negative, with T(ε_s) = |s| and the vector d of a line: what the lines that push hold, and
+next to nothing besides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.elasticity import strains
+from ..errors import SolverError
+from ..net.net import AXIAL_STIFFNESS, G0, R0, SLACKNESS, SMOOTHING
+from ..net.tension_laws import SMOOTH
+
+NOTHING = 1e-9
+"""Energy over that of the lines and of the loads which counts as none."""
+SPENT = ("nsteps", "nfev", "njev", "nlu")
+
+
+def lowest(newton, state):
+    """The equilibrium that is lowest as far as is known, with ``above_lowest`` [J] and ``starts`` in its stats.
+
+    Parameters
+    ----------
+    newton : refweb.statics.newton.Newton
+        Of a system under dead loads.
+    state : refweb.statics.equilibrium.Equilibrium
+        What it has found.
+
+    Returns
+    -------
+    refweb.statics.equilibrium.Equilibrium
+        Whose stats say how far it may lie above the lowest, 0 where it is proven to be that and None where nothing
+        bounds it, and the energies [J] of the equilibria from two starts, where a second one was tried.
+    """
+    system = newton.system
+    pushes = bool((state.tension < 0.0).any())
+    state.stats["above_lowest"] = None if pushes else 0.0
+    if not pushes or system.net.law.number != SMOOTH:
+        return state
+    try:
+        plain = _without_smoothing(newton, state)
+    except SolverError:
+        return state
+    state.stats |= {key: state.stats[key] + plain.stats[key] for key in SPENT}
+    forces = _forces(system, plain)
+    above, none = _above(system, state, forces), NOTHING * _scale(system, state)
+    if above > none:
+        try:
+            other = newton.solve(state.step, plain.x, warm=True)
+        except SolverError:
+            other = state
+        spent = {key: state.stats[key] + other.stats[key] for key in SPENT} if other is not state else {}
+        starts = [system.energy(state.step, one.x) for one in (state, other)]
+        if starts[1] < starts[0] - none:
+            state, above = other, _above(system, other, forces)
+        state.stats |= {**spent, "starts": starts}
+    state.stats["above_lowest"] = above
+    return state
+
+
+def _without_smoothing(newton, state):
+    """The equilibrium of the same net at η = 0."""
+    numbers = newton.system.net.line_data.copy()
+    numbers[:, [SMOOTHING, G0]] = 0.0
+    numbers[:, R0] = np.abs(numbers[:, SLACKNESS])
+    return type(newton)(newton.system.with_line_data(numbers), newton.progress, state.step).solve(state.step, state.x)
+
+
+def _vectors(net, x):
+    """Vector of each bar [m], shape (bars, 3)."""
+    return net.bars @ net.points + net.bars @ x
+
+
+def _forces(system, plain):
+    """Forces of the bars in an equilibrium at η = 0, vectors [N] of shape (bars, 3)."""
+    net = system.at(plain.step).net
+    strain = strains(net, plain.x).ravel()
+    points = len(net.weights)
+    axial, slackness = (np.repeat(net.line_data[:, column], points) for column in (AXIAL_STIFFNESS, SLACKNESS))
+    line = _vectors(net, plain.x)
+    length = np.linalg.norm(line, axis=1)
+    tension = axial * np.maximum(strain - slackness, 0.0)
+    return (tension / np.where(length > 0.0, length, 1.0))[:, None] * line
+
+
+def _above(system, state, forces):
+    """How far a state may lie above the lowest one [J], by forces that balance the loads."""
+    net = system.at(state.step).net
+    points, law = len(net.weights), net.law
+    natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.natural_length, points)
+    axial, slackness, smoothing, g0 = (
+        np.repeat(net.line_data[:, column], points) for column in (AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0)
+    )
+    size = np.linalg.norm(forces, axis=1)
+    g = size / axial + g0  # = (s + √(s² + 4η²))/2 at s = ε − ε0, so that s = g − η²/g
+    there = np.where(size > 0.0, slackness + g - smoothing**2 / np.where(g > 0.0, g, 1.0), 0.0)
+    stored = axial * (
+        law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
+        - law.energy_density(there, 1.0, slackness, smoothing)
+    )
+    along = (forces * _vectors(net, state.x)).sum(axis=1)
+    above = float((natural * (stored + size * (1.0 + there)) - along).sum())
+    return max(above, 0.0) + 2.0 * np.finfo(float).eps * float(np.abs(along).sum())
+
+
+def _scale(system, state):
+    """Energy of the lines and of the loads [J], without signs."""
+    return sum(float(np.abs(system.energy_of(f, state.step, state.x)).sum()) for f in system.families)
