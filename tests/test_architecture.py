@@ -198,6 +198,7 @@ def test_one_table_names_the_effects():
         "statics.interior_point",
         "statics.duality_bound",
         "statics.floating",
+        "statics.lowest",
         "system.system",
     }
     assert all(names == {"effects.elasticity"} for names in found.values())

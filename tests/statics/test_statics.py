@@ -89,11 +89,12 @@ def test_paper_webs_from_flat(mesh, smoothing):
     """The work promised for every web and smoothing: 25 factorizations from flat, 35 without smoothing, then 8 each.
 
     The count includes those of the pivot check. A net under a normal load is taut or slack, not compressed: K has no
-    negative pivot.
+    negative pivot. Where slack lines push a little, under the floor of the law, a second start takes as many again,
+    and more where the floor is so high that the net without it stands elsewhere.
     """
     found, gaps = paper_series(mesh, smoothing)
-    counts = [f.stats["nlu"] for f in found]
-    assert counts[0] <= (25 if smoothing else 35) and max(counts[1:]) <= 8, counts
+    counts, most = [f.stats["nlu"] for f in found], 2.5 if any((f.tension < 0.0).any() for f in found) else 1.0
+    assert counts[0] <= most * (25 if smoothing else 35) and max(counts[1:]) <= most * 8, counts
     assert max(f.stats["residual"] for f in found) <= RESIDUAL
     assert all(gap <= GAP for gap in gaps)
     if smoothing:
