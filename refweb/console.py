@@ -90,10 +90,23 @@ def print_scene(scene, system):
             ("", f"{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg"),
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
+            *_stiffness(scene, system),
             ("solve", how),
             *corners,
         ],
     )
+
+
+def _stiffness(scene, system):
+    """Rows of the box on the stiffness of contact that refweb has chosen."""
+    for body in system.net.bodies if scene.chosen else ():
+        if body.name in scene.chosen:
+            from .effects.contact.overlap import allowed
+
+            stiffness, exponent = scene.contact.law_of(body)
+            unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
+            text = f'stiffness {stiffness:g} {unit} for body "{body.name}", chosen for an overlap of at most '
+            yield "contact", text + readable(allowed(body), None, "m")
 
 
 def _results_of_steps(steps):
@@ -165,6 +178,10 @@ def print_run(summary, more=()):
             rows.append(
                 ("", f"{name} {readable(r['mean'], r['deviation'], unit)} over the ensemble, standard deviation")
             )
+    for name, body in summary.get("bodies", {}).items():
+        text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
+        text += f" at line {body['line']}" if body["line"] is not None else ""
+        rows.append(("contact", f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]))
     rows += more
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"

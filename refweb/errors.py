@@ -31,6 +31,17 @@ class OpenBook(NoEnd):
         self.drift = drift
 
 
+class TooSoft(SolverError):
+    """A run whose contact, of a stiffness that refweb chose, lets lines too deep into bodies.
+
+    ``stiffness`` is what each of these bodies is to have instead [N/m^p], by name.
+    """
+
+    def __init__(self, message, stiffness):
+        super().__init__(message)
+        self.stiffness = stiffness
+
+
 @contextlib.contextmanager
 def refused_at(place):
     """Begin what is refused inside with its place, such as ``[web]`` or ``net.toml:``."""

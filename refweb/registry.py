@@ -54,6 +54,7 @@ OBSERVABLES = {
     "dissipated_energy": "refweb.results.observables.book:DissipatedEnergy",
     "total_energy": "refweb.results.observables.book:TotalEnergy",
     "work": "refweb.results.observables.book:Work",
+    "overlap": "refweb.results.observables.overlap:Overlap",
     "slack_fraction": "refweb.results.observables.slack_fraction:SlackFraction",
     "step_size": "refweb.results.observables.book:StepSize",
 }

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import pathlib
 import time
 
 import numpy as np
 
-from .errors import InputError, in_file
+from .errors import InputError, TooSoft, in_file
 from .messages import short
 from .results.folder import Folder, check_folder, read_summary
 from .results.provenance import versions, web_of
@@ -15,6 +16,11 @@ from .results.run_status import Clock, recorded
 from .results.solution import as_history
 from .scene import Scene
 from .solution import Solution
+
+STIFFENINGS = 8
+"""Largest number of times that a run is repeated with a stiffer contact."""
+MOST_TIMES = 200
+"""Largest number of times at which it is looked whether what acts from outside moves anything."""
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):
@@ -85,7 +91,8 @@ def resume(folder, progress=None, announce=None):
         raise InputError(f"{name} holds no run.json and scene.toml of a run: use refweb run")
     if summary.get("status") == "solved":
         raise InputError(f"{name} holds a solved run: there is nothing to go on with")
-    scene = Scene.load(folder / "scene.toml")
+    chosen = tuple(name for name, body in summary.get("bodies", {}).items() if body["chosen"])
+    scene = Scene.load(folder / "scene.toml").replace(chosen=chosen)
     if "kind" in summary or scene.solve.kind == "static":
         raise InputError(f"{name} holds no dynamic run, and nothing else has checkpoints: use refweb run --force")
     check_folder(folder, force=True)
@@ -96,14 +103,29 @@ def resume(folder, progress=None, announce=None):
 
 
 def _solve(scene, out, progress, announce, kept=None, summary=None):
-    """Solve a scene; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on."""
-    clock = Clock()
+    """Solve a scene, with a stiffer contact as often as one that refweb chose is too soft; see `_attempt`."""
+    clock, scene, told = Clock(), scene.settled(), []
+    while True:
+        try:
+            return _attempt(scene, out, progress, announce, clock, told, kept, summary)
+        except TooSoft as soft:
+            told.append(str(soft))
+            scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
+            if len(told) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
+                scene = scene.replace(chosen=())
+
+
+def _attempt(scene, out, progress, announce, clock, told, kept=None, summary=None):
+    """Solve a scene as it stands.
+
+    ``told`` are warnings to begin with; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on.
+    """
     system = scene.build()
     if announce is not None:
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=versions())
     if kept is None:
-        solution.warnings += _notices(scene, system)
+        solution.warnings += [*told, *_notices(scene, system)]
     else:
         solution.warnings += _before(kept, summary, system, solution.versions)
     simulation = simulation_of(scene, system, solution, kept)
@@ -175,10 +197,26 @@ def simulation_of(scene, system, solution, kept=None):
 def _notices(scene, system):
     if system.net.bodies and not system.contact:
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
+    yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))
     if scene.solve.kind == "static" and (parts := system.unsupported_parts):
         axes = ", ".join(sorted({"xyz"[part.axis] for part in parts}))
         nodes = np.unique(np.concatenate([part.rows for part in parts]))
         yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
+
+
+def _idle(system, times):
+    """Warnings of what acts from outside on supports alone, at some times."""
+    for family in system.families:
+        if family.internal or family.angular_velocity is not None:
+            continue
+        times = sorted({*times, *family.times})
+        between = [0.5 * (one + other) for one, other in itertools.pairwise(times)]
+        felt = [system.force_of(family, t, np.zeros((system.rows, 3))) != 0.0 for t in (*times, *between)[:MOST_TIMES]]
+        acts = np.any(felt, axis=0)
+        if acts.any() and not (acts & ~system.supported).any():
+            rows = np.flatnonzero(acts.any(axis=1))
+            names = ", ".join(map(system.row_name, rows[:4])) + (", ..." if len(rows) > 4 else "")
+            yield f"the {family.name} on {names} acts on supports alone, which take it: it moves nothing"
 
 
 def _cpu_by_effect(system, solution):

@@ -12,7 +12,7 @@ import re
 import tomllib
 from dataclasses import dataclass, field, replace
 
-from .errors import InputError, in_file
+from .errors import InputError, in_file, refused_at
 from .messages import nearest, short, shown
 from .registry import EFFECTS, WEBS, load, name_of
 from .settings import START_STATES, Accuracy, Dynamic, Event, Output, Static, Supports
@@ -88,6 +88,7 @@ class Scene:
     seed: int = 0
     folder: pathlib.Path | None = field(default=None, compare=False)
     file: str = field(default="", compare=False)
+    chosen: tuple = field(default=(), compare=False)
 
     def __post_init__(self):
         for key, kind in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
@@ -236,8 +237,38 @@ class Scene:
         """A scene that differs in some fields."""
         return replace(self, **changes)
 
+    @property
+    def contact(self):
+        """Its ``[contact]``, None where there is none."""
+        return next((effect for effect in self.effects if name_of(EFFECTS, effect) == "contact"), None)
+
+    def with_stiffness(self, stiffness):
+        """The scene with another stiffness of contact for some bodies, by name, as refweb's choice."""
+        contact = self.contact
+        effects = tuple(e.with_stiffness(stiffness) if e is contact else e for e in self.effects)
+        return self.replace(effects=effects, chosen=tuple(dict.fromkeys([*self.chosen, *stiffness])))
+
+    def settled(self):
+        """The scene with the stiffness of contact that it leaves out; itself where it leaves out none.
+
+        Names of the bodies that it is chosen for stand in ``chosen``.
+        """
+        bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
+        missing = self.contact.left_out(bodies) if bodies else ()
+        if not missing:
+            return self
+        from .effects.contact.overlap import first_stiffness
+
+        system, steps = self.with_stiffness(dict.fromkeys(missing, 1.0)).build(), getattr(self.solve, "load_steps", ())
+        with in_file(self.file), refused_at("[contact]"):
+            return self.with_stiffness({
+                body.name: first_stiffness(system, body, self.contact.law_of(body)[1], steps)
+                for body in system.net.bodies
+                if body.name in missing
+            })  # fmt: skip
+
     def build(self):
-        """The `refweb.system.system.System` of this scene.
+        """The `refweb.system.system.System` of this scene, with the stiffness of contact that it leaves out chosen.
 
         Raises
         ------
@@ -246,6 +277,8 @@ class Scene:
         """
         from .build import build
 
+        if (settled := self.settled()) is not self:
+            return settled.build()
         with in_file(self.file):
             return build(
                 web=self.web,

@@ -37,7 +37,8 @@ MIRRORS = {
     "net/tension_laws": "net/test_laws.py net/test_elements.py",
     "net/rigid_body": "effects/test_contact.py test_contract.py",
     "net/shapes": "effects/test_contact.py",
-    "effects/contact": "test_contract.py effects/test_contact.py",
+    "effects/contact/overlap": "effects/test_overlap.py",
+    "effects/contact": "test_contract.py effects/test_contact.py effects/test_overlap.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
     "effects/elasticity": "net/test_elements.py test_contract.py",
     "effects/temperature": "effects/test_temperature.py",
@@ -45,6 +46,7 @@ MIRRORS = {
     "effects": "test_contract.py effects/test_{}.py",
     "system/links": "dynamics/integrators/test_ida.py",
     "system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py",
+    "statics/passage": "effects/test_overlap.py",
     "statics/smoothing_error": "dynamics/test_accuracy.py",
     "statics/critical_speed": "effects/test_frame.py",
     "statics/dynamic_relaxation": "statics/test_relaxation.py",
@@ -173,6 +175,14 @@ MUTANTS = [
         "        -push * damped * g[0] - drag * q[0],",
         "        -push * damped * g[0] + drag * q[0],",
     ),
+    Mutant(
+        "effects/contact/overlap",
+        "self.exponent + self.moving)\n        return rounded_up(max(own",
+        "self.exponent)\n        return rounded_up(max(own",
+    ),
+    Mutant("effects/contact/overlap", "1.0 if body.shape.once or body.shape.planar else 2.0", "1.0"),
+    Mutant("effects/contact/sphere", "out[c, 0] = data[c, RADIUS] - distance", "out[c, 0] = distance"),
+    Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     # Systems and links
     Mutant(
         "system/links",

@@ -65,7 +65,8 @@ BELOW = {name: TABLES_OF_TIME | {"effects.outer_load"} for name in ("load", "pre
 BELOW |= {"motion": TABLES_OF_TIME}
 BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
 VECTORS = {"effects.vectors"}
-BELOW |= {"contact": {"effects.contact", "effects.contact.nearest_point", "effects.contact.pair", *VECTORS}}
+BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
+BELOW["contact"] |= VECTORS
 BELOW |= {"bending": VECTORS}
 GENERAL = {"effects.contact.places", "net.grown_core"}
 """What effects are made of besides their own file."""
@@ -110,6 +111,7 @@ def called(given):
     for body in given.get("body", ()):
         modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
     if "contact" in given:
+        modules.add("results.observables.overlap" if solve["kind"] == "dynamic" else "statics.passage")
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
         general = "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"])
         if keys & {"damping", "friction"}:

@@ -13,7 +13,7 @@ def run(arguments):
     from ..scene import Scene
     from ..solution import Solution
 
-    scene = Scene.load(arguments.scene)
+    scene = Scene.load(arguments.scene).settled()
     system = scene.build()
     simulation_of(scene, system, Solution(scene))
     print_scene(scene, system)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
 from ..results import probes
 from ..results.observables.book import weights
@@ -21,14 +22,40 @@ SPREAD = 3.0
 """± of a result over its error if the method has its order."""
 
 
-def _scales_of_warnings(net):
-    """What refweb warns of, by name: tension times a scale of each element, of which the largest value counts."""
-    scales = {}
+def _probes_of_warnings(system, followed):
+    """Probes of what refweb warns of and refuses, by name, of which the largest value counts.
+
+    That is a scale of each element times its tension or its strain, and how deep lines are in each body. ``followed``
+    are probes that are looked at in any case: where one of them is of tensions, the largest of which is that of the
+    largest strain, strains need no look of their own.
+    """
+    net, scales = system.net, {}
     if net.law.number == SMOOTH:
-        scales["stress"] = 1.0 / net.area
+        scales["stress"] = 0, 1.0 / net.area
     if np.isfinite(net.strength).any():
-        scales["utilisation"] = 1.0 / (net.area * net.strength)
-    return scales
+        scales["utilisation"] = 0, 1.0 / (net.area * net.strength)
+    tell = [scale for column, scale in scales.values() if column == 0]
+    tell += [p.data[:, 0] for p in followed if p.kernel is probes.line and p.rows[0] == 0 and p.sign > 0.0]
+    if not any(_tells_strain(system, scale) for scale in tell):
+        scales["strain"] = 1, np.ones(len(net.cells))
+    found = {
+        name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
+        for name, (column, scale) in scales.items()
+    }
+    if system.contact:
+        from ..results.observables.overlap import probe_of
+
+        found |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
+    return found
+
+
+def _tells_strain(system, scale):
+    """Whether the largest tension times a scale is that of the most strained element, whatever that is."""
+    net, lines = system.net, [family for family in system.families if family.lines]
+    if len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping does not tell of strain
+        return False
+    numbers = np.column_stack([scale * net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, SLACKNESS : SMOOTHING + 1]])
+    return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))
 
 
 def _event_of(event, system):
@@ -72,9 +99,9 @@ class Watch:
         awaited = {event.observe for event in scene.event}
         booked = [o for o in self._observables if o.observable.booked]
         self._followed = [o for o in booked if o.reduce != "final" or o.name in awaited]
-        self._warned = _scales_of_warnings(system.net)
         self.probes = [o.probe(system) for o in self._probed]
-        self.probes += [probes.Probe(probes.line, [0, 0, len(s)], s[:, None], 1) for s in self._warned.values()]
+        self._warned = _probes_of_warnings(system, self.probes)
+        self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
         self.events = self._add_events(scene.event)
         own = dict.fromkeys(f.book for f in system.families if f.book != "work")
@@ -177,6 +204,26 @@ class Watch:
         if at is None:
             return None
         return float(course.extremes.values[at]), int(self.system.net.line[course.extremes.places[at]])
+
+    def strain(self, course):
+        """Largest strain of all steps [1] and its line."""
+        net, values, places = self.system.net, course.extremes.values, course.extremes.places
+        if (at := self._of_warning("strain")) is not None:
+            return float(values[at]), int(net.line[places[at]])
+        slots = [i for i, p in enumerate(self.probes) if p.kernel is probes.line and p.rows[0] == 0 and p.sign > 0.0]
+        at = next(i for i in slots if _tells_strain(self.system, self.probes[i].data[:, 0]))
+        cell = int(places[at])
+        tension, (stiffness, *law) = values[at] / self.probes[at].data[cell, 0], net.line_data[cell, 1:4]
+        return float(net.law.strain(tension, stiffness, *law)) if tension > 0.0 else 0.0, int(net.line[cell])
+
+    def note_overlaps(self, course, overlaps):
+        """Note the deepest contact of each body in `refweb.effects.contact.overlap.Overlaps`."""
+        extremes = course.extremes
+        for i, body in enumerate(self.system.net.bodies):
+            at = self._of_warning(("overlap", body.name))
+            value, place = float(extremes.values[at]), int(extremes.places[at])
+            if value > 0.0:
+                overlaps.note(i, value, float(extremes.times[at]), int(self.system.net.line[place]))
 
     def _of_warning(self, name):
         """Number of the probe of a warning, None where there is none."""

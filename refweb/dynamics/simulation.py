@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, NoEnd
+from ..errors import InputError, NoEnd, SolverError
 from ..registry import INTEGRATORS, load
 from ..results.solution import SOLVER, Result
-from ..results.state import State, floor_remark, strength_remark
+from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import Standing, follow
 from .history import Watch
 from .initial_state import Start, equilibrium, remarks_on, stored
@@ -74,6 +74,7 @@ class Simulation:
             scene = self._ways.scene
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
+        self.overlaps = _overlaps_of(scene, system)
         self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self._stand(kept)
@@ -163,6 +164,12 @@ class Simulation:
                 'leaves it by itself; without a [frame] law = "tension-only" has no such states'
             )
         self.solution.warnings += remarks_on(self.begin, self.system)
+        if self.overlaps is not None:
+            from ..statics.passage import Passage
+
+            passage = Passage(self.scene, self.system)
+            passage.note(State(self.system, 0.0, found.x))
+            passage.overlaps.refuse()
 
     def run(self, folder, tell):
         """One run from start to end, an `Ended`; ``tell`` is called with the share that is done."""
@@ -175,6 +182,7 @@ class Simulation:
                 table = self.watch.table(history)
                 if len(self.schedule.between):
                     self._compared += self.watch.of_observables(self.watch.table(compared)).tolist()
+                self._refuse_overlap(course)
                 last = first + len(table) - 1
                 if folder is None:
                     self._tables.append(table)
@@ -185,6 +193,9 @@ class Simulation:
                 if last in self.schedule.frames or course.stopped:
                     self._frame(last, folder, course)
                 tell((last + 1) / len(times))
+        except SolverError:
+            self._refuse_overlap(course)  # whatever stopped it: what comes of a line within a body is nonsense
+            raise
         finally:
             self._note(course)
         tolerance = self.standing.knob if integrator.knob == "rtol" else 0.0
@@ -200,6 +211,7 @@ class Simulation:
     def again(self, folder):
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
+        self.overlaps = _overlaps_of(self.scene, self.system)
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -216,12 +228,21 @@ class Simulation:
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
         return course, len(times) if course.stopped else row + 1
 
+    def _refuse_overlap(self, course):
+        """Refuse lines that are deeper in bodies than they may be, see `refweb.effects.contact.overlap.Deepest`."""
+        if self.overlaps is not None:
+            self.watch.note_overlaps(course, self.overlaps)
+            self.overlaps.refuse()
+
     def _note(self, course):
         """Take the state of a run over into the solution."""
         solution, watch = self.solution, self.watch
         self._largest_stress, self._unfilled = watch.largest_stress(course), watch.unfilled(course)
         if (used := watch.utilisation(course)) is not None:
             solution.utilisation = used
+        self._strain = watch.strain(course)
+        if self.overlaps is not None:
+            solution.bodies = self.overlaps.plain()
         if np.isfinite(course.x).all():
             solution.state = State(self.system, course.time, course.x.copy(), course.v.copy())
         solution.events = [
@@ -256,9 +277,21 @@ class Simulation:
         if self._largest_stress is not None:
             yield from floor_remark(self.system.net, self._largest_stress)
         yield from strength_remark(self.solution.utilisation)
+        yield from strain_remark(self._strain)
+        if self.overlaps is not None:
+            yield from self.overlaps.remarks()
         for name in self._unfilled:
             end = self._tables[-1][-1, 0]
             yield f"{name} is the mean of the whole run: it ended at t = {end:.6g} s, before a window was full"
+
+
+def _overlaps_of(scene, system):
+    """The `refweb.effects.contact.overlap.Overlaps` of a scene, None without contact."""
+    if not system.contact:
+        return None
+    from ..effects.contact.overlap import Overlaps
+
+    return Overlaps(scene.settled(), system)
 
 
 def _check_step(scene):

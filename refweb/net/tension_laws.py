@@ -159,6 +159,11 @@ class Law:
         """Stress σ = T/A [Pa]."""
         return _ufuncs()[0](self.number, strain, modulus, slackness, smoothing)
 
+    def strain(self, stress, modulus=1.0, slackness=0.0, smoothing=0.0):
+        """Strain of a tension, stress σ > 0 [Pa]: ε = ε0 + g − η²/g with g = σ/E + α."""
+        g = stress / modulus + (0.0 if self.name == "linear" else self.floor(1.0, slackness, smoothing))
+        return slackness + g - smoothing * smoothing / g
+
     def tangent(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Tangent modulus dσ/dε [Pa]."""
         return _ufuncs()[1](self.number, strain, modulus, slackness, smoothing)

@@ -2,8 +2,9 @@
 
 A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``x``, ``v`` and ``f`` are the
 displacement of each row of the unknowns, its velocity and the whole force on it, shape (rows, 3); ``lines`` holds
-tension and strain of each element, shape (cells, 2 or more); ``rows`` and ``data`` are the probe's own numbers. Where
-``where[1]`` is `PLACE` it writes the row or element it stands at to ``where[0]``.
+tension and strain of each element, shape (cells, 2 or more); ``rows`` and ``data`` are the probe's own numbers, or
+``data`` is what a family shows of its cells at that state. Where ``where[1]`` is `PLACE` it writes the row or element
+it stands at to ``where[0]``.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ class Probe(NamedTuple):
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
     average : float
         Length of a window [s] whose mean is looked at instead of the value, 0 for none.
+    family : int
+        Number of the family of the system whose values per cell stand in place of ``data``, −1 for none.
     """
 
     kernel: Callable
@@ -48,6 +51,7 @@ class Probe(NamedTuple):
     data: np.ndarray
     sign: float = 0.0
     average: float = 0.0
+    family: int = -1
 
 
 @kernel()
@@ -170,3 +174,17 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
         if lines[c, 1] <= data[c, 0]:
             count += 1
     return count / lines.shape[0]
+
+
+@kernel(PROBE)
+def deepest(t, x, v, f, lines, rows, data, where):
+    """Largest of the first column of data over some of its rows, (first, last + 1); the place is counted from there."""
+    values, best = data[rows[0] : rows[1], 0], 0.0
+    for n in range(values.size):
+        best = _larger(best, values[n])
+    if where[1] == PLACE:
+        where[0] = -1
+        for n in range(values.size - 1, -1, -1):
+            if best > 0.0 and values[n] == best:
+                where[0] = n
+    return best

@@ -77,6 +77,9 @@ class SolutionData:
         The result folder that a run wrote while it went.
     utilisation : (float, int), optional
         Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
+    bodies : dict
+        Of each body that the web may touch, by name: its deepest ``overlap`` [m], ``time`` and ``line`` of that, the
+        overlap ``allowed``, and the ``stiffness`` of its contact, ``chosen`` by refweb or given.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
     horizon : dict
@@ -106,6 +109,7 @@ class SolutionData:
     reduced: dict = field(default_factory=dict)
     horizon: dict = field(default_factory=dict)
     utilisation: tuple | None = None
+    bodies: dict = field(default_factory=dict)
 
     @property
     def results(self):
@@ -144,6 +148,7 @@ class SolutionData:
             "versions": self.versions,
             "seed": self.scene.seed,
             "warnings": self.warnings,
+            **({"bodies": self.bodies} if self.bodies else {}),
             **({"horizon": self.horizon} if self.horizon else {}),
         }
 

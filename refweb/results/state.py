@@ -31,7 +31,13 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        return force, per_cell.tension.copy()
+        contact = {i: per_cell[i][:, 0].copy() for i, f in enumerate(self.system.families) if f.contact}
+        return force, per_cell.tension.copy(), contact
+
+    def overlap(self, body):
+        """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
+        family, cells = self.system.touching(body)
+        return self._forces[2][family][cells]
 
     def _by_line(self, values):
         """Largest value over the elements of each line."""
@@ -129,6 +135,19 @@ def strength_remark(utilisation):
     """A warning where the largest stress over strength, (value, line), exceeds 1."""
     if utilisation is not None and utilisation[0] > 1.0:
         yield f"line {utilisation[1]} breaks: stress over strength is {utilisation[0]:.3g}"
+
+
+MUCH = 0.2
+"""Strain above which a remark is made: cables have broken before, and a linear law says nothing of them."""
+
+
+def strain_remark(strain):
+    """A warning where the largest strain, (value, line), exceeds `MUCH`."""
+    if strain[0] > MUCH:
+        yield (
+            f"line {strain[1]} is strained by {100.0 * strain[0]:.3g} %, above {100.0 * MUCH:g} %: no cable stretches "
+            "that far, and its law says nothing of it; lower what acts on it, or raise modulus or area"
+        )
 
 
 def floor_remark(net, stress):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..net.tension_laws import LINEAR
-from ..results.state import floor_remark, strength_remark
+from ..results.state import floor_remark, strain_remark, strength_remark
 
 
 class Remarks:
@@ -70,3 +70,27 @@ def remarks_on(state, stats, utilisation, equilibrium):
             )
     for text in strength_remark(utilisation):
         yield "strength", text
+    for text in strain_remark((float(state.strain.max()), int(state.strain.argmax()))):
+        yield "strain", text
+    for text in collapse_remark(state):
+        yield "collapse", text
+
+
+def collapse_remark(state):
+    """A warning where lines that do not push have let a net collapse.
+
+    It has where a node has moved by more than the size of the web, the diagonal of the box around it, beyond what
+    [[motion]] moves, while its lines are strained by less than that: it hangs at a distance of its own size, and holds
+    no shape that it was given.
+    """
+    system, net = state.system, state.system.net
+    if net.law.number == LINEAR:
+        return
+    moved, points = np.linalg.norm(state.x[: net.nodes], axis=1), net.points[: net.nodes]
+    driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)
+    far, size = float(moved.max() - moved[driven].max(initial=0.0)), float(np.linalg.norm(np.ptp(points, axis=0)))
+    if far > size and state.strain.max() < 1.0:
+        yield (
+            f"the web collapses: node {int(moved.argmax())} moves by {moved.max():.4g} m, and the whole web measures "
+            f"{size:.4g} m; lines that do not push hold no shape that hangs on nothing, add supports or lines"
+        )

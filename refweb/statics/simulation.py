@@ -38,6 +38,7 @@ class Simulation:
     def __init__(self, scene, system, solution):
         self.scene, self.system, self.solution = scene, system, solution
         self.rows, self._remarks = [], Remarks()
+        self._passage = _passage_of(scene, system)
         self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
@@ -66,7 +67,9 @@ class Simulation:
 
     def remarks(self):
         """What a reader of the results has to know."""
-        return self._remarks.texts()
+        yield from self._remarks.texts()
+        if self._passage is not None and self.rows:
+            yield from self._passage.overlaps.remarks()
 
     def _smoothing(self):
         """What finds the error of smoothing, None where there is none to be found."""
@@ -80,6 +83,10 @@ class Simulation:
     def _take(self, found, smoothing):
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        if self._passage is not None:
+            self._passage.note(state)
+            solution.bodies = self._passage.overlaps.plain()
+            self._passage.overlaps.refuse()
         results = self._results(found, state, smoothing)
         row = [found.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():
@@ -116,3 +123,12 @@ class Simulation:
         self.solution.frames.append((len(self.rows) - 1, self.solution.state))
         if folder is not None:
             folder.frame(*self.solution.frames[-1])
+
+
+def _passage_of(scene, system):
+    """The `refweb.statics.passage.Passage` of a scene, None without contact."""
+    if not system.contact:
+        return None
+    from .passage import Passage
+
+    return Passage(scene, system)

@@ -82,3 +82,15 @@ def test_tension_only_is_the_limit_of_the_smooth_law_and_linear_is_two_sided():
 def test_unknown_law_names_the_nearest():
     with pytest.raises(ValueError, match='did you mean "smooth"'):
         Law("smoth")
+
+
+@pytest.mark.parametrize("name", ["smooth", "tension-only", "linear"])
+def test_strain_of_a_stress_is_the_inverse(name):
+    law, numbers = Law(name), [(1.0, 0.0, 0.0)]
+    if name == "smooth":
+        numbers += [(7e7, 0.0, 1e-5), (1e3, 0.1, 1e-2), (1.0, 0.0, 0.5)]
+    for modulus, *rest in numbers:
+        for strain in (1e-3, 0.2, 3.0):
+            stress = law.stress(strain, modulus, *rest)
+            if stress > 1e-9 * modulus:
+                np.testing.assert_allclose(law.strain(stress, modulus, *rest), strain, rtol=1e-12, atol=1e-14)

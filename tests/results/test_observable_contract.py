@@ -67,10 +67,11 @@ BOOKED = [name for name in OBSERVABLES if name not in PROBED]
 def probed(observe, state):
     """(value, place) that the probe of an observable finds in a state."""
     system, found = state.system, observe.probe(state.system)
-    force = system.force(0.0, state.x, state.v)
+    force, shown = system.forces(0.0, state.x, state.v)
     strained = np.column_stack([state.element_tension, state.element_strain])
-    rows, data = np.array(found.rows, dtype=np.int64), np.ascontiguousarray(found.data, dtype=float)
+    rows, data = np.array(found.rows, dtype=np.int64), found.data if found.family < 0 else shown[found.family]
     where = np.array([-1, PLACE])
+    data = np.ascontiguousarray(data, dtype=float)
     value = found.kernel(0.0, state.x, state.v, force, strained, rows, data, where)
     return value, observe.observable.place(system, int(where[0]))
 

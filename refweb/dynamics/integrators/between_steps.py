@@ -110,6 +110,18 @@ def state_within(t, now, h, x, v, f, smooth, inside, model):
 
 
 @kernel()
+def show_again(now, inside, model, observed, running):
+    """Write natural lengths, and what families show that probes read, of the end of a step over that of its inside."""
+    families = model.families
+    if model.reels.lengths.size:
+        set_lengths(now, model.reels, families.data[0])
+    for i in observed.shown:
+        families.forces[i](
+            now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
+        )  # fmt: skip
+
+
+@kernel()
 def take_peak(t, now, smooth, inside, total, extremes, model, observed, running):
     """Take over what exceeds its extreme at a state between the last three looks, which ``inside`` holds."""
     (x, v, f), lines, where = (inside.state[0], inside.state[1], inside.state[2]), inside.lines, np.zeros(2, np.int64)
@@ -164,8 +176,8 @@ def look_back(total, model, observed, running):
             state_within(t, end, end - begin, ends[n, 0], ends[n, 1], ends[n, 2], False, inside, model)
             take_peak(t, now, False, inside, total, extremes, model, observed, running)
             last = t
-    if last > -math.inf and model.reels.lengths.size:
-        set_lengths(now, model.reels, model.families.data[0])
+    if last > -math.inf:
+        show_again(now, inside, model, observed, running)
 
 
 @kernel()
@@ -190,5 +202,4 @@ def look_inside(now, h, fresh, alone, inside, where, total, model, observed, run
             turned = look_at_sums(t, total, observed, extremes, fresh) or turned
         if turned:
             look_at_tops(now, h, not alone, inside, total, extremes, model, observed, running)
-    if model.reels.lengths.size:
-        set_lengths(now, model.reels, model.families.data[0])
+    show_again(now, inside, model, observed, running)

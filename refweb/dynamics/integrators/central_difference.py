@@ -111,7 +111,7 @@ class CentralDifference(Integrator):
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
         self._model = Model.of(system)
-        self._observed = Observed.of(probes, sums, len(system.families))
+        self._observed = Observed.of(probes, sums, self._model.families.outs)
         self._events, self._least = event_rows(events), least_energy(net)
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")

@@ -16,7 +16,7 @@ from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...results.probes import PLACE
 from .averages import average, look_for_means, write_means
-from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside
+from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
 from .energy_book import (
     begin_powers,
     book_energies,
@@ -96,6 +96,7 @@ def look_again(now, h, fresh, smooth, inside, total, model, observed, running):
     """
     if smooth:
         look_at_tops(now, h, True, inside, total, running.extremes, model, observed, running)
+        show_again(now, inside, model, observed, running)
     elif fresh:
         correct_within(running.extremes, observed.signs)
     else:

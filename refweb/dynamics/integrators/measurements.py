@@ -47,14 +47,17 @@ class Measurements:
     ----------
     probed : int
         Number of probes.
+    shown : list of int
+        Numbers of the families of whose cells probes read what they show.
     """
 
     def __init__(self, probes, sums, families):
         self.probed = len(probes)
         self._probes = [
-            (probe.kernel, np.array(probe.rows, dtype=np.int64), np.ascontiguousarray(probe.data, dtype=float))
-            for probe in probes
+            (p.kernel, np.array(p.rows, dtype=np.int64), np.ascontiguousarray(p.data, dtype=float), p.family)
+            for p in probes
         ]
+        self.shown = sorted({probe.family for probe in probes} - {-1})
         self._weights = np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3)
         self._signs = np.array([float(one.sign) for one in (*probes, *sums)])
         self._windows = Windows.of(probes)
@@ -64,7 +67,8 @@ class Measurements:
 
     def probe(self, i, sample):
         """Value of a probe at a `refweb.dynamics.integrators.simpson_book.Sample`."""
-        kernel, rows, data = self._probes[i]
+        kernel, rows, data, family = self._probes[i]
+        data = data if family < 0 else sample.shown[family]
         return kernel(sample.time, sample.x, sample.v, sample.force, sample.lines, rows, data, self._where)
 
     def _place(self, i, sample):

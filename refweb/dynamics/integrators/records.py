@@ -259,6 +259,8 @@ class Observed(NamedTuple):
         Probes whose sign is not 0.
     windows : refweb.dynamics.integrators.averages.Windows
         Windows of the probes that are averaged.
+    shown : ndarray of int
+        Families whose values per cell are the data of probes.
     """
 
     probes: List
@@ -268,20 +270,24 @@ class Observed(NamedTuple):
     signs: np.ndarray
     followed: np.ndarray
     windows: Windows
+    shown: np.ndarray
 
     @classmethod
-    def of(cls, probes, sums, families):
-        """Probes and sums over a number of families."""
+    def of(cls, probes, sums, outs):
+        """Probes and sums of a system whose families write ``outs`` per cell."""
+        families, outs = len(outs), list(outs)
+        numbers = [outs[p.family] if p.family >= 0 else np.ascontiguousarray(p.data, dtype=float) for p in probes]
         windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
         signs[windows.slots] = 0.0
         return cls(
             probes=typed_list(PROBE, [probe.kernel for probe in probes]),
             rows=typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
-            data=typed_list(MATRIX, [np.ascontiguousarray(probe.data, dtype=float) for probe in probes]),
+            data=typed_list(MATRIX, numbers),
             sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3),
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
+            shown=np.unique([probe.family for probe in probes if probe.family >= 0]).astype(np.int64),
         )
 
 

@@ -7,6 +7,7 @@ rule and the trapezoidal one differ too much, as where damped lines go slack in 
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,8 @@ class Sample(NamedTuple):
         What the line elements show: tension [N], strain [1].
     power : ndarray, shape (families + 1,)
         Power of each family and, last, of motion [W].
+    shown : dict of int to ndarray
+        What families show of their cells that probes read, by number of the family.
     """
 
     time: float
@@ -41,6 +44,7 @@ class Sample(NamedTuple):
     force: np.ndarray
     lines: np.ndarray
     power: np.ndarray
+    shown: dict = MappingProxyType({})
 
 
 class Rates(NamedTuple):
@@ -142,13 +146,15 @@ class SimpsonBook:
         ``hold(x, v)`` moves a state to the nearest one that the equations allow.
     fast : float
         Velocity [m/s] below which nothing is held to be moving.
+    shown : sequence of int
+        Numbers of the families of whose cells probes read what they show.
     """
 
-    def __init__(self, system, hold, fast):
+    def __init__(self, system, hold, fast, shown=()):
         self.system, self._hold, self._least = system, hold, least_energy(system.net)
         self._linear = system.rows - system.net.spins
         self._still = system.net.mass[: self._linear].sum() * fast
-        families = system.families
+        families, self._shown = system.families, shown
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
             typed_list(INDICES, [f.cells for f in families]),
@@ -171,7 +177,7 @@ class SimpsonBook:
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return Sample(t, x, v, force, out.lines.copy(), power)
+        return Sample(t, x, v, force, out.lines.copy(), power, {i: out[i].copy() for i in self._shown})
 
     def refuse_endless(self, t, force):
         """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""

@@ -120,7 +120,8 @@ class StepObserver(Integrator):
         self.stats = dict(nfev=0, njev=0, nlu=0)
         self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
         still = max(fast, self.atol_velocity / rtol)
-        self._book, self._limits = SimpsonBook(system, self.hold, still), StepLimits(system)
+        self._book = SimpsonBook(system, self.hold, still, self._measurements.shown)
+        self._limits = StepLimits(system)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a method brings

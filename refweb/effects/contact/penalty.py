@@ -188,7 +188,7 @@ def kernels(depth, pieces, nodes, functions):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 c, push = touch.c, push_of(touch)
-                out[c, 0] += push
+                out[c, 0] = max(out[c, 0], touch.spot.depth)
                 g = from_axes(touch.pair.axes, touch.spot.gradient)
                 for k in range(3):
                     for a in range(nodes):

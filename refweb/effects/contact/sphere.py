@@ -39,12 +39,14 @@ def kernels(pieces, nodes, functions):
             for c in range(first, first + pieces):
                 out[c, 0] = 0.0
             c, place, square = touched(x, cells, data, first, pieces, nodes, functions)
-            if c < 0 or square == 0.0:
+            if c < 0:
+                continue
+            distance = math.sqrt(square)
+            out[c, 0] = data[c, RADIUS] - distance
+            if square == 0.0:
                 continue
             p, _, _ = point(x, cells, data, c, nodes, functions, place)
-            distance = math.sqrt(square)
-            push = data[c, PENALTY] * (data[c, RADIUS] - distance)
-            out[c, 0] = push
+            push = data[c, PENALTY] * out[c, 0]
             for k in range(3):
                 pull = push * p[k] / distance
                 for a in range(nodes):

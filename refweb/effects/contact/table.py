@@ -47,9 +47,11 @@ class Contact(Table):
 
     Parameters
     ----------
-    stiffness : float
+    stiffness : float, optional
         Penalty k of each contact [N/m], or [N/m^1.5] with that exponent. A sphere touches a line once, other shapes
-        each of its elements up to three times.
+        each of its elements up to three times. Where it is left out, here and for a body, refweb chooses it from what
+        moves and pushes, and chooses it anew where lines get deeper into the body than a tenth of its size, see
+        `refweb.effects.contact.overlap`.
     exponent : {1, 1.5}
         p of the push k δ^p at the depth δ.
     damping : float
@@ -71,7 +73,7 @@ class Contact(Table):
         that is none.
     """
 
-    stiffness: float = real(above=0, unit="N/m")
+    stiffness: float | None = real(None, above=0, unit="N/m")
     exponent: float = field(_exponent, 1.0)
     damping: float = real(0.0, at_least=0, unit="s/m")
     friction: float = real(0.0, at_least=0)
@@ -81,6 +83,19 @@ class Contact(Table):
     def _of(self, body, key):
         own = getattr(self.bodies.get(body.name), key, None)
         return getattr(self, key) if own is None else own
+
+    def law_of(self, body):
+        """(stiffness, exponent) of a body; the stiffness is None where it is left out."""
+        return self._of(body, "stiffness"), self._of(body, "exponent")
+
+    def left_out(self, bodies):
+        """Names of those of some bodies whose stiffness is left out."""
+        return tuple(body.name for body in bodies if self._of(body, "stiffness") is None)
+
+    def with_stiffness(self, stiffness):
+        """The table with a stiffness for some bodies, by name."""
+        own = {name: replace(self.bodies.get(name, BodyContact()), stiffness=k) for name, k in stiffness.items()}
+        return replace(self, bodies={**self.bodies, **own})
 
     def extend(self, net):
         """The net with a row of rotation for each free body that friction turns."""
@@ -98,14 +113,16 @@ class Contact(Table):
         )
 
     def on(self, net):
-        """The families of all pairs of a line and a body, of one kind each; ``out`` is the contact force [N], or the
-        power of what is lost [W]."""
+        """The families of all pairs of a line and a body, of one kind each; ``out`` is the depth of the deepest
+        contact [m], or the power of what is lost [W]."""
         names = [body.name for body in net.bodies]
         if not names:
             raise InputError("there is no [[body]] that the web could touch: add one")
         for name in self.bodies:
             if name not in names:
                 raise InputError(f'bodies."{name}" is no body, {nearest(name, names)}')
+        for name in self.left_out(net.bodies):
+            raise InputError(f'stiffness is missing for body "{name}": a Scene chooses it, a System does not')
         functions = np.linalg.inv(np.vander(np.sort(net.places), increasing=True))
         element = net.subdivide, net.order + 1, tuple(functions.ravel().tolist())
         pressed, losing = {}, {}

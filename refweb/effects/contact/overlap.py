@@ -1,0 +1,283 @@
+"""How deep lines may be in a body, and the stiffness of contact that holds them there.
+
+A penalty lets lines in, and a weak one lets them through. An overlap is held against the size of the body: the radius
+of a sphere, of a ring in its plane, or the smallest edge or diameter of another shape. Above `SHARE` of it contact is
+not that with a rigid body; a line that is deeper than `CORE` of the way to the middle passes through, for its push may
+turn to the other side at any moment.
+
+The push k δ^p stores k δ^(p + 1)/(p + 1). A body that brings the energy E is stopped at δ by k = (p + 1) E/δ^(p + 1), a
+push F is held there by k = F/δ^p, whatever else gives way. So the stiffness that would do follows from an overlap that
+was found: it falls with k^(−1/(p + 1)) where a body comes with its energy, with k^(−1/p) where it is pushed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import InputError, SolverError, TooSoft
+from ...net.net import AXIAL_STIFFNESS
+from ...net.rigid_body import RigidBody
+
+SHARE = 0.1
+"""Overlap that is allowed, over the size of the body."""
+CORE = 0.5
+"""Overlap at which a line is in the core, over the distance from the middle of the body to its surface."""
+AIM = 0.8
+"""Overlap that a stiffness is chosen for, over what is allowed."""
+STIFFER = 4.0
+"""Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
+MOST_TIMES = 200
+"""Largest number of times at which loads and motions are looked at."""
+
+
+def size_of(body):
+    """Length that an overlap is held against [m]; infinite for a body without end."""
+    return body.thickness * (1.0 if body.shape.once or body.shape.planar else 2.0)
+
+
+def allowed(body):
+    """Overlap that is allowed [m]."""
+    return SHARE * size_of(body)
+
+
+def rounded_up(value):
+    """A number of two digits that is not smaller."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return float(f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.1e}")
+
+
+class Deepest(NamedTuple):
+    """The deepest contact of a body.
+
+    Attributes
+    ----------
+    body : refweb.net.rigid_body.RigidBody
+        The body.
+    overlap : float
+        Depth [m], 0 where nothing has touched.
+    time : float
+        Time [s]; in statics the load step.
+    line : int, optional
+        The line.
+    stiffness, exponent : float
+        k [N/m^p] and p of its contact.
+    moving : bool
+        Whether it comes with energy, in dynamics, or is pushed.
+    least : float
+        Stiffness that its energy, or what pushes, asks for at the start [N/m^p].
+    chosen : bool
+        Whether the stiffness is refweb's choice.
+    """
+
+    body: RigidBody
+    overlap: float
+    time: float
+    line: int | None
+    stiffness: float
+    exponent: float
+    moving: bool
+    least: float
+    chosen: bool
+
+    @property
+    def too_deep(self):
+        """Whether it is deeper than allowed."""
+        return self.overlap > allowed(self.body)
+
+    @property
+    def in_core(self):
+        """Whether the line is in the core."""
+        return self.overlap > CORE * self.body.thickness
+
+    @property
+    def enough(self):
+        """Stiffness that would do [N/m^p]: of an overlap that is `AIM` of what is allowed.
+
+        In the core the depth says little: it is no less than what the energy at the start asks for.
+        """
+        share = self.overlap / (AIM * allowed(self.body))
+        own = self.stiffness * share ** (self.exponent + self.moving)
+        return rounded_up(max(own, self.least) if self.in_core else own)
+
+    def plain(self):
+        """As ``run.json`` has it."""
+        size = allowed(self.body)
+        own = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
+        own |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
+        return own
+
+    def _where(self):
+        instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
+        return f'{self.overlap:.3g} m deep in body "{self.body.name}" at {instant}'
+
+    def refuse(self):
+        """Refuse a line in the core, and a choice that was too soft.
+
+        Raises
+        ------
+        TooSoft
+            Where refweb chose the stiffness and the overlap is not allowed.
+        SolverError
+            Where a line is in the core.
+        """
+        if self.chosen and self.too_deep:
+            stiffer = rounded_up(max(self.enough, STIFFER * self.stiffness))
+            raise TooSoft(
+                f"line {self.line} is {self._where()} with stiffness = {self.stiffness:g}, {allowed(self.body):.3g} m "
+                f"are allowed; repeated with stiffness = {stiffer:g}",
+                {self.body.name: stiffer},
+            )
+        if self.in_core:
+            raise SolverError(
+                f"line {self.line} passes the core of a body: it is {self._where()}, whose middle is "
+                f"{self.body.thickness:.3g} m below its surface; {self._remedy()}"
+            )
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        if self.overlap <= 0.0:
+            yield f'body "{self.body.name}" never touches the web, though there is a [contact]'
+        elif self.too_deep:
+            share = 100.0 * self.overlap / size_of(self.body)
+            yield f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {self._remedy()}"
+
+    def _remedy(self):
+        power = f"1/{self.exponent + self.moving:g}"
+        return (
+            f"stiffness = {self.enough:g} would do in place of {self.stiffness:g}, or leave it out "
+            f"(the overlap falls with k to the power {power})"
+        )
+
+
+class Overlaps:
+    """The deepest contacts of all bodies of a system so far.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        With a stiffness for each body; those of ``scene.chosen`` are refweb's choice.
+    system : refweb.system.system.System
+        That of the scene.
+    """
+
+    def __init__(self, scene, system):
+        self.system, self._chosen, self._moving = system, scene.chosen, not system.net.quasi_static
+        self._laws = [scene.contact.law_of(body) for body in system.net.bodies]
+        self._load_steps = getattr(scene.solve, "load_steps", ())
+        self.found = [self._deepest(i, 0.0, 0.0, None) for i in range(len(self.bodies))]
+
+    @property
+    def bodies(self):
+        """The bodies, in their order."""
+        return self.system.net.bodies
+
+    def _deepest(self, i, overlap, time, line):
+        body, (stiffness, exponent), least = self.bodies[i], self._laws[i], 0.0
+        if overlap > CORE * body.thickness:
+            least = first_stiffness(self.system, body, exponent, self._load_steps)
+        chosen = body.name in self._chosen
+        return Deepest(body, overlap, time, line, stiffness, exponent, self._moving, least, chosen)
+
+    def stiffness_of(self, body):
+        """Stiffness of the contact of a body [N/m^p]."""
+        return self._laws[self.bodies.index(body)][0]
+
+    def note(self, i, overlap, time, line):
+        """Note the deepest overlap [m] of body ``i``, its time [s] and its line, if it is deeper than before."""
+        if overlap > self.found[i].overlap:
+            self.found[i] = self._deepest(i, overlap, time, line)
+
+    def refuse(self):
+        """Refuse what may not be, see `Deepest.refuse`."""
+        for deepest in self.found:
+            deepest.refuse()
+
+    def plain(self):
+        """As ``run.json`` has it, by name."""
+        return {deepest.body.name: deepest.plain() for deepest in self.found}
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        for deepest in self.found:
+            yield from deepest.remarks()
+
+
+def first_stiffness(system, body, exponent, load_steps=()):
+    """Stiffness of contact that a scene asks for before it is solved [N/m^p].
+
+    It is that of `AIM` of the allowed overlap under the energy ½ μ v² that is there between the web and the body, and
+    under what pushes them. v is the speed of the body and the free node nearest to it towards each other, with what
+    they gain under outer forces until they meet, and that of prescribed motion. μ is the mass of the body if the web
+    has supports, else the reduced mass of both; for a fixed body it is that of all free nodes. The push is the
+    resultant of outer forces on the body, or, for a fixed one, on the web. Statics knows no energy: there contact is at
+    least as stiff as the stiffest line, which costs no steps; so it is, as the softest line, where nothing moves and
+    nothing pushes.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With any stiffness of contact.
+    body : refweb.net.rigid_body.RigidBody
+        One of its bodies.
+    exponent : float
+        p of its contact.
+    load_steps : sequence of float
+        Those of statics.
+
+    Raises
+    ------
+    InputError
+        For a body without end, whose size says nothing of an overlap.
+    """
+    net, deep = system.net, AIM * allowed(body)
+    if not math.isfinite(deep):
+        raise InputError(f'stiffness is missing for body "{body.name}", whose size has no end: give stiffness = ...')
+    lines = net.line_data[:, AXIAL_STIFFNESS] / (net.natural_length * exponent * deep ** (exponent - 1.0))
+    push = max(_push(system, body, t) for t in (*load_steps, *_times(system)))
+    asked = push / deep**exponent
+    if net.quasi_static:
+        return rounded_up(max(asked, float(lines.max())))
+    asked = max(asked, (exponent + 1.0) * _energy(system, body) / deep ** (exponent + 1.0))
+    return rounded_up(asked if asked > 0.0 else float(lines.min()))
+
+
+def _times(system):
+    """Times at which loads are looked at [s]: the start, corners of tables, and between them."""
+    corners = np.concatenate([[0.0], np.asarray(system.corners, dtype=float)])
+    corners = corners[:: max(len(corners) // (MOST_TIMES // 2), 1)]
+    return np.unique(np.concatenate([corners, 0.5 * (corners[1:] + corners[:-1])])).tolist()
+
+
+def _push(system, body, t):
+    """Resultant of outer forces on a body that is free, or on the free nodes [N]."""
+    force = np.where(system.supported, 0.0, system.outer_force(t))
+    return float(np.linalg.norm(force[: system.net.nodes].sum(axis=0) if body.fixed else force[body.row]))
+
+
+def _energy(system, body):
+    """½ μ v² of a web and a body that meet [J], see `first_stiffness`."""
+    net, nodes = system.net, system.net.nodes
+    held = system.supported[:nodes]
+    free = np.flatnonzero(~held.all(axis=1))
+    if not len(free):
+        free = np.arange(nodes)
+    web, own = float(net.mass[free].sum()), float(net.mass[body.row])
+    v, away = system.initial_velocity(), net.points[free] - net.points[body.row]
+    distance, speed = np.linalg.norm(away, axis=1), np.linalg.norm(v[free] - v[body.row], axis=1)
+    nearest = int(distance.argmin())
+    v0 = float(speed[nearest]) if speed[nearest] > 0.0 else float(speed.max())
+    fastest = 0.0
+    for t in _times(system) if system.drives else ():
+        driven = np.zeros_like(v)
+        system.drive(t, np.zeros_like(v), driven)
+        fastest = max(fastest, float(np.linalg.norm(driven, axis=1).max()))
+    force = np.where(system.supported, 0.0, system.outer_force(0.0))
+    falls = np.zeros(3) if body.fixed else force[body.row] / own
+    carried = held.any() and not body.fixed
+    along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
+    gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - body.thickness, 0.0)
+    mass = web if body.fixed else own if held.any() else own * web / (own + web)
+    return 0.5 * mass * ((v0 + fastest) ** 2 + gained)

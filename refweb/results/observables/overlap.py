@@ -1,0 +1,54 @@
+"""How deep lines are in a body."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import InputError
+from ...messages import nearest
+from .observable import Observable, Value
+
+
+class Overlap(Observable):
+    """Depth of the deepest contact of a body, 0 where it touches nothing; it stands at the line.
+
+    With ``reduce = "max"`` it is the deepest of all steps and between them.
+    """
+
+    unit, keys = "m", ("body",)
+
+    def on(self, system):
+        """Refuse a scene without contact, a body that is none, and none where there are several."""
+        names, body = [body.name for body in system.net.bodies], self.observe.body
+        if not system.contact:
+            raise InputError('quantity = "overlap" needs [contact] in the scene')
+        if body is None and len(names) > 1:
+            raise InputError(f'body is missing: quantity = "overlap" is of one body, {nearest("", names)}')
+        if body is not None and body not in names:
+            raise InputError(f'body = "{body}" is no body, {nearest(body, names)}')
+
+    def _body(self, net):
+        """The body it is of."""
+        return next(body for body in net.bodies if self.observe.body in (None, body.name))
+
+    def of(self, state):
+        """The deepest over all lines."""
+        deep = state.overlap(self._body(state.system.net))
+        at = int(np.argmax(deep))
+        return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
+
+    def probe(self, system):
+        """Of what the family of its contact shows."""
+        return probe_of(system, self._body(system.net))
+
+    def place(self, system, at):
+        """The line of an element, None where nothing is touched."""
+        return int(system.net.line[at]) if at >= 0 else None
+
+
+def probe_of(system, body):
+    """The `refweb.results.probes.Probe` of the deepest contact of a body."""
+    from ..probes import Probe, deepest
+
+    family, cells = system.touching(body)
+    return Probe(deepest, [cells.start, cells.stop], np.zeros((1, 1)), family=family)

@@ -1,0 +1,89 @@
+"""Lines that pass through bodies from one equilibrium to the next, which no equilibrium shows.
+
+Between two equilibria there is no motion to look at. A line whose straight way from the one to the other leads through
+the core of a body has passed it, or has slid around it: which of the two, no load step says, and smaller ones would.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..effects.contact.overlap import CORE, Overlaps
+from ..errors import SolverError
+from ..results.state import State
+
+PARTS = 8
+"""Number of looks at a way as long as a body is thick."""
+MOST = 64
+"""Largest number of nodes about whose nearest place to a body it is looked."""
+
+
+class Passage:
+    """Follows how deep lines are in bodies from one equilibrium to the next.
+
+    Parameters
+    ----------
+    scene : refweb.Scene
+        With a stiffness of contact for each body.
+    system : refweb.system.system.System
+        That of the scene.
+    x : ndarray, shape (rows, 3), optional
+        Displacement before the first [m], by default that of the web as it is.
+
+    Attributes
+    ----------
+    overlaps : refweb.effects.contact.overlap.Overlaps
+        The deepest contact of each body.
+    """
+
+    def __init__(self, scene, system, x=None):
+        self._system, self.overlaps = system, Overlaps(scene.settled(), system)
+        self._x = np.zeros((system.rows, 3)) if x is None else x
+
+    def note(self, state):
+        """Note an equilibrium, a `refweb.results.state.State`.
+
+        Raises
+        ------
+        SolverError
+            For a line whose way there leads through the core of a body.
+        """
+        net = self._system.net
+        for i, body in enumerate(net.bodies):
+            if body.fixed:
+                deep = state.overlap(body)
+                at = int(deep.argmax())
+                self.overlaps.note(i, float(deep[at]), state.time, int(net.line[at]))
+                self._look_back(body, deep, state)
+        self._x = state.x
+
+    def _looks(self, body, way):
+        """Shares of a way (rows, 3) at which lines may be deepest: about where its nodes are nearest to a body."""
+        net = self._system.net
+        begin, own = net.points[: net.nodes] + self._x[: net.nodes] - net.points[body.row], way[: net.nodes]
+        length = np.linalg.norm(own, axis=1)
+        moved = np.flatnonzero(PARTS * length > body.thickness)
+        begin, own, length = begin[moved], own[moved], length[moved]
+        nearest = np.clip(-(begin * own).sum(axis=1) / length**2, 0.0, 1.0)
+        order = np.argsort(np.linalg.norm(begin + nearest[:, None] * own, axis=1))[:MOST]
+        step = body.thickness / (PARTS * length[order])
+        around = nearest[order, None] + step[:, None] * np.arange(-PARTS, PARTS + 1)
+        return np.unique(around[(around > 0.0) & (around < 1.0)])
+
+    def _look_back(self, body, deep, state):
+        """Look at the way that leads to an equilibrium."""
+        system, way = self._system, state.x - self._x
+        looks = self._looks(body, way) if math.isfinite(body.thickness) else []
+        before = State(system, state.time, self._x).overlap(body) if len(looks) else deep
+        ends = np.maximum(np.maximum(deep, before), CORE * body.thickness)
+        for share in looks:
+            there = State(system, state.time, self._x + share * way).overlap(body)
+            if ((passed := there - ends) > 1e-9 * body.thickness).any():
+                line = system.net.line[int(passed.argmax())]
+                raise SolverError(
+                    f'line {line} passes the core of body "{body.name}" on its way to load step {state.time:g}: it '
+                    "slid around, or the solver went through, or contact is too weak; take smaller load_steps, or a "
+                    f"larger stiffness than {self.overlaps.stiffness_of(body):g}"
+                )
