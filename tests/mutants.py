@@ -233,7 +233,7 @@ MUTANTS = [
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "factor = 1.0 / (1.0 - share)", "factor = 1.0"),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
-    Mutant("dynamics/history", 'scales["stress"] = 1.0 / net.area', 'scales["stress"] = net.area'),
+    Mutant("dynamics/history", 'scales["stress"] = 0, 1.0 / net.area', 'scales["stress"] = 0, net.area'),
     Mutant(
         "dynamics/history",
         "float(extremes.values[at]), float(extremes.times[at])",

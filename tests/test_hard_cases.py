@@ -11,6 +11,8 @@ from refweb.errors import OpenBook
 from validation.hard_cases import hard_cases
 from validation.hard_cases.balances import energy_left, momentum_left, turning_left, unbalanced
 from validation.hard_cases.hard_cases import STATIC, STATICS, attempt, matrix
+from validation.hard_cases.overlaps import outcome as hit_of
+from validation.hard_cases.overlaps import random_hit
 from validation.hard_cases.random_scenes import near_the_limit, outcome, random_net
 
 
@@ -83,7 +85,7 @@ def test_many_random_nets():
 
 def check_runs(seeds):
     """Every run that is returned has its energy, by positions and velocities alone, within the budget, and momentum."""
-    refused = 0
+    refused = through = 0
     for seed in seeds:
         try:
             with np.errstate(all="ignore"):
@@ -91,9 +93,13 @@ def check_runs(seeds):
         except OpenBook:
             refused += 1
             continue
+        except refweb.SolverError as error:  # of the random stiffness many are too weak for what comes
+            assert "passes the core of a body" in str(error), seed
+            through += 1
+            continue
         assert energy_left(solution) <= 1.001 * DRIFT, seed
         assert momentum_left(solution) <= 1e-9 and turning_left(solution) <= 1e-9, seed
-    assert refused < 0.2 * len(seeds)
+    assert refused < 0.2 * len(seeds) and through < 0.5 * len(seeds)
 
 
 def test_runs_near_the_limit():
@@ -130,3 +136,21 @@ def test_threads_change_nothing(tmp_path):
             files = [out / "history.csv", *sorted((out / "frames").iterdir())]
             written.append([path.read_bytes() for path in files])
         assert written[0] == written[1] and len(written[0]) > 1
+
+
+def check_hits(seeds):
+    """Lines that a chosen stiffness holds within the allowed overlap; of any stiffness said, or refused."""
+    for given, kinds in ((False, {"held"}), (True, {"held", "said", "refused"})):
+        found = {}
+        for seed in seeds:
+            found.setdefault(hit_of(random_hit(seed, given)), []).append(seed)
+        assert found.keys() <= kinds and (not given or found.keys() == kinds), found
+
+
+def test_random_hits():
+    check_hits(range(12))
+
+
+@pytest.mark.slow
+def test_many_random_hits():
+    check_hits(range(200))

@@ -164,7 +164,7 @@ class Simulation:
                 'leaves it by itself; without a [frame] law = "tension-only" has no such states'
             )
         self.solution.warnings += remarks_on(self.begin, self.system)
-        if self.overlaps is not None:
+        if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
             from ..statics.passage import Passage
 
             passage = Passage(self.scene, self.system)
@@ -175,6 +175,7 @@ class Simulation:
         """One run from start to end, an `Ended`; ``tell`` is called with the share that is done."""
         times, integrator = self.schedule.times, self.integrator
         course, ahead = self._set_off(folder)
+        self._refuse_overlap(course)
         tell(ahead / len(times))
         integrator.breathe = lambda t: tell(t / times[-1])
         try:
@@ -291,7 +292,7 @@ def _overlaps_of(scene, system):
         return None
     from ..effects.contact.overlap import Overlaps
 
-    return Overlaps(scene.settled(), system)
+    return Overlaps(scene.settled(), system, moving=True)
 
 
 def _check_step(scene):

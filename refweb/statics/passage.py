@@ -39,7 +39,7 @@ class Passage:
     """
 
     def __init__(self, scene, system, x=None):
-        self._system, self.overlaps = system, Overlaps(scene.settled(), system)
+        self._system, self.overlaps = system, Overlaps(scene.settled(), system, moving=False)
         self._x = np.zeros((system.rows, 3)) if x is None else x
 
     def note(self, state):

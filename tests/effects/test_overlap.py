@@ -277,3 +277,15 @@ def test_twins_share_the_stiffness():
     assert twin.system is simulation.system
     with pytest.raises(refweb.InputError, match='stiffness is missing for body "ball"'):
         refweb.Contact().on(scene.build().net)
+
+
+def test_where_a_body_starts_is_no_matter_of_stiffness():
+    """An overlap at the start is told, and repeats nothing; in the core it is refused before a step is taken."""
+    solution = refweb.run(hit(ball(speed=0.0, gap=-0.3 * RADIUS), duration=1e-3, interval=1e-3))
+    told = solution.bodies["ball"]
+    assert told["overlap"] == pytest.approx(0.3 * RADIUS) and told["time"] == 0.0
+    assert told["stiffness"] == solution.scene.settled().contact.bodies["ball"].stiffness
+    assert not any("repeated" in text for text in solution.warnings)
+    assert any("30 % of its size; there it starts" in text for text in solution.warnings)
+    with pytest.raises(refweb.SolverError, match='line 0 starts in the core of a body, 0.06 m deep in body "ball"'):
+        refweb.run(hit(ball(gap=-0.6 * RADIUS)))

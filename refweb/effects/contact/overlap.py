@@ -29,6 +29,8 @@ AIM = 0.8
 """Overlap that a stiffness is chosen for, over what is allowed."""
 STIFFER = 4.0
 """Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
+DEEPER = 1.1
+"""Factor on the overlap at the start up to which a deeper one is no matter of stiffness."""
 MOST_TIMES = 200
 """Largest number of times at which loads and motions are looked at."""
 
@@ -70,6 +72,8 @@ class Deepest(NamedTuple):
         Stiffness that its energy, or what pushes, asks for at the start [N/m^p].
     chosen : bool
         Whether the stiffness is refweb's choice.
+    initial : float
+        Overlap at t = 0 [m], which no stiffness changes.
     """
 
     body: RigidBody
@@ -81,11 +85,17 @@ class Deepest(NamedTuple):
     moving: bool
     least: float
     chosen: bool
+    initial: float
 
     @property
     def too_deep(self):
         """Whether it is deeper than allowed."""
         return self.overlap > allowed(self.body)
+
+    @property
+    def at_start(self):
+        """Whether it is deepest where it starts."""
+        return self.moving and self.overlap <= self.initial
 
     @property
     def in_core(self):
@@ -123,7 +133,11 @@ class Deepest(NamedTuple):
         SolverError
             Where a line is in the core.
         """
-        if self.chosen and self.too_deep:
+        if self.in_core and self.at_start:
+            raise SolverError(
+                f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
+            )
+        if self.chosen and self.too_deep and self.overlap > DEEPER * self.initial:
             stiffer = rounded_up(max(self.enough, STIFFER * self.stiffness))
             raise TooSoft(
                 f"line {self.line} is {self._where()} with stiffness = {self.stiffness:g}, {allowed(self.body):.3g} m "
@@ -141,8 +155,9 @@ class Deepest(NamedTuple):
         if self.overlap <= 0.0:
             yield f'body "{self.body.name}" never touches the web, though there is a [contact]'
         elif self.too_deep:
+            remedy = "there it starts" if self.at_start else self._remedy()
             share = 100.0 * self.overlap / size_of(self.body)
-            yield f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {self._remedy()}"
+            yield f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
 
     def _remedy(self):
         power = f"1/{self.exponent + self.moving:g}"
@@ -161,10 +176,13 @@ class Overlaps:
         With a stiffness for each body; those of ``scene.chosen`` are refweb's choice.
     system : refweb.system.system.System
         That of the scene.
+    moving : bool
+        Whether bodies come with energy, in dynamics, or are pushed.
     """
 
-    def __init__(self, scene, system):
-        self.system, self._chosen, self._moving = system, scene.chosen, not system.net.quasi_static
+    def __init__(self, scene, system, moving):
+        self.system, self._chosen, self._moving = system, scene.chosen, moving
+        self._initial = [0.0] * len(system.net.bodies)
         self._laws = [scene.contact.law_of(body) for body in system.net.bodies]
         self._load_steps = getattr(scene.solve, "load_steps", ())
         self.found = [self._deepest(i, 0.0, 0.0, None) for i in range(len(self.bodies))]
@@ -179,7 +197,10 @@ class Overlaps:
         if overlap > CORE * body.thickness:
             least = first_stiffness(self.system, body, exponent, self._load_steps)
         chosen = body.name in self._chosen
-        return Deepest(body, overlap, time, line, stiffness, exponent, self._moving, least, chosen)
+        if self._moving and time == 0.0:
+            self._initial[i] = overlap
+        initial = self._initial[i]
+        return Deepest(body, overlap, time, line, stiffness, exponent, self._moving, least, chosen, initial)
 
     def stiffness_of(self, body):
         """Stiffness of the contact of a body [N/m^p]."""
