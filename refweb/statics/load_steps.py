@@ -97,7 +97,7 @@ def _by_interior_point(newton, t, x, spent):
     from .interior_point import InteriorPoint
 
     inner = InteriorPoint(newton.system, t, x, newton.anchors)
-    for tolerance in (1e-7, 1e-11, 1e-16):
+    for tolerance in (1e-7, 1e-11, 1e-16) if inner.loaded else (1e-16,):  # without load all that is left is too much
         start = inner.follow(tolerance)
         try:
             state = newton.solve(t, start, warm=True, most=15 if tolerance > 1e-16 else 200)
