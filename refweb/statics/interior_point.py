@@ -125,12 +125,10 @@ class InteriorPoint:
         if step is None:
             return False
         ahead = min(_longest(self._s, step[2]), _longest(self._y, step[3]))
-        share = (1.0 - ahead) ** 3
         second = _product(scaling.divide(step[2]), scaling.multiply(step[3]))
-        length = 0.0
         # Where the corrector leads out of the cones at once, towards their middle, without it.
-        for share, second in ((share, second), (1.0, 0.0 * second)):
-            aim = shift - second
+        for share, corrector in (((1.0 - ahead) ** 3, second), (1.0, 0.0)):
+            aim = shift - corrector
             aim[:, 0] += share * mean
             step = self._step(scaling, kept, [(1.0 - share) * one for one in still], aim) or step
             length = min(1.0, CENTRED * min(_longest(self._s, step[2], np.inf), _longest(self._y, step[3], np.inf)))
