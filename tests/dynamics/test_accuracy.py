@@ -155,10 +155,10 @@ def elastic_sag():
 
 
 def test_error_of_elements():
-    """Order 2 towards the elastic catenary: the estimate is within 5 % of what is off, at 8 elements."""
+    """Order 2 towards the elastic catenary: the estimate is 1.25 times what is off, within 5 %, at 8 elements."""
     solution = refweb.run(catenary(8, accuracy=refweb.Accuracy(refine=True)))
     result = solution.results["sag"]
-    assert result.discretisation == pytest.approx(abs(result.value - elastic_sag()), rel=0.05)
+    assert result.discretisation == pytest.approx(1.25 * abs(result.value - elastic_sag()), rel=0.05)
     assert solution.summary()["results"]["sag"]["discretisation"] == result.discretisation
     assert "discretisation" not in refweb.run(catenary(8)).summary()["results"]["sag"]
 

@@ -48,12 +48,12 @@ class Line(Observable):
         return np.ones(len(net.cells))
 
     def error(self, state, equilibrium):
-        """The proven bound of duality, where there is one."""
+        """The proven bound of duality, where there is one, and the rounding of lines that both ends hold."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
         net, line = state.system.net, self.observe.line
         bound = self.bound(equilibrium.duality_bound.tension, net)
-        return float(bound.max() if line is None else bound[net.line == line].max())
+        return float((bound if line is None else bound[net.line == line]).max()) + self.of_held_lines(state)
 
 
 class Tension(Line):

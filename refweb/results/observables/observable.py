@@ -6,6 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...net.net import LENGTH
+
+ROUNDING, SHARE = 4.0 * np.finfo(float).eps, 1e-7
+"""Rounding of a strain by that of positions and lengths, and the change of a length by which its effect is found."""
+
 
 class Value(NamedTuple):
     """Value of an observable at one instant; ``where`` is the node or line it stands at."""
@@ -72,7 +77,26 @@ class Observable:
             share = 1e-7 * state.system.natural_length(state.time).min() / size if size > 0.0 else 0.0
             there = type(state)(state.system, state.time, state.x + share * deviation)
             changes.append(abs(self.of(there).value - value) / share if share > 0.0 else 0.0)
-        return float(changes[0] + 3.0 * max(changes[1:]) + 2.0 * np.finfo(float).eps * abs(value))
+        rounding = 2.0 * np.finfo(float).eps * abs(value) + self.of_held_lines(state)
+        return float(changes[0] + 3.0 * max(changes[1:]) + rounding)
+
+    def of_held_lines(self, state):
+        """What rounding of their strains by `ROUNDING` makes of the value by lines that both ends hold.
+
+        No move of a node balances these.
+        """
+        system = state.system.at(state.time)
+        net = system.net
+        held = system.supported[: net.nodes].all(axis=1)[net.cells].all(axis=1)
+        if not held.any():
+            return 0.0
+        changes, value = [], self.of(state).value
+        for share in (SHARE, -SHARE):  # of a line that is neither slack nor taut, the side where it is taut
+            numbers = net.line_data.copy()
+            numbers[held, LENGTH] *= 1.0 + share
+            there = type(state)(system.with_line_data(numbers), state.time, state.x)
+            changes.append(abs(self.of(there).value - value))
+        return max(changes) / SHARE * ROUNDING
 
     def floats(self, state, equilibrium):
         """Whether moves at no cost change the value, beside what other moves of their size change."""
