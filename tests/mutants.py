@@ -207,6 +207,11 @@ MUTANTS = [
     Mutant(
         "statics/duality_bound", "np.where(bars.tension > 0.0, 0.0, bars.natural - bars.length)", "0.0 * bars.length"
     ),
+    Mutant("statics/floating", "tension > equilibrium.duality_bound.tension[:, None]", "tension > -1.0"),
+    Mutant("statics/floating", "found[side, open_, axis] = sign * far[open_]", "pass"),
+    Mutant("statics/interval", "between = (ends[:, 0] != ends[:, 1])", "between = (ends[:, 0] < ends[:, 1])"),
+    Mutant("statics/lowest", "starts[1] < starts[0] - none", "starts[1] > starts[0] + none"),
+    Mutant("results/observables/observable", "/ SHARE * ROUNDING", "/ SHARE * ROUNDING / 27.0"),
     Mutant("statics/smoothing_error", "/ (1.0 - SHARE) for", "* (1.0 - SHARE) for"),
     Mutant("statics/newton", "((-tiny, 1), (tiny, 0))", "((-tiny, 1), (tiny, -1))"),
     Mutant(

@@ -20,7 +20,9 @@ def tensions(solution):
     # (l² − l0²)/(l + l0) keeps the digits of strains that the difference of lengths loses
     strain = ((2 * reach + moved) * moved).sum(axis=1) / (length + first) / natural + (first - natural) / natural
     own = solution.scene.cable
-    stiffness = own.modulus * own.area
+    groups = solution.scene.web.groups if own.groups else None
+    moduli = [own.groups[name].modulus if name in own.groups else own.modulus for name in groups or ()]
+    stiffness = own.area * (np.array(moduli) if moduli else own.modulus)
     if own.law == "tension-only" or own.smoothing == 0.0:
         taut = np.maximum(strain - (own.slackness or 0.0), 0.0)
         force, stored = stiffness * taut, 0.5 * stiffness * taut**2

@@ -90,6 +90,18 @@ def static(*effects, web=None, steps=(1.0,), supports=None, refused=None, **law)
     )
 
 
+def uneven(ratio):
+    """A web with lines of two stiffnesses, too long and too short ones in turn."""
+    web = window(6).web()
+    length = np.linalg.norm(web.points[web.lines[:, 0]] - web.points[web.lines[:, 1]], axis=1)
+    length = (length * np.resize([0.99, 1.05, 1.01], len(length))).tolist()
+    group = np.resize(["stiff", "soft", "soft", "stiff", "stiff"], len(length)).tolist()
+    rim = web.find("rim").tolist()
+    given = inline(web.points.tolist(), web.lines.tolist(), rim, natural_length=length, groups=group)
+    loaded = pull(1.0, int(web.centre)), pull(-3.0, int(web.centre) + 1)
+    return static(*loaded, web=given, groups={"soft": refweb.Group(modulus=7e7 / ratio)})
+
+
 SPOKES = 200
 ANGLES = 2 * np.pi * np.arange(SPOKES) / SPOKES
 WHEEL = inline(
@@ -110,6 +122,9 @@ CROSSED = inline(
 )
 DANGLING = inline([*ROW, [1.0, 1.0, 0.0]], [[0, 1], [1, 2], [2, 3], [1, 4]], [0, 3])
 APART = inline([*ROW, [0, 1, 0], [1, 1, 0]], [[0, 1], [1, 2], [2, 3], [4, 5]], [0, 3, 4])
+TETHERED = inline(ROW, [[0, 1], [1, 2], [2, 3]], [0, 3], natural_length=[1.3, 0.9, 1.3])
+APART_BY = [refweb.Load(node=1, force=(-1.0, 0.0, 0.0)), refweb.Load(node=2, force=(1.0, 0.0, 0.0))]
+ARCH = inline([[-1, 0, 0], [1, 0, 0], [0, 0, 0.1]], [[0, 2], [1, 2]], [0, 1])
 RIM = refweb.Supports(nodes=["rim"])
 HANGING = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
 CORNER = refweb.Supports(nodes=["corners"])
@@ -144,6 +159,13 @@ STATICS = {
         "pushed along, a mechanism": static(refweb.Load(node=1, force=(1.0, 0.0, 0.0)),
                                             web=inline(ROW, [[0, 1], [1, 2], [2, 3]], [0])),
         "without supports": static(pull(1.0), supports=refweb.Supports(nodes=[]), refused=CARRIED_OFF),
+    },
+    "lines of stiffness 1 : r, slack and taut": {r: uneven(r) for r in (1e2, 1e4, 1e6)},
+    "positions that are open": {
+        "two nodes pulled apart between slack tethers": static(*APART_BY, web=TETHERED),
+        "an arch that may hang": static(pull(-0.1, 2), web=ARCH, law="smooth", smoothing=1e-2),
+        "a line that both ends hold": static(pull(1.0, 1), web=inline([*ROW[:2], [0, 1, 0], ROW[3]],
+                                             [[0, 1], [1, 2], [2, 3]], [0, 2, 3], natural_length=[1.0, 1.4, 3.0])),
     },
     "loads": {
         "in the plane": static(refweb.Load(node="centre", force=(1.0, 0.3, 0.0))),
@@ -383,6 +405,16 @@ def struck():
         given.append(1e-3 * (7000.0 - solution.state.v[-1, 2]))
     why = "10 steps while the ball moves by its radius, of order 2"
     return Row("momentum that a ball of 7 km/s loses", given[0], given[1], "CVODE", 1e-2, why, "N s")
+
+
+def ends():
+    """How far two nodes go that are pulled apart between slack tethers: until one of these is straight."""
+    observe = [refweb.Observe(name="x", quantity="position", node=1, component="x")]
+    scene = scene_of(STATICS["positions that are open"]["two nodes pulled apart between slack tethers"], "newton")
+    least, most = refweb.run(scene.replace(observe=observe)).results["x"].interval
+    between = 0.9 * (1.0 + 1.0 / (7e7 * 1e-4))
+    off = max(abs(least - (3.0 - 1.3 - between)), abs(most - 1.3))
+    return Row("ends of what floats", off, 0.0, "straight tethers", 1e-8, "1e-10 of the lengths", "m", scale=1.0)
 
 
 def peaks():
