@@ -50,7 +50,7 @@ class Body(Table):
         Axis of a cylinder.
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of its
-        smallest size. Contact that is no deeper has a force of one direction.
+        smallest size.
     mass : float, optional
         Mass [kg], > 0; needed unless the body is fixed.
     position : sequence of 3 float

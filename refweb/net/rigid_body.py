@@ -32,12 +32,12 @@ A shape is a file with a class, whose fields are its keys in ``[[body]]``. This 
             corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
             return 0.5 * self.drawn * corners, np.array([[0, 1, 2], [0, 2, 3]])
 
-A body is convex, and its depth the distance from its surface: concave, with a gradient of length 1 that does not jump
-as far as contact goes. That is why edges are rounded, and a body is a core and the radius by which it has grown on all
-sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or round about
-its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a capsule;
-otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move sets ``free = True``
-and brings ``inertia``. The line in ``SHAPES`` of ``refweb/registry.py``::
+A body is convex. Its depth is the distance from its surface there, and concave, with a gradient that nowhere jumps: the
+force is the slope of an energy. That is why edges are rounded, and a body is a core and the radius by which it has
+grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
+round about its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a
+capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move sets
+``free = True`` and brings ``inertia``. The line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
 """

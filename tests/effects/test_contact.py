@@ -95,7 +95,10 @@ def own_depth(shape, points):
 
 
 def cloud(shape, count=300):
-    """Points inside and around, none where the distance has a kink in its first two derivatives."""
+    """Points inside and around, where depth is the distance; none near kinks of its first two derivatives.
+
+    Behind half of the rounding that is where one face is much nearer than the others, see `refweb.net.grown_core`.
+    """
     core = {"sphere": (0, 0, 0), "ring": (0, 0, 0), "box": (0.2, 0.3, 0.4), "cylinder": (0.2, 0.2, 0.3)}[shape]
     p = np.random.default_rng(1).uniform(-0.8, 0.8, (20 * count, 3))
     l = np.abs(p)  # noqa: E741
@@ -105,8 +108,10 @@ def cloud(shape, count=300):
         l[:, 2] = 1.0
     faces = core - l
     clear = (np.abs(faces) > 0.02).all(axis=1) & (np.hypot(p[:, 0], p[:, 1]) > 0.05)
-    order = np.sort(faces, axis=1)
-    clear &= (order[:, 0] < 0.0) | (order[:, 1] - order[:, 0] > 0.02)
+    if shape in ("box", "cylinder"):
+        order = np.sort(faces, axis=1)
+        outside = np.linalg.norm(np.minimum(faces, 0.0), axis=1)
+        clear &= (outside > 0.05) | (order[:, 1] > 1.5 * np.maximum(order[:, 0], 0.0) + 0.02)
     return p[clear][:count]
 
 

@@ -41,6 +41,23 @@ def tensions(solution):
     return force, vector / np.where(length > 0, length, 1.0)[:, None], (stored * natural).sum()
 
 
+STEP = 1e-6
+"""Displacement of a node by which the energy of contact is differenced [m]."""
+
+
+def pushes(state):
+    """Force of contact on every row, by differences of its energy: what the force should be, whatever it is [N]."""
+    system, force = state.system, np.zeros_like(state.x)
+    for family in (family for family in system.families if family.contact and family.energy is not None):
+        for row in np.unique(family.cells):
+            for axis in range(3):
+                moved = np.zeros_like(state.x)
+                moved[row, axis] = STEP
+                ends = [system.energy_of(family, state.time, state.x + sign * moved).sum() for sign in (1.0, -1.0)]
+                force[row, axis] -= (ends[0] - ends[1]) / (2.0 * STEP)
+    return force
+
+
 def unbalanced(solution):
     """Largest force at a free node, over the largest of loads and tensions."""
     state, (force, direction, _) = solution.state, tensions(solution)
@@ -54,7 +71,7 @@ def unbalanced(solution):
             outer[net.find(effect.node)] += state.time * np.array(effect.force)
         if isinstance(effect, refweb.Gravity):
             outer += net.mass[:, None] * np.array(effect.acceleration)
-    rest = np.where(system.supported, 0.0, pulls + outer)
+    rest = np.where(system.supported, 0.0, pulls + outer + pushes(state))
     # displacements are rounded to 2e-16 of themselves, so is the distance that a natural length of its own is taken
     # from, and lines of EA/L = k make a force of that
     first = np.linalg.norm(net.points[net.cells[:, 1]] - net.points[net.cells[:, 0]], axis=1)

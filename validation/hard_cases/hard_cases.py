@@ -2,7 +2,8 @@
 
 Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of
 1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
-bodies that start inside of the web, pulses and peaks between steps, hammer blows, tables with more corners than steps.
+bodies that start inside of the web, edges that lines press deeper than
+they are round, pulses and peaks between steps, hammer blows, tables with more corners than steps.
 Each is solved by every method that takes it; a number proves each result:
 
 - statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
@@ -76,6 +77,17 @@ def pull(force, node="centre"):
     return refweb.Load(node=node, force=tuple(float(f) for f in np.multiply(force, UP)))
 
 
+EDGE = inline([[-1, 0, 0], [-0.25, 0, 0], [0.25, 0, 0], [1, 0, 0]], [[0, 1], [1, 2], [2, 3]], [0, 3])
+
+
+def box(top, offset=0.0, **changes):
+    """A fixed box of 0.3 m that stands on an edge, the edge above at a height and beside the middle."""
+    axes = [(1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)]
+    place = (offset, 0.0, top - 0.15 * 2.0**0.5)
+    own = dict(name="box", shape="box", size=(0.3, 0.3, 1.0), axes=axes, position=place, fixed=True)
+    return refweb.Body(**{**own, **changes})
+
+
 # Statics
 
 
@@ -128,7 +140,17 @@ ARCH = inline([[-1, 0, 0], [1, 0, 0], [0, 0, 0.1]], [[0, 2], [1, 2]], [0, 1])
 RIM = refweb.Supports(nodes=["rim"])
 HANGING = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
 CORNER = refweb.Supports(nodes=["corners"])
+SOFT = refweb.Contact(stiffness=60.0)
+
+
+def over_edge(press, offset=0.0):
+    """A taut line over the edge of a box, deeper in it than the edge is round."""
+    return static(box(press, offset), SOFT, web=EDGE, modulus=1e8, area=1e-5, prestrain=0.01)
+
+
 STATICS = {
+    "a line over the edge of a box, pressed by [m]": {p: over_edge(p) for p in (0.01, 0.03, 0.06, 0.1, 0.15)},
+    "a line beside the edge of a box, by [m]": {o: over_edge(0.1, o) for o in (1e-9, 1e-3, 0.02)},
     "flat web under F [N]": {f: static(pull(f)) for f in (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6)},
     "smoothing η, 1 N": {e: static(pull(1.0), law="smooth", smoothing=e) for e in (1e-1, 1e-3, 1e-6, 1e-9, 1e-12, 0.0)},
     "slackness ε0, 1 N": {
@@ -294,7 +316,24 @@ RING = ball(
     velocity=(2.0, 0.5, 0.0),
 )
 JUMP = refweb.Motion(node=[0], displacement=[[0.0, 0.0, 0.0, 0.0], [1e-5, 0.0, 0.0, 1e-3], [1.0, 0.0, 0.0, 1e-3]])
+FALLING = refweb.Velocity(node="all", value=(0.0, 0.0, -4.0))
+ASKEW = dict(size=(0.3, 0.4, 0.5), axes=[(2.0, 1.0, -1.0), (-1.0, 2.0, 0.0)], position=(0.02, -0.03, -0.33))
+DRUM = refweb.Body(
+    name="drum",
+    shape="cylinder",
+    radius=0.2,
+    length=0.4,
+    axis=(1.0, 0.5, 1.0),
+    fixed=True,
+    position=(0.02, -0.03, -0.29),
+)
 MOTIONS = {
+    "thrown over edges, deeper than they are round": {
+        "of a box": free(box(0.0, **ASKEW), SOFT, FALLING, supports=RIM, duration=0.05, modulus=1e6, area=1e-5),
+        "of a box of sharp edges": free(box(0.0, **ASKEW, rounding=1e-4), SOFT, FALLING, supports=RIM, duration=0.05,
+                                        modulus=1e6, area=1e-5),
+        "of a drum": free(DRUM, SOFT, FALLING, supports=RIM, duration=0.05, modulus=1e6, area=1e-5),
+    },
     "impact at v [m/s]": {
         v: hit(ball(velocity=(0.0, 0.0, v), mass=1e-3), stiffness=max(1e4, 0.4 * v * v), duration=2.0 / max(v, 100.0))
         for v in (2.0, 100.0, 1000.0, 7000.0)

@@ -174,23 +174,15 @@ def places(depth):
         return Spot(p, d, e, deep, gradient, hessian)
 
     @kernel()
-    def deepest(x, cells, data, c, nodes, functions):
-        low, high, place, pair = 0.0, 1.0, 0.5, pair_of(data, c, nodes)
-        if nodes > 2:
-            most = -math.inf
-            for n in range(SAMPLES + 1):
-                deep = within(x, cells, data, c, nodes, functions, n / SAMPLES).depth
-                faded = window(pair.once, n / SAMPLES, True)[0] ** (1.0 / (pair.exponent + 1.0))
-                if (felt := faded * deep if deep > 0.0 else deep) > most:
-                    most, place = felt, n / SAMPLES
-            low, high = max(place - 1.0 / SAMPLES, 0.0), min(place + 1.0 / SAMPLES, 1.0)
+    def climbed(x, cells, data, c, nodes, functions, low, high, place):
+        moved, pair = math.inf, pair_of(data, c, nodes)
         if pair.once:
             for end in (low, high):
                 spot = within(x, cells, data, c, nodes, functions, end)
                 slope = dot(spot.gradient, spot.d)
                 if (end == 0.0 and slope <= 0.0) or (end == 1.0 and slope >= 0.0):
                     return end, spot.depth
-        for _ in range(100):  # Newton's method, by bisection where it leaves the bracket
+        for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
             spot = within(x, cells, data, c, nodes, functions, place)
             deep, slope = spot.depth, dot(spot.gradient, spot.d)
             if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
@@ -201,12 +193,36 @@ def places(depth):
             else:
                 high = place
             step = place - value / curve if curve < 0.0 else -1.0
-            if not low <= step <= high:
+            if not low <= step <= high or abs(step - place) > 0.5 * moved:
                 step = 0.5 * (low + high)
             moved, place = abs(step - place), step
             if moved <= 1e-15:
                 break
         return place, within(x, cells, data, c, nodes, functions, place).depth
+
+    @kernel()
+    def felt(x, cells, data, c, nodes, functions, place):
+        deep, pair = within(x, cells, data, c, nodes, functions, place).depth, pair_of(data, c, nodes)
+        return window(pair.once, place, True)[0] ** (1.0 / (pair.exponent + 1.0)) * deep if deep > 0.0 else deep
+
+    @kernel()
+    def deepest(x, cells, data, c, nodes, functions):
+        if nodes > 2:  # from the places where samples are largest, of which there may be several
+            most, where, depth_there = -math.inf, 0.0, 0.0
+            before, here = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
+            for n in range(SAMPLES + 1):
+                at, after = n / SAMPLES, -math.inf
+                if n < SAMPLES:
+                    after = felt(x, cells, data, c, nodes, functions, at + 1.0 / SAMPLES)
+                if here >= before and here > after:
+                    low, high = max(at - 1.0 / SAMPLES, 0.0), min(at + 1.0 / SAMPLES, 1.0)
+                    place, deep = climbed(x, cells, data, c, nodes, functions, low, high, at)
+                    value = felt(x, cells, data, c, nodes, functions, place)
+                    if value > most:
+                        most, where, depth_there = value, place, deep
+                before, here = here, after
+            return where, depth_there
+        return climbed(x, cells, data, c, nodes, functions, 0.0, 1.0, 0.5)
 
     @kernel()
     def contacts(x, cells, data, first, pieces, nodes, functions, found):

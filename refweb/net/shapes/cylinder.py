@@ -24,8 +24,8 @@ class Cylinder(Shape):
     axis : sequence of 3 float
         Its axis.
     rounding : float, optional
-        Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. Contact
-        that is no deeper has a force of one direction.
+        Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. How depth
+        goes on below says `refweb.net.grown_core`.
     """
 
     radius: float = real(above=0, unit="m")
