@@ -173,7 +173,11 @@ MUTANTS = [
     # Contact and friction
     Mutant("effects/contact/table", "slip_velocity: float = real(1e-2", "slip_velocity: float = real(1e-3"),
     Mutant("effects/contact/table", "return getattr(self, key) if own is None else own", "return getattr(self, key)"),
-    Mutant("effects/contact/friction", "damped = max(pair.damping * rate, -1.0)", "damped = pair.damping * rate"),
+    Mutant(
+        "effects/contact/friction",
+        "damped, rate = max(pair.damping * dot(g, u), -1.0)",
+        "damped, rate = pair.damping * dot(g, u)",
+    ),
     Mutant(
         "effects/contact/friction",
         "        -push * damped * g[0] - drag * q[0],",

@@ -1,8 +1,8 @@
 """Losses of contact, by damping and by friction, as compiled kernels.
 
-At a contact, see `refweb.effects.contact.places`, let N₀ = k W δ^p be the push of the penalty, n = −∂δ/∂x the
-normal, u the velocity of the line's point relative to the body's, with the rate of depth δ̇ = −n·u and the slip u_t = u
-+ δ̇ n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossley [1]_ and by Coulomb, regularised,
+At a contact, see `refweb.effects.contact.places`, let g = ∂δ/∂x, N₀ = |g| k W δ^p be the push of the penalty, n =
+−g/|g| the normal, u the velocity of the line's point relative to the body's, with the rate of depth δ̇ = g·u and the
+slip u_t = u − (n·u) n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossley [1]_ and by Coulomb, regularised,
 
     N = N₀ (1 + max(d δ̇, −1)) ≥ 0,        F = N₀ max(d δ̇, −1) n − μ N q,
 
@@ -87,13 +87,20 @@ def slip_of(v, cells, c, nodes, spins, functions, pair, place, y):
 
 
 @kernel()
+def facing(g):
+    """(length of a gradient of depth, the unit vector along it)."""
+    length = math.sqrt(dot(g, g))
+    return (length, (g[0] / length, g[1] / length, g[2] / length)) if length > 0.0 else (0.0, g)
+
+
+@kernel()
 def hunt_crossley(pair, push, g, u):
-    """The `Loss` of the push N₀."""
-    rate = dot(g, u)
-    damped = max(pair.damping * rate, -1.0)
-    t = u[0] - rate * g[0], u[1] - rate * g[1], u[2] - rate * g[2]
+    """The `Loss` of a push k W δ^p."""
+    length, n = facing(g)
+    damped, rate = max(pair.damping * dot(g, u), -1.0), dot(n, u)
+    t = u[0] - rate * n[0], u[1] - rate * n[1], u[2] - rate * n[2]
     size = math.sqrt(dot(t, t) + pair.slip_velocity**2)
-    return Loss(damped, push * (1.0 + damped), (t[0] / size, t[1] / size, t[2] / size), size)
+    return Loss(damped, push * length * (1.0 + damped), (t[0] / size, t[1] / size, t[2] / size), size)
 
 
 @kernel()
@@ -112,31 +119,33 @@ def friction_force(pair, push, g, u):
 def by_velocity(pair, push, g, u, matrix):
     """Write ∂F/∂u."""
     damped, normal, q, size = hunt_crossley(pair, push, g, u)
+    length, n = facing(g)
     slope = push * pair.damping if damped > -1.0 else 0.0
     drag = pair.friction * normal / size
     for i in range(3):
         for j in range(3):
-            along = g[i] * g[j]
-            across = (1.0 if i == j else 0.0) - along - q[i] * q[j]
-            matrix[i, j] = -slope * along - drag * across - pair.friction * slope * q[i] * g[j]
+            across = (1.0 if i == j else 0.0) - n[i] * n[j] - q[i] * q[j]
+            matrix[i, j] = -slope * g[i] * g[j] - drag * across - pair.friction * length * slope * q[i] * g[j]
 
 
 @kernel()
 def by_place(pair, push, steep, g, bend, u, matrix):
-    """Write ∂F/∂y at a given u; ``steep`` is ∂N₀/∂δ, ``bend`` the Hessian of the depth."""
+    """Write ∂F/∂y at a given u; ``steep`` is ∂/∂δ of the push k W δ^p, ``bend`` the Hessian of the depth."""
     damped, normal, q, size = hunt_crossley(pair, push, g, u)
+    length, n = facing(g)
+    inverse = 1.0 / length if length > 0.0 else 0.0
     slope = push * pair.damping if damped > -1.0 else 0.0
-    rate, turned = dot(g, u), hessian_times(bend, u)
+    rate, turned, leant, qh = dot(n, u), hessian_times(bend, u), hessian_times(bend, n), hessian_times(bend, q)
     h = ((bend[0], bend[1], bend[2]), (bend[1], bend[3], bend[4]), (bend[2], bend[4], bend[5]))
-    qh = hessian_times(bend, q)
     for j in range(3):
-        pushed, faster = steep * g[j], slope * turned[j]  # ∂N₀/∂y, N₀ ∂(d δ̇)/∂y
-        pressed = pushed * (1.0 + damped) + faster  # ∂N/∂y
-        along = rate * qh[j]  # −q·∂u_t/∂y
+        pushed, faster = steep * g[j], slope * turned[j]  # ∂(k W δ^p)/∂y, k W δ^p ∂(d δ̇)/∂y
+        pressed = length * (pushed * (1.0 + damped) + faster) + push * (1.0 + damped) * leant[j]  # ∂N/∂y
+        along = rate * qh[j]  # −|g| q·∂u_t/∂y
         for i in range(3):
-            slid = -rate * h[i][j] - g[i] * turned[j] + q[i] * along  # size ∂q/∂y
+            tilted = h[i][j] - n[i] * leant[j]  # |g| ∂n/∂y
+            slid = -rate * tilted - n[i] * (turned[j] - rate * leant[j]) + q[i] * along  # |g| size ∂q/∂y
             matrix[i, j] = -(pushed * damped + faster) * g[i] - push * damped * h[i][j]
-            matrix[i, j] -= pair.friction * (pressed * q[i] + normal * slid / size)
+            matrix[i, j] -= pair.friction * (pressed * q[i] + normal * inverse * slid / size)
 
 
 @kernel(forceinline=True)
