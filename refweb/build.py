@@ -64,6 +64,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported)
+    _check_bare(system)
     _check_motions(system)
     if system.constraints:
         _check_links(solve)
@@ -86,6 +87,16 @@ def _web(web, folder):
     except OSError as error:
         path = shown(getattr(web, "path", ""))
         raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
+
+
+def _check_bare(system):
+    """Refuse nodes that nothing ties to the web."""
+    linked = np.concatenate([[], *(constraint.cells.ravel() for constraint in system.constraints)])
+    bare = system.net.web.bare
+    bare = bare[~np.isin(bare, linked)]
+    if len(bare):
+        more = f" (and {len(bare) - 1} more)" if len(bare) > 1 else ""
+        raise InputError(f"[web] node {bare[0]}{more} is used by no line and no [[link]]")
 
 
 def _check_memory(lines, cable, effects, solve, output):

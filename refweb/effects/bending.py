@@ -195,7 +195,9 @@ class Bending(Table):
                 f"stiffness = {self.stiffness:g} bends nothing: no line of this web continues another within 30°; "
                 "give [cable] subdivide > 1 for lines that bend between their nodes, or leave the table out"
             )
-        spring = self.stiffness / net.natural_length[elements].mean(axis=1)
+        _, kind, beside = np.unique(np.sort(net.cells, axis=1), axis=0, return_inverse=True, return_counts=True)
+        beside = beside[kind.ravel()][elements].max(axis=1)  # of two lines beside each other each continues one
+        spring = self.stiffness / net.natural_length[elements].mean(axis=1) / beside
         vectors = net.points[rows[:, 1:]] - net.points[rows[:, :-1]]
         return Family(
             name="bending",

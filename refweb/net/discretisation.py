@@ -87,7 +87,7 @@ def _divided(web, pieces):
 
 def _numbered(dofs, line, place, nodes):
     """Row of each dof: the web's nodes keep their number, the others follow line by line and along each line."""
-    count = dofs.max() + 1
+    count = max(dofs.max() + 1, nodes)
     of_line, along = np.empty(count, dtype=np.int64), np.empty(count)
     of_line[dofs], along[dofs] = line[:, None], place
     added = nodes + np.lexsort((along[nodes:], of_line[nodes:]))

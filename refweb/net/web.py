@@ -43,8 +43,7 @@ class Web:
     Raises
     ------
     InputError
-        For node numbers out of range, a line that joins a node to itself, repeats another one or has no length, nodes
-        that no line uses, numbers that are not finite.
+        For node numbers out of range, a line that joins a node to itself or has no length, numbers that are not finite.
 
     Notes
     -----
@@ -135,6 +134,11 @@ class Web:
         before = np.roll(side, 1, axis=0)
         turn = before[:, 0] * side[:, 1] - before[:, 1] * side[:, 0]
         return np.sort(hull[turn > _TIE]).astype(np.int64)
+
+    @property
+    def bare(self):
+        """Numbers of the nodes that no line uses, sorted, shape (k,)."""
+        return np.flatnonzero(np.bincount(self.lines.ravel(), minlength=len(self.points)) == 0)
 
     def components(self):
         """Number of connected parts and the part each node belongs to, shape (nodes,)."""
@@ -257,13 +261,4 @@ def _checked_lines(lines, nodes):
         raise InputError(f"lines[{i}] = {lines[i].tolist()} must be node numbers 0 … {nodes - 1}")
     for i in _first(lines[:, 0] == lines[:, 1]):
         raise InputError(f"lines[{i}] = {lines[i].tolist()} joins a node to itself")
-    key = lines.min(axis=1).astype(np.int64) * nodes + lines.max(axis=1)
-    _, first, same = np.unique(key, return_index=True, return_inverse=True)
-    for i in _first(first[same] != np.arange(len(lines))):
-        j = first[same[i]]
-        raise InputError(f"lines[{i}] = {lines[i].tolist()} repeats lines[{j}] = {lines[j].tolist()}")
-    unused = np.flatnonzero(np.bincount(lines.ravel(), minlength=nodes) == 0)
-    if len(unused):
-        more = f" (and {len(unused) - 1} more)" if len(unused) > 1 else ""
-        raise InputError(f"node {unused[0]}{more} is used by no line")
     return np.array(lines, dtype=np.int32, order="C")

@@ -93,6 +93,7 @@ class State:
         """Free nodes that no taut line holds, whose position is not unique; bars hold under compression as well."""
         net = self.system.net
         held = self.system.supported.all(axis=1)
+        held[net.web.bare] = True  # by a link
         holds = np.ones(len(net.cells), dtype=bool) if net.law.number == LINEAR else ~self.element_slack
         held[net.cells[holds].ravel()] = True
         return np.flatnonzero(~held[: net.nodes])
