@@ -33,8 +33,6 @@ def remarks_on(here, state, equilibrium):
 
 def left_out(system):
     """What the modes of a system leave out."""
-    if system.rotating:
-        yield "Coriolis forces are left out: ± holds how far they may move the frequency of a mode that they act on"
     if any(family.damping is not None and family not in system.rotating for family in system.families):
         yield "forces that depend on velocity, such as damping, are left out"
     if free := [body.name for body in system.net.bodies if not body.fixed]:

@@ -150,6 +150,15 @@ class Pencil:
             raise SolverError(f"no modes at step {self.t:g}: the stiffness is singular to rounding")
         return y[self.massive]
 
+    def bend(self, shift):
+        """Displacement of the unknowns with mass under forces on them, K less ``shift`` M, as a function of forces."""
+        self._shift, self._solve = shift, self._solver(shift)
+        return self._flexible
+
+    def follow(self, force):
+        """Displacement of the unknowns without mass under forces on them, all others held."""
+        return self._inner.solve(force)
+
     def moved(self, force):
         """Displacement of the unknowns under a force, K less the last shift M."""
         return self._solver(self._shift)(force)

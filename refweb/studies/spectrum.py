@@ -7,9 +7,8 @@ With M definite there is an eigenvalue within ‖Kφ − ω²Mφ‖ of ω², in 
 come the rounding of K, and what the error that is left in the equilibrium changes in ω²: K is assembled once more after
 another Newton step.
 
-In a frame that turns K has the centrifugal force, and Coriolis forces are left out: ω²Mφ = (K + iωG)φ with G of the
-norm 2Ω has by Weyl's inequality its frequencies between √(Ω² + ω²) ± Ω, which the bound holds for every mode that they
-act on. Those along the axis feel none.
+In a frame that turns K has the centrifugal force, and the modes are those of `refweb.studies.turning`, with Coriolis
+forces.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ import numpy as np
 
 from ..errors import SolverError
 from .pencil import Pencil
+from .turning import coriolis, turning_pairs
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +38,8 @@ class Spectrum:
         ‖Kφ − ω²Mφ‖ over |ω²| ‖φ‖, in the norms of M⁻¹ and M [1].
     shapes : ndarray, shape (modes, rows, 3)
         Displacements; the largest of a row is 1, and its largest component positive.
+    later : ndarray, shape (modes, rows, 3), optional
+        In a frame that turns, displacements a quarter of a period after those.
     modal_mass : ndarray, shape (modes,)
         φᵀMφ of the shapes [kg]: a shape over its root is mass-normalised.
     shares : ndarray, shape (modes, 3)
@@ -61,6 +63,7 @@ class Spectrum:
     nodes: np.ndarray
     unstable: int
     zero: int
+    later: np.ndarray | None = None
 
     @property
     def frequency(self):
@@ -100,6 +103,9 @@ def spectrum(system, t, x, number, seed=0):
         Where nothing that has mass has stiffness, or a node has neither.
     """
     pencil = Pencil(system, t, x, seed)
+    if (turned := coriolis(system)) is not None:
+        pairs = turning_pairs(pencil, turned, number, lambda v: _rounding(pencil, v) + _left(pencil, v))
+        return _described(pencil, *pairs)
     unstable, low = pencil.below(0.0, 1.0), pencil.below(0.0, -1.0)
     vectors, shift = [], 0.0
     if unstable:
@@ -114,40 +120,46 @@ def spectrum(system, t, x, number, seed=0):
             f"no mode at step {t:g}: none of the {len(pencil.massive)} unknowns that have mass has stiffness; stretch "
             "the web by a load, or by a prestrain of its cable"
         )
-    return _described(pencil, np.hstack(vectors), unstable, low - unstable)
+    return _described(pencil, *_ordered(pencil, np.hstack(vectors)), unstable, low - unstable)
 
 
-def _described(pencil, vectors, unstable, zero):
-    """The `Spectrum` of vectors."""
-    system = pencil.system
+def _ordered(pencil, vectors):
+    """ω², increasing, with bounds, residuals and vectors."""
     vectors = vectors / np.sqrt((vectors * (pencil.M @ vectors)).sum(axis=0))
     squared = (vectors * (pencil.K @ vectors)).sum(axis=0)
     vectors, squared = vectors[:, (order := np.argsort(squared))], squared[order]
     residual = pencil.residual(squared, vectors)
-    modes = np.arange(len(squared))
-    shapes = np.zeros((len(modes), system.rows, 3))
+    return squared, residual + _rounding(pencil, vectors) + _left(pencil, vectors), residual, vectors
+
+
+def _described(pencil, squared, bound, residual, vectors, unstable, zero):
+    """The `Spectrum` of vectors with φ*Mφ = 1."""
+    system, modes = pencil.system, np.arange(len(squared))
+    shapes = np.zeros((len(modes), system.rows, 3), dtype=vectors.dtype)
     kinetic = np.zeros_like(shapes)
     shapes.reshape(len(modes), -1)[:, system.free] = vectors.T
-    kinetic.reshape(len(modes), -1)[:, system.free] = (vectors * (pencil.M @ vectors)).T
-    bound = residual + _rounding(pencil, vectors) + _left(pencil, vectors) + _turned(system, squared, shapes)
-    size = np.linalg.norm(shapes, axis=2)
-    nodes = np.argmax(size > (1.0 - 1e-6) * size.max(axis=1, keepdims=True), axis=1)  # the first of equal ones
-    largest = shapes[modes, nodes]
-    sign = np.sign(largest[modes, abs(largest).argmax(axis=1)])
-    shapes *= (sign / size[modes, nodes])[:, None, None]
+    kinetic.reshape(len(modes), -1)[:, system.free] = (vectors.conj() * (pencil.M @ vectors)).T
     mass = np.where(system.supported.all(axis=1), 0.0, system.net.mass)
+    swept = np.linalg.norm(shapes, axis=2)
+    nodes = np.argmax(swept > (1.0 - 1e-6) * swept.max(axis=1, keepdims=True), axis=1)  # the first of equal ones
+    largest = shapes[modes, nodes]
+    largest = largest[modes, abs(largest).argmax(axis=1)]
+    shapes *= (largest.conj() / abs(largest))[:, None, None]  # at the instant when that is at its largest
+    size = np.linalg.norm(shapes[modes, nodes].real, axis=1)
+    shapes /= size[:, None, None]
     return Spectrum(
         step=pencil.t,
         squared=squared,
         bound=bound,
         residual=residual / np.maximum(abs(squared), np.finfo(float).tiny),
-        shapes=shapes,
-        modal_mass=1.0 / size[modes, nodes] ** 2,
-        shares=kinetic.sum(axis=1),
-        moving=(size**2 @ mass) ** 2 / (mass.sum() * (size**4 @ mass)),
+        shapes=np.ascontiguousarray(shapes.real),
+        modal_mass=1.0 / size**2,
+        shares=kinetic.sum(axis=1).real,
+        moving=(swept**2 @ mass) ** 2 / (mass.sum() * (swept**4 @ mass)),
         nodes=nodes,
         unstable=unstable,
         zero=zero,
+        later=np.ascontiguousarray(-shapes.imag) if np.iscomplexobj(shapes) else None,
     )
 
 
@@ -155,7 +167,7 @@ def _rounding(pencil, vectors):
     """What the rounding of K may make of ω²."""
     size = abs(vectors)
     rounding = 8.0 * (size * (abs(pencil.K) @ size)).sum(axis=0)
-    return np.finfo(float).eps * (rounding + 2.0 * (vectors * (pencil.strained @ vectors)).sum(axis=0))
+    return np.finfo(float).eps * (rounding + 2.0 * (vectors.conj() * (pencil.strained @ vectors)).sum(axis=0).real)
 
 
 def _left(pencil, vectors):
@@ -163,13 +175,4 @@ def _left(pencil, vectors):
     system, there = pencil.system, pencil.x.copy()
     there.ravel()[system.free] += pencil.moved(system.force(pencil.t, pencil.x).ravel()[system.free])
     change = pencil.change(there)
-    return np.linalg.norm(vectors.T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too
-
-
-def _turned(system, squared, shapes):
-    """How far Coriolis forces may move ω²."""
-    turning = np.array(system.rotating[0].angular_velocity if system.rotating else (0.0, 0.0, 0.0))
-    force = np.where(system.supported, 0.0, np.cross(turning, shapes))
-    speed = np.linalg.norm(turning)
-    felt = abs(force).max(axis=(1, 2)) > 1e-9 * speed * abs(shapes).max(axis=(1, 2))
-    return np.where(felt, 2.0 * speed * (speed + np.sqrt(speed**2 + np.maximum(squared, 0.0))), 0.0)
+    return np.linalg.norm(vectors.conj().T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too

@@ -152,28 +152,6 @@ def test_taut_string_converges_with_twice_its_order(mass, order):
 # The hanging chain, in the limit of no stretch.
 
 
-@pytest.mark.parametrize("speed", [0.2, 2.0, 9.0])
-def test_frequencies_in_a_turning_frame(speed):
-    """A mass on a cross: across the plane as at rest, in it √(ω²) ± Ω, which ± holds though Coriolis is left out."""
-    points = [[-1, 0, 0], [0, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0]]
-    scene = refweb.Scene(
-        web=inline(points, [[0, 1], [1, 2], [3, 1], [1, 4]], supports=[0, 2, 3, 4]),
-        cable=refweb.Cable(law="linear", modulus=1e6, area=1e-4, density=0.0, prestrain=0.01),
-        effects=[refweb.PointMass(node=1, mass=2.0)],
-    )
-    still = refweb.modes(scene, 3)
-    turning = refweb.modes(scene.replace(effects=[*scene.effects, refweb.Frame(angular_velocity=(0, 0, speed))]), 3)
-    order = np.argsort(turning.shapes[:, 1, 2] ** 2)
-    across = order[-1]
-    natural = still.frequency[np.argmax(still.shapes[:, 1, 2] ** 2)]
-    np.testing.assert_allclose(turning.frequency[across], natural, rtol=1e-12)
-    assert turning.error[across] < 1e-12
-    for k, sign in zip(order[:2], (-1.0, 1.0), strict=True):
-        exact = still.frequency.max() + sign * speed / (2.0 * np.pi)
-        assert abs(turning.frequency[k] - exact) <= turning.error[k] < 3.0 * speed / (2.0 * np.pi)
-    assert len(turning.warnings) == 1 and "Coriolis" in turning.warnings[0]
-
-
 def test_hanging_beads_are_zeros_of_laguerre():
     """N beads on a massless thread: ω² = (g/a) x with L_N(x) = 0, the pendulum for N = 1.
 

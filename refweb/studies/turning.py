@@ -1,0 +1,282 @@
+"""Frequencies in a frame that turns, with Coriolis forces: pairs of (K + iωG − ω²M) φ = 0.
+
+G = 2 m Ω × is antisymmetric, so that iG is Hermitian; frequencies come in pairs ±ω with conjugate shapes, of which
+those above 0 are listed. Where K, which has the centrifugal force, is positive definite, all of them are real: with
+u = (φ, ωφ) they are those of a definite pencil [1]_,
+
+    B u = 1/ω A u,        A = [K 0; 0 M],        B = [−iG M; M 0],
+
+and as many lie between 0 and s as K + isG − s²M has negative pivots. With the residual r = (K + iωG − ω²M) φ there is
+one whose 1/ω is within |r|/ω, in the norm of K⁻¹, over that of u in A.
+
+Where K is not definite, Coriolis forces may hold what K does not: a free mass has K = −mΩ² and goes straight ahead,
+which is ω = Ω, double and of one shape. Such nets are solved as a whole, by all eigenvalues of the first order system,
+as far as they are `MOST` unknowns. What changes κ = φ*Kφ by e then changes ω, a root of κ + ωγ − ω²μ = 0, by no more
+than the root δ of μδ² + √(γ² + 4κμ) δ = e; that is an estimate, which takes shapes to be good.
+
+References
+----------
+.. [1] F. Tisseur, K. Meerbergen, "The quadratic eigenvalue problem", SIAM Review 43 (2001) 235–286, section 4,
+   doi:10.1137/S0036144500381988.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse import block_array, coo_array, csc_array, csc_matrix, diags_array, kron, triu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+
+from ..errors import SolverError
+from .pencil import DENSE
+
+MOST = 600
+"""Unknowns with mass up to which nets are solved as a whole where K is not definite."""
+SMALL = 1e-7
+"""Rate that counts as none, over the largest: the root of what rounding leaves of it squared."""
+
+
+class Pairs(NamedTuple):
+    """Pairs of a pencil in a frame that turns.
+
+    Attributes
+    ----------
+    squared, bound : ndarray, shape (modes,)
+        ω² [1/s²], negative of a rate of growth where there is one, and the bound on its error.
+    residual : ndarray, shape (modes,)
+        |(K + iωG − ω²M) φ| in the norm of M⁻¹, with φ*Mφ = 1 [1/s²].
+    vectors : ndarray of complex, shape (unknowns, modes)
+        Shapes.
+    unstable, zero : int
+        Number of modes that grow, and of directions that nothing drives.
+    """
+
+    squared: np.ndarray
+    bound: np.ndarray
+    residual: np.ndarray
+    vectors: np.ndarray
+    unstable: int
+    zero: int
+
+
+def coriolis(system):
+    """G = −∂f/∂v of the unknowns [kg/s], a sparse matrix; None where no frame turns."""
+    speed = np.array(system.rotating[0].angular_velocity if system.rotating else (0.0, 0.0, 0.0))
+    if not speed.any():
+        return None
+    net = system.net
+    mass = coo_array(diags_array(net.mass))
+    if net.consistent_minus_lumped is not None:
+        count = net.cells.shape[1]
+        rows, columns = np.repeat(net.cells, count, axis=1).ravel(), np.tile(net.cells, count).ravel()
+        mass = mass + coo_array((net.consistent_minus_lumped.ravel(), (rows, columns)), shape=mass.shape)
+    across = 2.0 * np.cross(np.eye(3), speed)  # (Ω × e)_i = across[i, j] e_j
+    return csc_array(csc_array(kron(mass, across))[system.free][:, system.free])
+
+
+class Gyroscopic:
+    """K, M and G of a pencil in its unknowns with mass; those without follow.
+
+    Parameters
+    ----------
+    pencil : refweb.studies.pencil.Pencil
+        K and M.
+    G : sparse matrix, shape (unknowns, unknowns)
+        That of `coriolis`.
+    """
+
+    def __init__(self, pencil, G):
+        self.pencil, self.G = pencil, G
+        self.M = csc_array(pencil.M)[pencil.massive][:, pencil.massive]
+        self.own = G[pencil.massive][:, pencil.massive]
+        self._weigh = splu(csc_matrix(self.M))
+
+    def stiffness(self):
+        """K of the unknowns with mass, the others in equilibrium with them, a dense matrix."""
+        K, pencil = csc_array(self.pencil.K), self.pencil
+        own = K[pencil.massive][:, pencil.massive].toarray()
+        if len(pencil.massless):
+            across = K[pencil.massless][:, pencil.massive].toarray()
+            own -= across.T @ pencil.follow(across)
+        return 0.5 * (own + own.T)
+
+    def whole(self, parts):
+        """Vectors of all unknowns, shape (unknowns, modes)."""
+        vectors = np.zeros((self.pencil.system.pattern.size, parts.shape[1]), dtype=complex)
+        vectors[self.pencil.massive] = parts
+        if len(self.pencil.massless):
+            rest = (self.pencil.K @ vectors)[self.pencil.massless]
+            vectors[self.pencil.massless] = -self.pencil.follow(rest.real) - 1j * self.pencil.follow(rest.imag)
+        return vectors / np.sqrt(self.form(self.pencil.M, vectors))
+
+    @staticmethod
+    def form(matrix, vectors):
+        """φ*Aφ of each vector, of a symmetric matrix."""
+        return (vectors.conj() * (matrix @ vectors)).sum(axis=0).real
+
+    def forms(self, vectors):
+        """κ = φ*Kφ and γ = φ*iGφ of vectors with φ*Mφ = 1."""
+        return self.form(self.pencil.K, vectors), (vectors.conj() * (1j * (self.G @ vectors))).sum(axis=0).real
+
+    def rest(self, rates, vectors):
+        """(K + λG + λ²M) φ of the unknowns with mass, where those without have none."""
+        rest = self.pencil.K @ vectors + rates * (self.G @ vectors) + rates**2 * (self.pencil.M @ vectors)
+        return rest[self.pencil.massive]
+
+    def weighed(self, rest):
+        """Norm of each column in M⁻¹."""
+        inverse = self._weigh.solve(rest.real) + 1j * self._weigh.solve(rest.imag)
+        return np.sqrt(np.maximum((rest.conj() * inverse).sum(axis=0).real, 0.0))
+
+    def below(self, omega):
+        """Number of frequencies between 0 and one, of a definite K."""
+        import qdldl
+
+        real = self.pencil.K - omega**2 * self.pencil.M
+        turned = omega * self.G
+        both = csc_matrix(triu(block_array([[real, -turned], [turned, real]]), format="csc"))
+        pivots = qdldl.Solver(both, upper=True).factors()[1]
+        return int(np.count_nonzero(~(pivots > 0.0))) // 2
+
+
+def turning_pairs(pencil, G, number, least):
+    """The lowest `Pairs` of a net in a frame that turns, those that grow first.
+
+    Parameters
+    ----------
+    pencil : refweb.studies.pencil.Pencil
+        K and M.
+    G : sparse matrix
+        That of `coriolis`.
+    number : int
+        Pairs wanted; there are as many as unknowns with mass.
+    least : callable
+        Of vectors: what rounding and the error of the equilibrium make of φ*Kφ [1/s²].
+
+    Raises
+    ------
+    SolverError
+        Where some stay unfound, or K is not definite and there are too many unknowns.
+    """
+    gyroscopic = Gyroscopic(pencil, G)
+    if pencil.below(0.0, -1.0) == 0:
+        return _definite(gyroscopic, min(number, len(pencil.massive)), least)
+    if len(pencil.massive) > MOST:
+        raise SolverError(
+            f"no modes at step {pencil.t:g}: in [frame] nothing but Coriolis forces holds some directions of a net of "
+            f"{len(pencil.massive)} unknowns with mass, which is more than {MOST}, and none could be said to be "
+            "missed: support nodes, or divide lines less"
+        )
+    return _general(gyroscopic, number, least)
+
+
+def _definite(gyroscopic, number, least):
+    pencil = gyroscopic.pencil
+    size, solve = len(pencil.massive), pencil.bend(0.0)
+    for attempt in range(4):
+        wanted = min(number + 1 + 20 * attempt, size)
+        whole = size <= DENSE or 3 * wanted >= size
+        inverse, parts = (_all if whole else _some)(gyroscopic, wanted, solve, attempt)
+        vectors = gyroscopic.whole(parts)
+        stiff, turned = gyroscopic.forms(vectors)
+        split = np.sqrt(turned**2 + 4.0 * stiff)
+        omega = np.where(turned > 0.0, 0.5 * (turned + split), 2.0 * stiff / (split - np.minimum(turned, 0.0)))
+        order = np.argsort(omega)
+        omega, vectors, stiff, split = omega[order], vectors[:, order], stiff[order], split[order]
+        mark = omega[number - 1] * (1.0 - 1e-7)
+        if gyroscopic.below(mark) == np.count_nonzero(omega < mark):
+            break
+    else:
+        raise SolverError(f"no modes at step {pencil.t:g}: below ω = {mark:.4g} 1/s some of them stay unfound")
+    omega, vectors, stiff, split = omega[:number], vectors[:, :number], stiff[:number], split[:number]
+    rest = gyroscopic.rest(1j * omega, vectors)
+    soft = np.column_stack([solve(r.real) + 1j * solve(r.imag) for r in rest.T])
+    left = np.sqrt(np.maximum((rest.conj() * soft).sum(axis=0).real, 0.0))
+    share = left / np.sqrt(stiff + omega**2)  # error of 1/ω, over 1/ω
+    off = omega * share / np.maximum(1.0 - share, 0.5) + least(vectors) / split
+    return Pairs(omega**2, 2.0 * omega * off + off**2, gyroscopic.weighed(rest), vectors, 0, 0)
+
+
+def _all(gyroscopic, wanted, solve, attempt):
+    """The largest 1/ω, and φ of the unknowns with mass."""
+    M, G, K = gyroscopic.M.toarray(), gyroscopic.own.toarray(), gyroscopic.stiffness()
+    none = np.zeros_like(M)
+    B, A = np.block([[-1j * G, M], [M, none]]), np.block([[K, none], [none, M]])
+    inverse, vectors = scipy.linalg.eigh(B, A)
+    return inverse[: -wanted - 1 : -1], vectors[: len(M), : -wanted - 1 : -1]
+
+
+def _some(gyroscopic, wanted, solve, attempt):
+    """As `_all`, by Lanczos iteration."""
+    M, G, size = gyroscopic.M, gyroscopic.own, gyroscopic.M.shape[0]
+    pencil, weigh = gyroscopic.pencil, gyroscopic._weigh
+
+    def times(u):
+        u = u.ravel()
+        return np.concatenate([M @ u[size:] - 1j * (G @ u[:size]), M @ u[:size]])
+
+    def heavy(u):
+        u = u.ravel()
+        whole = np.zeros(pencil.system.pattern.size, dtype=complex)
+        whole[pencil.massive] = u[:size]
+        pull = pencil.K @ whole
+        if len(pencil.massless):
+            rest = pull[pencil.massless]
+            whole[pencil.massless] = -pencil.follow(rest.real) - 1j * pencil.follow(rest.imag)
+            pull = pencil.K @ whole
+        return np.concatenate([pull[pencil.massive], M @ u[size:]])
+
+    def light(u):
+        u = u.ravel()
+        first = solve(u[:size].real) + 1j * solve(u[:size].imag)
+        return np.concatenate([first, weigh.solve(u[size:].real) + 1j * weigh.solve(u[size:].imag)])
+
+    shape = (2 * size, 2 * size)
+    B, A, inverse = (LinearOperator(shape, matvec=by, dtype=complex) for by in (times, heavy, light))
+    start = np.random.default_rng(pencil.seed + attempt).standard_normal(2 * size).astype(complex)
+    try:
+        found, vectors = eigsh(B, wanted, A, which="LA", v0=start, Minv=inverse)
+    except ArpackError as error:
+        raise SolverError(f"no modes at step {pencil.t:g}: {error}") from None
+    return found, vectors[:size]
+
+
+def _general(gyroscopic, number, least):
+    """All pairs of the first order system; what grows less than `SMALL` of the fastest rate does not grow."""
+    gyroscopic.pencil.bend(gyroscopic.pencil.beside(gyroscopic.pencil.below(0.0, -1.0), 1.0))
+    root = scipy.linalg.cholesky(gyroscopic.M.toarray(), lower=True)
+
+    def scaled(matrix):
+        half = scipy.linalg.solve_triangular(root, matrix, lower=True)
+        return scipy.linalg.solve_triangular(root, half.T, lower=True).T
+
+    K, G = scaled(gyroscopic.stiffness()), scaled(gyroscopic.own.toarray())
+    size = len(K)
+    found, parts = np.linalg.eig(np.block([[np.zeros_like(K), np.eye(size)], [-K, -G]]))
+    none = SMALL * np.sqrt(abs(K).sum(axis=0).max())
+    least_growth = np.maximum(none, 1e-6 * abs(found))
+    grows = (found.real > least_growth) & (found.imag > -none)
+    turns = (abs(found.real) <= least_growth) & (found.imag > none)
+    if not (grows.any() or turns.any()):
+        raise SolverError(f"no mode at step {gyroscopic.pencil.t:g}: nothing that has mass has stiffness or is turned")
+    kept = np.flatnonzero(grows | turns)
+    kept = kept[np.argsort(np.where(grows, -found.real, found.imag)[kept])][:number]
+    rates, grown = found[kept], grows[kept]
+    vectors = gyroscopic.whole(scipy.linalg.solve_triangular(root.T, parts[:size, kept]))
+    stiff, turned = gyroscopic.forms(vectors)
+    split = np.sqrt(abs(turned**2 + 4.0 * stiff))
+    split = np.where(split**2 < 64.0 * np.finfo(float).eps * (turned**2 + 4.0 * abs(stiff)), 0.0, split)
+    roots = np.array([0.5 * (turned + split), 0.5 * (turned - split)])
+    omega = roots[abs(roots - rates.imag).argmin(axis=0), np.arange(len(kept))]
+    rates = np.where(grown, rates, 1j * omega)
+    rest = gyroscopic.weighed(gyroscopic.rest(rates, vectors))
+    rounding = 8.0 * np.finfo(float).eps * (abs(stiff) + abs(rates * turned) + abs(rates) ** 2)
+    off = rest + rounding + least(vectors)
+    off = 2.0 * off / (split + np.sqrt(split**2 + 4.0 * off))
+    value = np.where(grown, rates.real, omega)
+    squared = np.where(grown, -1.0, 1.0) * value**2
+    flutter = grows & (abs(found.imag) > none)  # four rates each, the others two
+    zero = size - int(turns.sum()) - int(grows.sum()) - int(flutter.sum())
+    return Pairs(squared, 2.0 * abs(value) * off + off**2, rest, vectors, int(grows.sum()), zero)
