@@ -70,6 +70,7 @@ MIRRORS = {
     "studies/predictability": "studies/test_horizon.py",
     "studies/discretisation_error": "dynamics/test_accuracy.py",
     "studies/spectrum": "studies/test_modes.py",
+    "studies/turning": "studies/test_turning.py",
     "studies/pencil": "studies/test_modes.py",
     "studies": "studies/test_cost.py",
     "commands": "commands/test_cli.py",
@@ -292,8 +293,10 @@ MUTANTS = [
         "np.log10(np.maximum(apart, 1e-300))[known]",
     ),
     Mutant("studies/discretisation_error", "first * ratio / (ratio - 1.0)", "first / (ratio - 1.0)"),
+    Mutant("studies/turning", "across = 2.0 * np.cross(", "across = np.cross("),
+    Mutant("studies/turning", "split = np.sqrt(turned**2 + 4.0 * stiff)", "split = np.sqrt(turned**2 + stiff)"),
     Mutant("studies/spectrum", "/ (2.0 * np.pi)", "/ np.pi"),
-    Mutant("studies/spectrum", "modal_mass=1.0 / size[modes, nodes] ** 2", "modal_mass=1.0 / size[modes, nodes]"),
+    Mutant("studies/spectrum", "modal_mass=1.0 / size**2", "modal_mass=1.0 / size"),
     Mutant("studies/budget", "SHARE = 1.0 / 3.0", "SHARE = 1.0"),
     # The command line
     Mutant(

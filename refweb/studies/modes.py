@@ -51,7 +51,10 @@ class Modes(Solution):
 
     @property
     def shapes(self):
-        """Displacement of each node in each mode at the last load step, the largest 1, shape (modes, nodes, 3)."""
+        """Displacement of each node in each mode at the last load step, the largest 1, shape (modes, nodes, 3).
+
+        In a frame that turns nodes go round: ``spectra[-1].later`` is a quarter of a period after that.
+        """
         return self.spectra[-1].shapes[:, : self.state.system.net.nodes]
 
     def __repr__(self):
