@@ -168,6 +168,7 @@ def test_nodes_that_nothing_holds_are_refused():
     with pytest.raises(refweb.InputError, match=r"node 2 has no mass: give density > 0 or a \[\[point_mass\]\]"):
         refweb.run(hung([[1, 2]], [[0.7, 0.0, 0.0]], [], 0.1))
     held = hung([[1, 2]], [[0.7, 0.0, 0.0]], [2.0], 0.1)
-    for refused in (lambda: refweb.run(held.replace(solve=refweb.Static())), lambda: refweb.modes(held)):
+    static = held.replace(solve=refweb.Static(), output=refweb.Output(), accuracy=refweb.Accuracy())
+    for refused in (lambda: refweb.run(static), lambda: refweb.modes(held)):
         with pytest.raises(refweb.InputError, match=r"\[\[link\]\]"):
             refused()

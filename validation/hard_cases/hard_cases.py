@@ -137,6 +137,7 @@ APART = inline([*ROW, [0, 1, 0], [1, 1, 0]], [[0, 1], [1, 2], [2, 3], [4, 5]], [
 TETHERED = inline(ROW, [[0, 1], [1, 2], [2, 3]], [0, 3], natural_length=[1.3, 0.9, 1.3])
 APART_BY = [refweb.Load(node=1, force=(-1.0, 0.0, 0.0)), refweb.Load(node=2, force=(1.0, 0.0, 0.0))]
 ARCH = inline([[-1, 0, 0], [1, 0, 0], [0, 0, 0.1]], [[0, 2], [1, 2]], [0, 1])
+BESIDE = inline(ROW, [[0, 1], [1, 0], [1, 2], [2, 3], [2, 3]], [0, 3], natural_length=[0.98, 0.99, 0.97, 0.99, 0.98])
 RIM = refweb.Supports(nodes=["rim"])
 HANGING = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
 CORNER = refweb.Supports(nodes=["corners"])
@@ -166,6 +167,7 @@ STATICS = {
         "dangling end": static(HANGING, pull(-1.0, 1), web=DANGLING),
         "two components": static(HANGING, web=APART),
         "a slack line of no length": static(HANGING, web=MET),
+        "two lines between two nodes": static(HANGING, pull(1.0, 1), web=BESIDE),
         "a line through its neighbour": static(pull(-3e3, 1), web=CROSSED),
         "all slack": static(HANGING, web=SLACK),
         "slack without load": static(web=SLACK),
@@ -405,6 +407,7 @@ MOTIONS = {
         "an end that jumps": free(JUMP, supports=RIM, refused=MOVED),
         "lengths 1 : 1e6": thrown(SHORT, (0, 3), duration=1e-4),
         "a slack line of no length": thrown(MET, (0, 3)),
+        "two lines between two nodes": thrown(BESIDE, (0, 3)),
         "a line through its neighbour": thrown(CROSSED, (0, 2, 3, 5), (0.0, 0.0, -10.0)),
         "a dangling end": thrown(DANGLING, (0, 3), node=4),
         "two components": thrown(APART, (0, 3, 4)),
