@@ -32,8 +32,8 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 from ..errors import SolverError
 from .pencil import DENSE
 
-MOST = 600
-"""Unknowns with mass up to which nets are solved as a whole where K is not definite."""
+MOST = 1500
+"""Unknowns with mass up to which nets are solved as a whole where K is not definite; that many take some minutes."""
 SMALL = 1e-7
 """Rate that counts as none, over the largest: the root of what rounding leaves of it squared."""
 
