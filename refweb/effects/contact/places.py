@@ -4,7 +4,8 @@ A line that lies on a face, or along a ring or a cylinder, has no single nearest
 jump from end to end. All shapes but spheres touch each element at both ends and once in between, at the place ξ where
 W(ξ) δ(ξ)^(p + 1) is largest, with the depth δ, the exponent p of the penalty and the window W = 4 ξ (1 − ξ). On a
 straight element that is one place, since the roots of W and δ are concave; it never jumps, and fades out where it nears
-an end, whose own contact takes over.
+an end, whose own contact takes over. On a curved one that bends away from the body between its ends there may be two,
+of which the deeper counts: the energy has a kink, and the force jumps, where they are equal.
 """
 
 from __future__ import annotations
