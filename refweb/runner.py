@@ -163,7 +163,7 @@ def _refine(scene, solution):
     def results(solution):
         return [step["results"] for step in solution.steps] or [solution.reduced]
 
-    found = discretisation_errors(scene, results(solution), lambda finer: results(run(finer)))
+    found = discretisation_errors(scene.replace(chosen=()), results(solution), lambda finer: results(run(finer)))
     if not solution.steps:
         solution.reduced = found[0]
     for step, with_errors in zip(solution.steps, found, strict=False):

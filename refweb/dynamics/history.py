@@ -35,8 +35,7 @@ def _probes_of_warnings(system, followed):
     if np.isfinite(net.strength).any():
         scales["utilisation"] = 0, 1.0 / (net.area * net.strength)
     tell = [scale for column, scale in scales.values() if column == 0]
-    tell += [p.data[:, 0] for p in followed if p.kernel is probes.line and p.rows[0] == 0 and p.sign > 0.0]
-    if not any(_tells_strain(system, scale) for scale in tell):
+    if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
         scales["strain"] = 1, np.ones(len(net.cells))
     found = {
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
@@ -47,6 +46,11 @@ def _probes_of_warnings(system, followed):
 
         found |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
     return found
+
+
+def _of_tension(probe):
+    """Whether a probe follows the largest of tensions, each times a scale, and no mean of it."""
+    return probe.kernel is probes.line and probe.rows[0] == 0 and probe.sign > 0.0 and not probe.average
 
 
 def _tells_strain(system, scale):
@@ -210,8 +214,8 @@ class Watch:
         net, values, places = self.system.net, course.extremes.values, course.extremes.places
         if (at := self._of_warning("strain")) is not None:
             return float(values[at]), int(net.line[places[at]])
-        slots = [i for i, p in enumerate(self.probes) if p.kernel is probes.line and p.rows[0] == 0 and p.sign > 0.0]
-        at = next(i for i in slots if _tells_strain(self.system, self.probes[i].data[:, 0]))
+        told = (_of_tension(p) and _tells_strain(self.system, p.data[:, 0]) for p in self.probes)
+        at = next(i for i, one in enumerate(told) if one)
         cell = int(places[at])
         tension, (stiffness, *law) = values[at] / self.probes[at].data[cell, 0], net.line_data[cell, 1:4]
         return float(net.law.strain(tension, stiffness, *law)) if tension > 0.0 else 0.0, int(net.line[cell])
