@@ -1,8 +1,8 @@
 """Hits of a ball on a web whose cells are smaller than the ball: how deep lines get, and whether it goes through.
 
 Neither is asked of refweb: depth is the radius less the distance of a line from the centre, and the ball is through
-where a node that it came to from one side, within four fifths of its radius of the way it flies, is on its other side.
-Lines that a ball has pushed aside are further from its way than that.
+where a free node that it came to from one side is on its other side, within four fifths of its radius of the way it
+flies. Lines that a ball has pushed aside are further from its way than that, and what holds the web stays where it is.
 """
 
 import numpy as np
@@ -54,9 +54,11 @@ def depths(state, body):
 
 
 def through(state, body):
-    """Whether a ball that came from below has a node near its way behind it."""
-    away = state.position[: state.system.net.nodes] - state.position[body.row]
-    near = np.linalg.norm(away[:, :2], axis=1) < ACROSS * body.radius
+    """Whether a ball that came from below has a free node that stood in its way behind it, and near its way."""
+    net, free = state.system.net, ~state.system.supported.all(axis=1)
+    before, away = (points[: net.nodes] - points[body.row] for points in (net.points, state.position))
+    met = free[: net.nodes] & (np.linalg.norm(before[:, :2], axis=1) < body.radius)
+    near = met & (np.linalg.norm(away[:, :2], axis=1) < ACROSS * body.radius)
     return bool((away[near, 2] < 0.0).any())
 
 
