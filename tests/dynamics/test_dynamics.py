@@ -893,7 +893,7 @@ def test_a_body_without_contact_passes_with_a_warning():
 
 @pytest.mark.parametrize("speed", [1e3, 7e3])
 def test_a_fast_body_does_not_pass_between_two_steps(speed):
-    """Its largest contact force is that of a tenth of the steps, within the ±; through soft contact it is seen to go."""
+    """Its largest contact force is that of a tenth of the steps, within ±; through soft contact it is seen to go."""
     web, bar = refweb.Window(mesh="square", rows=10, columns=10, side=0.1), cable(law="tension-only")
     ball = refweb.Body(name="ball", radius=0.12, mass=0.5, position=(0, 0, 0.2), velocity=(0, 0, -speed))
     force = refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")
