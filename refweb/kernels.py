@@ -15,6 +15,15 @@ all its digits, which it loses when positions are the unknowns.
 `LINES`        ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
 `IMPULSE`      ``(t, x, cells, data, total)``: adds ∫F dt [N s], F the sum of the forces of all cells, to ``total
                (3,)``, but for a constant
+`MEET`         ``(h, x, v, inverse, cells, data, touches, begin)``: writes what touches to rows of ``touches`` from
+               ``begin`` on, for a kick of size h from velocities v, ``inverse (rows, 3)`` being 1/m, 0 where a support
+               holds; the row behind them, also where ``touches`` has no room for all
+`RECALL`       ``(number, memory, f, touches, begin, end)``: adds to f the forces of what touched in the step before
+               this one, of a ``number`` > 0
+`SWEEP`        ``(h, number, f, inverse, touches, count)``: solves contacts one after the other and adds what their
+               forces change by to f; the largest change of a velocity in a kick [m/s]
+`GIVE`         ``(number, memory, v, touches, begin, end, out)``: notes forces in the ``memory`` of a step, and writes
+               the power of each cell to ``out`` [W]
 =============  ==========================================================================================
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
@@ -59,6 +68,12 @@ BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_
 IMPULSE = ENERGY
 LINES = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
+MEET = types.int64(
+    _f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2), types.int64
+)
+SWEEP = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
+RECALL = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
+GIVE = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
 
 
 def _cache_folder():

@@ -39,6 +39,7 @@ MIRRORS = {
     "net/shapes": "effects/test_contact.py",
     "net/grown_core": "effects/test_deep_contact.py",
     "effects/contact/overlap": "effects/test_overlap.py",
+    "effects/contact/rubbing": "effects/test_rubbing.py effects/test_contact.py",
     "effects/contact": "test_contract.py effects/test_contact.py effects/test_overlap.py effects/test_deep_contact.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
     "effects/elasticity": "net/test_elements.py test_contract.py",
@@ -192,6 +193,9 @@ MUTANTS = [
     Mutant("effects/contact/overlap", "1.0 if body.shape.once or body.shape.planar else 2.0", "1.0"),
     Mutant("effects/contact/sphere", "out[c, 0] = data[c, RADIUS] - distance", "out[c, 0] = distance"),
     Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
+    Mutant("effects/contact/rubbing", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),
+    Mutant("effects/contact/rubbing", "p, normal = 0.0, touches[n, PUSH]", "p, normal = 0.0, 2.0 * touches[n, PUSH]"),
+    Mutant("effects/contact/rubbing", "lever = cross(axis, y)", "lever = cross(y, axis)"),
     # Systems and links
     Mutant(
         "system/links",

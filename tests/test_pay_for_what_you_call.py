@@ -115,7 +115,7 @@ def called(given):
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
         general = "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"])
         if keys & {"damping", "friction"}:
-            modules |= {"effects.contact.friction", "effects.contact.penalty", *GENERAL}
+            modules |= {"effects.contact.friction", "effects.contact.rubbing", "effects.contact.penalty", *GENERAL}
         elif general:
             modules |= {"effects.contact.penalty", *GENERAL}
         if any(body.get("shape", "sphere") == "sphere" for body in given["body"]) and not keys & {"exponent"}:

@@ -65,8 +65,6 @@ def decided(scene, system):
     if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
         return Choice(given_to(scene, "cvode", family=family), f"{what} is not for explicit steps")
-    # the bound of damping and friction in contact is that of all lines touched at once
-    system = _undamped(system, lambda family: family.contact)
     bound = _bound(system)
     corners = np.searchsorted(system.corners, scene.solve.duration)
     steps = max(scene.solve.duration / (0.5 * bound), float(corners))
@@ -91,17 +89,18 @@ def decided(scene, system):
     return Choice(given_to(scene, "central-difference"), price)
 
 
-def _undamped(system, chosen=lambda family: True):
-    """The system without the bounds of damping, of some families or of all."""
+def _undamped(system):
+    """The system without the bounds of damping."""
     calm = copy.copy(system)
-    calm.families = [replace(f, damping_bound=None) if chosen(f) else f for f in system.families]
+    calm.families = [replace(family, damping_bound=None) for family in system.families]
     return calm
 
 
 def step_price(system):
     """Estimate of the CPU time of an explicit step of one evaluation of forces [s].
 
-    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
+    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away; where
+    kicks are solved for losses of contact, it takes up to twice the time.
     """
     price = PER_STEP + PER_ELEMENT * len(system.net.cells)
     if any(family.damping is not None for family in system.families):

@@ -17,11 +17,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 TENSION, STRAIN, POWER = range(3)
 """Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
+
+
+class Rubbing(NamedTuple):
+    """Kernels that solve for losses where an explicit method kicks velocities.
+
+    Attributes
+    ----------
+    meet, recall, sweep, give : kernel
+        What touches, its forces in the step before, one sweep over it, and its power; signatures are in
+        `refweb.kernels`. All families have the same ``sweep``.
+    width : int
+        Number of columns of what touches.
+    memory : int
+        Number of columns that a cell has in the memory of a step.
+    """
+
+    meet: Callable
+    recall: Callable
+    sweep: Callable
+    give: Callable
+    width: int
+    memory: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +86,9 @@ class Family:
     damping : kernel, optional
         −∂f/∂v by cell; None where the force does not depend on velocity.
     damping_bound : kernel, optional
-        Bound on the row sums of |−∂f/∂v|.
+        Bound on the row sums of |−∂f/∂v|; None where kicks are solved by ``rubbing``.
+    rubbing : Rubbing, optional
+        How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
     impulse : kernel, optional
@@ -95,6 +120,7 @@ class Family:
     angular_velocity: tuple | None = None
     damping: Callable | None = None
     damping_bound: Callable | None = None
+    rubbing: Rubbing | None = None
     internal: bool = False
     impulse: Callable | None = None
     moment_free: bool = False

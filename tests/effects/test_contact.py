@@ -407,7 +407,7 @@ def test_losses_close_the_book(exponent):
     """A block that falls, bounces and slides: nothing is won back, and the drift of the book is of order 2."""
     steps, drifts = [], []
     contact = refweb.Contact(stiffness=1e4, exponent=exponent, damping=2.0, friction=0.3, slip_velocity=0.05)
-    for safety in np.geomspace(0.4, 0.02, 10):
+    for safety in np.geomspace(0.3, 0.01, 14):
         solution = refweb.run(
             block([contact], height=2e-3, speed=0.5, solve=refweb.Dynamic(duration=0.1, safety=safety), interval=1e-3)
         )
@@ -750,22 +750,3 @@ def test_bound_of_contact_bounds(shape, exponent, mass):
         fastest = np.linalg.eigvals(tangent).real.max()
         shares.append(0.5 * CentralDifference(system).bound(x, reach=0.0) * np.sqrt(fastest))
     assert max(shares) <= 1.0 + 1e-12 and (mass < 1.0 or max(shares) > 0.2)
-
-
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("mass", [1e-5, 1e-3, 1.0, 1e3])
-def test_bound_of_losses_bounds(shape, mass):
-    """Rates at which losses damp are never above the row sums that the step is made of."""
-    contact = refweb.Contact(stiffness=1e3, exponent=1.5, damping=0.3, friction=0.5, slip_velocity=0.2)
-    for seed in range(15):
-        system, x, masses = overlapping(shape, contact, mass, seed)
-        v = 0.1 * np.random.default_rng(seed).standard_normal(x.shape)
-        v[system.supported] = 0.0
-        v[system.rows - system.net.spins :] = 0.0
-        rates, speed = np.zeros(system.rows), 2.0 * np.linalg.norm(v, axis=1).max()
-        for family in system.families:
-            if family.damping_bound is not None:
-                family.damping_bound(0.0, speed, x, system.net.mass, rates, family.cells, family.data)
-        damping = system.pattern.matrix(system.damping(0.0, x, v)).toarray() / masses[:, None]
-        fastest = np.abs(np.linalg.eigvals(damping)).max()
-        assert fastest <= (rates[system.free // 3] / masses).max() * (1.0 + 1e-12)

@@ -76,6 +76,8 @@ def forces_at(t, x, v, f, lines, model):
     add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), families.still, forces, cells, data, outs)
     for i in families.viscous:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
+    for i in model.rubbed.families:
+        forces[i](t, x, v, f, cells[i], data[i], outs[i])
 
 
 @kernel()

@@ -45,11 +45,14 @@ class ExplicitCourse(Course):
     ----------
     force : ndarray, shape (rows, 3)
         Force [N], last seen with the velocity at half a step.
+    power : ndarray, shape (families,)
+        Power of each family that is booked by it at the last step [W].
     before : ndarray, shape (3, rows, 3)
         Displacement, velocity and force at the row or the corner of a table before.
     """
 
     force: np.ndarray
+    power: np.ndarray
     before: np.ndarray | None = field(default=None, metadata={"saved": False})
 
     def __post_init__(self):
@@ -168,7 +171,7 @@ class CentralDifference(Integrator):
         book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), self._least))
         ledger = Ledger.empty()
         open_ledger(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
-        seen = dict(extremes=extremes, events=events, averages=averages)
+        seen = dict(power=np.zeros(len(system.families)), extremes=extremes, events=events, averages=averages)
         return ExplicitCourse(time=0.0, x=x, v=v, force=force, ledger=ledger, **seen, **book)
 
     def save(self, course):
@@ -212,9 +215,9 @@ class CentralDifference(Integrator):
         for name in SHARED:
             clock[name] = getattr(course, name)
         clock["least"] = self._least
-        families, changing = len(self.system.families), len(self._model.reels.lengths)
+        changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
-        carried = np.zeros(families), np.zeros((2, changing))
+        carried = course.power, np.zeros((2, changing))
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
     def advance(self, course, times):

@@ -63,10 +63,12 @@ def no_energy(t, x, cells, data, out):
 
 
 @kernel(forceinline=True)
-def begin_powers(t, x, v, extra, families, power):
-    """Write the power of each family that is booked by it [W]."""
+def begin_powers(t, x, v, extra, families, solved, known, power):
+    """Write the power of each family that is booked by it [W]; where it is ``known``, not of those that kicks solve."""
     for n in range(families.powers.shape[0]):
         i, column = families.powers[n, 0], families.powers[n, 1]
+        if known and i in solved:
+            continue
         families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
         power[i] = families.outs[i][:, column].sum()
 

@@ -39,6 +39,7 @@ from .step import (
     last_kick,
     move_supports,
     note_state,
+    rubbing_kick,
     set_lengths,
     set_reaction,
     turn_supports,
@@ -109,7 +110,7 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
     """Write powers, force of supports and push from outside at the time t that steps begin at."""
     x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
     if running.clock[0].begun == 0:
-        begin_powers(t, x, v, extra, families, running.power)
+        begin_powers(t, x, v, extra, families, model.rubbed.families, running.clock[0].nsteps > 0, running.power)
     if changing:
         reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
     set_reaction(model.inertia.held, running.f, reaction)
@@ -136,9 +137,10 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
-    half, was = np.empty((rows if viscous.size else 0, 3)), np.empty(reels.lengths.size if changing else 0)
+    rubbing, touches = model.rubbed.families.size > 0, np.empty((0, model.rubbed.width))
+    half, was = np.empty((rows if viscous.size or rubbing else 0, 3)), np.empty(reels.lengths.size if changing else 0)
     pushing, push, pushed = model.outside.pushing.size > 0, np.zeros(3), running.ledger.pushed
-    extra = np.zeros((rows if powers.shape[0] or viscous.size or pushing else 0, 3))
+    extra = np.zeros((rows if powers.shape[0] or viscous.size or rubbing or pushing else 0, 3))
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
@@ -166,7 +168,9 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])
-        if viscous.size:
+        if rubbing:
+            touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
+        elif viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)
         else:
             last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)

@@ -11,7 +11,21 @@ from typing import NamedTuple
 import numpy as np
 from numba.typed import List
 
-from ...kernels import BOUND, ENERGY, FORCE, INDICES, LINES, MATRIX, VECTOR, record, typed_list
+from ...kernels import (
+    BOUND,
+    ENERGY,
+    FORCE,
+    GIVE,
+    INDICES,
+    LINES,
+    MATRIX,
+    MEET,
+    RECALL,
+    SWEEP,
+    VECTOR,
+    record,
+    typed_list,
+)
 from ...results.probes import INTEGERS, PROBE
 from .averages import Averages, Windows
 from .energy_book import no_energy
@@ -105,13 +119,14 @@ class Families(NamedTuple):
     forces, cells, data, outs : List
         Kernel of each family, its cells, its numbers, and what it writes per cell.
     still, viscous : ndarray of int
-        Families behind the first whose forces follow from displacement and time alone, and those of velocity.
+        Families behind the first whose forces follow from displacement and time alone, and those of velocity whose
+        kicks are iterated.
     energies, stored : List
         Kernel of the energy of each family, and what it writes per cell [J].
     working : ndarray of int, shape (families,)
         Whether what is booked of a family is work (1), its energy, which is lost (−1), or nothing (0).
     powers : ndarray of int, shape (powered, 3)
-        Families booked by their power, the column of ``outs`` that has it, and whether they are viscous.
+        Families booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
     bounds, dampings : List
         Kernel that bounds the stiffness of each family, and the damping of each viscous one.
     """
@@ -135,9 +150,10 @@ class Families(NamedTuple):
         families, net = system.families, system.net
         lines = net.line_data.copy() if system.line_drives else net.line_data
         numbers = [lines if family.lines else family.data for family in families]
-        viscous = [i for i, family in enumerate(families) if family.damping is not None]
-        still = [i for i in range(1, len(families)) if i not in viscous]
-        powers = [(i, f.power, i in viscous) for i, f in enumerate(families) if f.power is not None]
+        fast = [i for i, family in enumerate(families) if family.damping is not None]
+        viscous = [i for i in fast if families[i].rubbing is None]
+        still = [i for i in range(1, len(families)) if i not in fast]
+        powers = [(i, f.power, i in fast) for i, f in enumerate(families) if f.power is not None]
         return cls(
             forces=typed_list(FORCE, [family.force for family in families]),
             cells=typed_list(INDICES, [family.cells for family in families]),
@@ -151,6 +167,46 @@ class Families(NamedTuple):
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
             bounds=typed_list(BOUND, [family.bound or no_bound for family in families]),
             dampings=typed_list(BOUND, [families[i].damping_bound or no_bound for i in viscous]),
+        )
+
+
+class Rubbed(NamedTuple):
+    """Families whose kicks are solved for.
+
+    Attributes
+    ----------
+    families : ndarray of int
+        Their numbers.
+    meets, recalls, sweeps, gives : List
+        Their kernels, see `refweb.effects.base.Rubbing`.
+    memories : List
+        What is remembered of the step before, by cell, within a row.
+    width : int
+        Number of columns of what touches.
+    """
+
+    families: np.ndarray
+    meets: List
+    recalls: List
+    sweeps: List
+    gives: List
+    memories: List
+    width: int
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
+        rubbing = [system.families[i] for i in families]
+        own = [family.rubbing for family in rubbing]
+        return cls(
+            families=np.array(families, dtype=np.int64),
+            meets=typed_list(MEET, [one.meet for one in own]),
+            recalls=typed_list(RECALL, [one.recall for one in own]),
+            sweeps=typed_list(SWEEP, [one.sweep for one in own]),
+            gives=typed_list(GIVE, [one.give for one in own]),
+            memories=typed_list(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
+            width=max((one.width for one in own), default=0),
         )
 
 
@@ -231,6 +287,7 @@ class Model(NamedTuple):
 
     inertia: Inertia
     families: Families
+    rubbed: Rubbed
     motions: Motions
     reels: Reels
     corners: np.ndarray
@@ -239,7 +296,7 @@ class Model(NamedTuple):
     @classmethod
     def of(cls, system):
         """That of a `refweb.system.system.System`."""
-        parts = (part.of(system) for part in (Inertia, Families, Motions, Reels))
+        parts = (part.of(system) for part in (Inertia, Families, Rubbed, Motions, Reels))
         return cls(*parts, system.corners, Outside.of(system))
 
 

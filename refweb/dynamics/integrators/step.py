@@ -11,6 +11,11 @@ from ...net.net import LENGTH
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
+SWEEPS = 32
+"""Largest number of sweeps over contacts in a step, which goes on where that before it came to: how contacts that stick
+at one point share their force may take more, and moves nothing but their creep below the slip velocity."""
+SETTLED = 1e-12
+"""Change of velocities, over the fastest and over what other forces give, at which sweeps over contacts end."""
 
 
 @kernel(forceinline=True)
@@ -59,8 +64,8 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
 
     Forces that depend on velocity see that at the end of the step; the kick, thereby implicit, stays adjoint to the
-    first one, and the method of order 2. The iteration contracts with ½ h C/m, and ends at rounding; friction that has
-    grown may take more than 30 rounds, and what `ROUNDS` leave shows in the energy book.
+    first one, and the method of order 2. The iteration contracts with ½ h C/m, and ends at rounding; what `ROUNDS`
+    leave shows in the energy book.
     """
     copy_rows(v, half)
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
@@ -77,11 +82,75 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
             flat_v[q] = speed if share == 1.0 else flat_v[q] + share * (speed - flat_v[q])
         if not change > 1e-14 * fastest:
             break
-        if change > 0.75 * before_that and share > 0.02:  # friction that has grown since the last bound
+        if change > 0.75 * before_that and share > 0.02:  # damping that has grown since the last bound
             share *= 0.5
         before_that = change
     for q in range(flat_v.size):
         flat_f[q] += flat_extra[q]
+
+
+@kernel()
+def meet_all(h, x, v, inverse, families, rubbed, touches, ends):
+    """Write all that touches, and to ``ends`` the rows that each family's end at; ``touches``, or a larger one."""
+    while True:
+        count = 0
+        for m in range(rubbed.families.size):
+            i = rubbed.families[m]
+            count = rubbed.meets[m](h, x, v, inverse, families.cells[i], families.data[i], touches, count)
+            ends[m] = count
+        if count <= touches.shape[0]:
+            return touches
+        touches = np.empty((2 * count, rubbed.width))
+
+
+@kernel()
+def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
+    """As `viscous_kick`, where losses of contact are solved for: they need no bound.
+
+    Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
+    the first begins without a memory of another. It writes the power of what rubs, and returns room for what touches.
+    """
+    families, rubbed = model.families, model.rubbed
+    forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
+    ends = np.zeros(rubbed.families.size, dtype=np.int64)
+    touches = meet_all(h, x, v, inverse, families, rubbed, touches, ends)
+    count, begin = ends[-1], 0
+    copy_rows(v, half)
+    flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
+    flat_v, flat_f, fastest = v.reshape(-1), f.reshape(-1), 0.0
+    extra[:] = 0.0
+    for q in range(flat_v.size):
+        fastest = max(fastest, abs(flat_v[q]), h * flat_inverse[q] * abs(flat_f[q]))
+    for m in range(ends.size):
+        if number == 1:
+            rubbed.memories[m][:] = 0.0
+        rubbed.recalls[m](number, rubbed.memories[m], f, touches, begin, ends[m])
+        begin = ends[m]
+    for n in range(ROUNDS if viscous.size else SWEEPS if count else 0):
+        change = 0.0
+        if viscous.size:
+            for q in range(flat_f.size):
+                flat_f[q] -= flat_extra[q]
+            extra[:] = 0.0
+            for i in viscous:
+                forces[i](t, x, v, extra, cells[i], data[i], outs[i])
+            for q in range(flat_f.size):
+                flat_f[q] += flat_extra[q]
+        if count:
+            change = rubbed.sweeps[0](h, n, f, inverse, touches, count)
+        if viscous.size:
+            for q in range(flat_v.size):
+                speed = flat_half[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
+                change, flat_v[q] = max(change, abs(speed - flat_v[q])), speed
+        if not change > SETTLED * fastest:
+            break
+    last_kick(0.5 * h, flat_inverse, flat_half, flat_f)
+    copy_rows(half, v)
+    begin = 0
+    for m in range(rubbed.families.size):
+        rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], outs[rubbed.families[m]])
+        begin = ends[m]
+    return touches
 
 
 @kernel(forceinline=True)
@@ -111,10 +180,12 @@ def turn_supports(t, model, running):
             now = v[driven[d], k]
             running.work[running.work.size - 1] += 0.5 * mass[driven[d]] * (now + was[d, k]) * (now - was[d, k])
             turned = turned or now != was[d, k]
-    if turned and families.viscous.size:
+    if turned and families.viscous.size + model.rubbed.families.size:
         f[:] = 0.0
         for i in range(len(forces)):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
+        for i in model.rubbed.families:
+            running.power[i] = families.outs[i][:, 0].sum()
     return turned
 
 

@@ -9,7 +9,8 @@ slip u_t = u − (n·u) n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossle
 F being what is added here to the penalty. F acts on the line at the contact and on the body with −F and the moment
 −y × F about its centre, y from the centre to the line's point, so that their momenta and angular momenta are kept; a
 ring turns about its normal only. The power F·u is not positive. With the matrices A = ∂F/∂y and B = ∂F/∂u the tangents
-follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of the contact's place as it moves.
+follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of the contact's place as it moves. How explicit
+kicks solve for F is in `refweb.effects.contact.rubbing`.
 
 References
 ----------
@@ -29,7 +30,7 @@ from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..vectors import cross, dot
 from .nearest_point import lightness, share
 from .pair import pair_of
-from .penalty import SHALLOW, foresight, power_of_depth, push_of, slope_of_power, thickness, turn_block
+from .penalty import SHALLOW, foresight, push_of, slope_of_power, thickness, turn_block
 from .places import PLACES, along_axes, from_axes, hessian_times, place_moves, places, window
 
 
@@ -219,7 +220,7 @@ def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
 
 @kernel()
 def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
-    """Add the row sums of the contacts of an element, with ∂F/∂u, or ∂F/∂y, of at most ``most`` each.
+    """Add the row sums of the contacts of an element, with ∂F/∂y of at most ``most`` each.
 
     Unknowns of the body are scaled as in `refweb.effects.contact.nearest_point.lightness`, and its rotation likewise.
     """
@@ -242,7 +243,7 @@ def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
 
 @functools.cache
 def kernels(depth, pieces, nodes, functions, spins):
-    """Force, stiffness and its bound, damping and its bound.
+    """Force, stiffness and its bound, and damping.
 
     Parameters
     ----------
@@ -310,15 +311,4 @@ def kernels(depth, pieces, nodes, functions, spins):
                 most = most * pair.stiffness * slope_of_power(pair.exponent, deep)
                 add_row_sums(rates, most, mass, cells, data, c, nodes, spins)
 
-    @kernel(BOUND)
-    def damping_bound(reach, speed, x, mass, rates, cells, data):
-        for c in range(cells.shape[0]):
-            deep = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
-            if deep > 0.0:
-                pair = pair_of(data, c, nodes)
-                fast = pair.friction * (1.0 + SHALLOW * pair.damping * speed) / pair.slip_velocity
-                most = pair.damping * (1.0 + pair.friction) + fast
-                most = most * pair.stiffness * power_of_depth(pair.exponent, deep)
-                add_row_sums(rates, most, mass, cells, data, c, nodes, spins)
-
-    return force, stiffness, bound, damping, damping_bound
+    return force, stiffness, bound, damping

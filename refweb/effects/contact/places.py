@@ -225,7 +225,7 @@ def places(depth):
             return where, depth_there
         return climbed(x, cells, data, c, nodes, functions, 0.0, 1.0, 0.5)
 
-    @kernel()
+    @kernel(forceinline=True)
     def contacts(x, cells, data, first, pieces, nodes, functions, found):
         """Write (cell, place, whether the place moves) of each contact of a line to ``found``; return their number."""
         count, best = 0, 0.0

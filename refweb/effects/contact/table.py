@@ -2,7 +2,8 @@
 
 The kernels of spheres alone are in `refweb.effects.contact.sphere`; other shapes, which touch a line wherever it lies
 on them, and other exponents are in `refweb.effects.contact.penalty`, damping and friction in
-`refweb.effects.contact.friction`. Bodies whose kernels are the same make one family.
+`refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.contact.rubbing`. Bodies
+whose kernels are the same make one family.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ class Contact(Table):
     friction : float
         Coefficient of friction μ. Free bodies that are spheres or rings are turned by it.
     slip_velocity : float
-        Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Steps of an
-        explicit method are in proportion to it where friction rules them.
+        Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Explicit steps
+        do not depend on it.
     bodies : dict of str to BodyContact
         What differs for a body.
 
@@ -172,8 +173,13 @@ class Contact(Table):
     def _friction(self, net, element, depth, spins, bodies):
         from .friction import kernels
 
-        force, stiffness, bound, damping, damping_bound = kernels(depth, *element, spins)
+        force, stiffness, bound, damping = kernels(depth, *element, spins)
         cells, data = self._numbers(net, bodies, spins)
+        rubbing = None
+        if net.order == 1:  # explicit steps take no other elements
+            from . import rubbing as kicks
+
+            rubbing = kicks.kernels(depth, net.subdivide, element[2], spins)
         return Family(
             name="contact",
             contact=True,
@@ -187,7 +193,7 @@ class Contact(Table):
             observed=1,
             power=0,
             damping=damping,
-            damping_bound=damping_bound,
+            rubbing=rubbing,
             internal=True,
             symmetric=False,
             at_rest=False,

@@ -1,0 +1,329 @@
+"""Losses of contact solved for, contact by contact, where an explicit method kicks velocities.
+
+A kick of size h leaves positions where they are. Of the velocities v⁻ ahead of it and v⁺ behind it, the impulses
+of contacts that act at once are to follow: with the relative velocity u = J v of a contact, its force F(u) of
+`refweb.effects.contact.friction` and all other forces f,
+
+    v⁺ = v⁻ + h M⁻¹(f + Σ Jᵀ F(u_θ)),        u_θ = (1 − θ) u⁻ + θ u⁺.
+
+Friction below its slip velocity is as stiff as that is small, so these equations are solved and not stepped over. They
+are coupled, since contacts share nodes and bodies: a sweep solves them one after the other, each with the forces that
+the others have come to, and the next sweep goes the other way, as nonlinear Gauss–Seidel does in [1]_. Each alone has a
+solution in closed form but for one number. Along the normal u = b + θ h w F is linear by pieces. Along the two
+directions of the tangent plane in which J M⁻¹ Jᵀ has no mixed term, with Z_i = θ h w_i μ N, the size r = √(|u_t|² +
+v_s²) is the root of
+
+    v_s²/r² + Σ b_i²/(r + Z_i)² = 1,
+
+whose left side falls and is convex, so that Newton's method on its inverse root comes to it from below.
+
+θ is ½ where a kick hardly changes the slip, which makes steps of order 2, and goes to 1 where the contact sticks, which
+takes the slip away instead of turning it round: θ(z) = 1/(1 − e⁻ᶻ) − 1/z is exact for a force −z u/h w. It departs from
+½ by z/12, of order h, which leaves the order at 2. What all forces do to the kinetic energy in a kick is h times their
+power at v = ½ (v⁻ + v⁺), and this power is what is booked: it closes the book whether sweeps have converged or not.
+Where it would be positive at a contact, whose slip turns round within the kick, θ is ½ there: F(u)·u is never positive.
+
+References
+----------
+.. [1] M. Jean, "The non-smooth contact dynamics method", Comput. Methods Appl. Mech. Engrg. 177 (1999) 235–257,
+   doi:10.1016/S0045-7825(98)00383-1.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from ...kernels import GIVE, MEET, RECALL, SWEEP, kernel
+from ..base import Rubbing
+from ..vectors import cross, dot
+from .nearest_point import share
+from .penalty import push_of
+from .places import PLACES, from_axes, places
+
+CELL, ROWS, SHARES, AXES, LEVERS, START = 0, 1, 5, 7, 16, 25
+"""Columns of what touches: cell; rows of the nodes, the body and its rotation, −1 without; shares of the nodes; the
+normal and two tangents; what an angular velocity adds to u along each; u⁻ along each [m/s]."""
+OWN, MIXED, PUSH, DAMPING, FRICTION, SLIP = 28, 31, 33, 34, 35, 36
+"""J M⁻¹ Jᵀ of each direction [1/kg], and of the normal with each tangent; N₀ [N], d [s/m], μ and v_s [m/s]."""
+FORCE, THETA, SLOT, WIDTH = 37, 40, 42, 43
+"""F along each direction [N], θ of the normal and of the tangents, slot in the memory of a cell; number of columns."""
+SLOTS, NOTED = 3, 4
+"""Contacts that a cell has at most, and what is remembered of each: the number of the step, and F [N]."""
+SETTLING = 2
+"""Number of sweeps after which θ stays."""
+
+
+@kernel()
+def fitted(z):
+    """θ(z) = 1/(1 − e⁻ᶻ) − 1/z of a loss that alone would take e⁻ᶻ of a velocity, z ≥ 0; ½ to 1."""
+    if z < 0.1:
+        return 0.5 + z / 12.0 * (1.0 - z * z / 60.0 * (1.0 - z * z / 42.0))
+    return 1.0 / (1.0 - math.exp(-z)) - 1.0 / z
+
+
+@kernel()
+def slip_size(b, c, y, z, slip):
+    """Root r of slip²/r² + b²/(r + y)² + c²/(r + z)² = 1, with y, z ≥ 0: never below the root of large steps."""
+    r = max(slip, math.sqrt(b * b + c * c) - max(y, z))
+    for _ in range(100):
+        p, q, s = slip / r, b / (r + y), c / (r + z)
+        p, q, s = p * p, q * q, s * s
+        total = p + q + s
+        step = total * (math.sqrt(total) - 1.0) / (p / r + q / (r + y) + s / (r + z))
+        r += step
+        if not abs(step) > 1e-15 * r:
+            break
+    return r
+
+
+@kernel(forceinline=True)
+def rows_of(touches, n):
+    """Rows of both nodes, of the body and of its rotation, −1 without."""
+    return int(touches[n, ROWS]), int(touches[n, ROWS + 1]), int(touches[n, ROWS + 2]), int(touches[n, ROWS + 3])
+
+
+@kernel(forceinline=True)
+def along(touches, n, i, rows):
+    """Component along direction i of Σ N v − v_body + ω × ..., of ``rows (rows, 3)``."""
+    at, lever = AXES + 3 * i, LEVERS + 3 * i
+    a, b, body, spin = rows_of(touches, n)
+    total = 0.0
+    for k in range(3):
+        point = touches[n, SHARES] * rows[a, k] + touches[n, SHARES + 1] * rows[b, k]
+        total += touches[n, at + k] * (point - rows[body, k])
+        if spin >= 0:
+            total += touches[n, lever + k] * rows[spin, k]
+    return total
+
+
+@kernel(forceinline=True)
+def moved(touches, n, i, f, inverse):
+    """Component along direction i of the acceleration by forces f."""
+    at, lever = AXES + 3 * i, LEVERS + 3 * i
+    a, b, body, spin = rows_of(touches, n)
+    total = 0.0
+    for k in range(3):
+        point = touches[n, SHARES] * inverse[a, k] * f[a, k] + touches[n, SHARES + 1] * inverse[b, k] * f[b, k]
+        total += touches[n, at + k] * (point - inverse[body, k] * f[body, k])
+        if spin >= 0:
+            total += touches[n, lever + k] * inverse[spin, k] * f[spin, k]
+    return total
+
+
+@kernel()
+def push_apart(touches, n, p, q, s, f):
+    """Add a force along the three directions to the rows of a contact."""
+    a, b, body, spin = rows_of(touches, n)
+    for k in range(3):
+        force = p * touches[n, AXES + k] + q * touches[n, AXES + 3 + k] + s * touches[n, AXES + 6 + k]
+        f[a, k] += touches[n, SHARES] * force
+        f[b, k] += touches[n, SHARES + 1] * force
+        f[body, k] -= force
+        if spin >= 0:
+            f[spin, k] += p * touches[n, LEVERS + k] + q * touches[n, LEVERS + 3 + k] + s * touches[n, LEVERS + 6 + k]
+
+
+@kernel()
+def weigh(touches, n, i, j, inverse):
+    """J M⁻¹ Jᵀ between two directions [1/kg]."""
+    a, b, body, spin = rows_of(touches, n)
+    total = 0.0
+    for k in range(3):
+        point = touches[n, SHARES] ** 2 * inverse[a, k] + touches[n, SHARES + 1] ** 2 * inverse[b, k] + inverse[body, k]
+        total += touches[n, AXES + 3 * i + k] * touches[n, AXES + 3 * j + k] * point
+        if spin >= 0:
+            total += touches[n, LEVERS + 3 * i + k] * touches[n, LEVERS + 3 * j + k] * inverse[spin, k]
+    return total
+
+
+@kernel()
+def turn_tangents(touches, n, inverse):
+    """Turn the tangents of a contact so that J M⁻¹ Jᵀ has no mixed term between them."""
+    first, last, mixed = weigh(touches, n, 1, 1, inverse), weigh(touches, n, 2, 2, inverse), 0.0
+    mixed = weigh(touches, n, 1, 2, inverse)
+    if abs(mixed) > 1e-15 * (first + last):
+        angle = 0.5 * math.atan2(2.0 * mixed, first - last)
+        c, s = math.cos(angle), math.sin(angle)
+        for at in (AXES, LEVERS):
+            for k in range(3):
+                one, other = touches[n, at + 3 + k], touches[n, at + 6 + k]
+                touches[n, at + 3 + k], touches[n, at + 6 + k] = c * one + s * other, c * other - s * one
+
+
+@kernel()
+def set_axis(touches, n, i, axis, y, normal, planar):
+    """Write direction i of a contact at y from the centre, and its lever: of a ring, about its normal alone."""
+    lever = cross(axis, y)
+    if planar:
+        turn = dot(lever, normal)
+        lever = turn * normal[0], turn * normal[1], turn * normal[2]
+    for k in range(3):
+        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = axis[k], lever[k]
+
+
+@kernel()
+def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
+    """Write all that sweeps ask of a contact of an element with two nodes."""
+    c, pair = touch.c, touch.pair
+    touches[n, CELL] = c
+    for k in range(3 + spins):
+        touches[n, ROWS + k] = cells[c, k]
+    if not spins:
+        touches[n, ROWS + 3] = -1.0
+    for a in range(2):
+        touches[n, SHARES + a] = share(a, 2, functions, touch.place)[0]
+    y, g = from_axes(pair.axes, touch.spot.y), from_axes(pair.axes, touch.spot.gradient)
+    steep = math.sqrt(dot(g, g))
+    g = g[0] / steep, g[1] / steep, g[2] / steep
+    least = (1.0, 0.0, 0.0) if abs(g[0]) < 0.6 else (0.0, 1.0, 0.0)
+    e = cross(g, least)
+    size = math.sqrt(dot(e, e))
+    e = e[0] / size, e[1] / size, e[2] / size
+    set_axis(touches, n, 0, g, y, pair.axes[2], pair.planar)
+    set_axis(touches, n, 1, e, y, pair.axes[2], pair.planar)
+    set_axis(touches, n, 2, cross(g, e), y, pair.axes[2], pair.planar)
+    turn_tangents(touches, n, inverse)
+    for i in range(3):
+        touches[n, START + i] = along(touches, n, i, v)
+        touches[n, OWN + i] = weigh(touches, n, i, i, inverse)
+        touches[n, FORCE + i] = 0.0
+    for i in range(2):
+        touches[n, MIXED + i] = weigh(touches, n, 0, 1 + i, inverse)
+    touches[n, PUSH], touches[n, DAMPING] = push_of(touch) * steep, pair.damping * steep
+    touches[n, FRICTION], touches[n, SLIP] = pair.friction, pair.slip_velocity
+    touches[n, THETA] = fitted(h * touches[n, OWN] * touches[n, PUSH] * touches[n, DAMPING])
+    touches[n, THETA + 1] = 1.0
+    touches[n, SLOT] = 0.0 if touch.inner or pair.once else 1.0 if touch.place < 0.5 else 2.0
+
+
+@kernel()
+def solve_normal(touches, n, h, rate):
+    """(force along the normal, N) where the others alone would speed the contact up by ``rate`` [m/s²]."""
+    push, damping, own = touches[n, PUSH], touches[n, DAMPING], touches[n, OWN]
+    if damping == 0.0:
+        return 0.0, push
+    while True:
+        theta = touches[n, THETA]
+        start = touches[n, START] + theta * h * rate
+        u = start / (1.0 + theta * h * own * push * damping)
+        damped = damping * u
+        if damped < -1.0:
+            damped = -1.0
+        force = -push * damped
+        if theta == 0.5 or damped * (touches[n, START] + 0.5 * h * (rate + own * force)) >= 0.0:
+            return force, push * (1.0 + damped)
+        touches[n, THETA] = 0.5
+
+
+@kernel()
+def solve_tangents(touches, n, h, drag, first, last, settling):
+    """Friction along both tangents, of μ N = ``drag``, where the others alone would speed it up by first and last."""
+    slip, one, other = touches[n, SLIP], h * touches[n, OWN + 1], h * touches[n, OWN + 2]
+    u, w = touches[n, START + 1], touches[n, START + 2]
+    if settling:
+        r = slip_size(u + h * first, w + h * last, one * drag, other * drag, slip)
+        touches[n, THETA + 1] = fitted(max(one, other) * drag / r)
+    while True:
+        theta = touches[n, THETA + 1]
+        b, c, y, z = u + theta * h * first, w + theta * h * last, theta * one * drag, theta * other * drag
+        r = slip_size(b, c, y, z, slip)
+        b, c = b / (r + y), c / (r + z)
+        force = -drag * b, -drag * c
+        if theta == 0.5:
+            return force
+        mean, more = u + 0.5 * (h * first + one * force[0]), w + 0.5 * (h * last + other * force[1])
+        if b * mean + c * more >= 0.0:
+            return force
+        touches[n, THETA + 1] = 0.5
+
+
+@kernel()
+def turned_from(memory, c, at, touches, n):
+    """Components along the directions of a contact of the vector that a row of a memory holds."""
+    p = q = s = 0.0
+    for k in range(3):
+        p += memory[c, at + k] * touches[n, AXES + k]
+        q += memory[c, at + k] * touches[n, AXES + 3 + k]
+        s += memory[c, at + k] * touches[n, AXES + 6 + k]
+    return p, q, s
+
+
+@kernel(SWEEP)
+def sweep(h, number, f, inverse, touches, count):
+    """Solve contacts in turn, backwards where ``number`` is odd; the largest change of a velocity [m/s]."""
+    most = 0.0
+    for m in range(count):
+        n = count - 1 - m if number % 2 else m
+        if not touches[n, PUSH] > 0.0:
+            continue
+        was = touches[n, FORCE], touches[n, FORCE + 1], touches[n, FORCE + 2]
+        p, normal = 0.0, touches[n, PUSH]
+        if touches[n, DAMPING] > 0.0:
+            own, rate = touches[n, OWN], moved(touches, n, 0, f, inverse)
+            p, normal = solve_normal(touches, n, h, rate - own * was[0])
+            most = max(most, h * own * abs(p - was[0]))
+        q = s = 0.0
+        drag = touches[n, FRICTION] * normal
+        if drag > 0.0:
+            one, other = touches[n, OWN + 1], touches[n, OWN + 2]
+            first = moved(touches, n, 1, f, inverse) + touches[n, MIXED] * (p - was[0]) - one * was[1]
+            last = moved(touches, n, 2, f, inverse) + touches[n, MIXED + 1] * (p - was[0]) - other * was[2]
+            q, s = solve_tangents(touches, n, h, drag, first, last, number < SETTLING)
+            most = max(most, h * one * abs(q - was[1]), h * other * abs(s - was[2]))
+        touches[n, FORCE], touches[n, FORCE + 1], touches[n, FORCE + 2] = p, q, s
+        push_apart(touches, n, p - was[0], q - was[1], s - was[2], f)
+    return most
+
+
+@kernel(RECALL)
+def recall(number, memory, f, touches, begin, end):
+    """Begin with the forces of the step before: what sticks then takes few sweeps."""
+    for n in range(begin, end):
+        c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
+        if memory[c, at] == number - 1:
+            force = turned_from(memory, c, at + 1, touches, n)
+            touches[n, FORCE], touches[n, FORCE + 1], touches[n, FORCE + 2] = force
+            push_apart(touches, n, force[0], force[1], force[2], f)
+
+
+@kernel(GIVE)
+def give(number, memory, v, touches, begin, end, out):
+    """Write the power of each cell at the velocities v, and remember forces."""
+    out[:, 0] = 0.0
+    for n in range(begin, end):
+        c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
+        memory[c, at] = number
+        for k in range(3):
+            memory[c, at + 1 + k] = 0.0
+            for i in range(3):
+                memory[c, at + 1 + k] += touches[n, FORCE + i] * touches[n, AXES + 3 * i + k]
+        for i in range(3):
+            out[int(touches[n, CELL]), 0] += touches[n, FORCE + i] * along(touches, n, i, v)
+
+
+@functools.cache
+def kernels(depth, pieces, functions, spins):
+    """The `Rubbing` of elements with two nodes.
+
+    Parameters
+    ----------
+    depth, pieces, functions, spins
+        See `refweb.effects.contact.friction.kernels`.
+    """
+    _, _, contacts, touch_of = places(depth)
+
+    @kernel(MEET)
+    def meet(h, x, v, inverse, cells, data, touches, begin):
+        found, count = np.empty((PLACES * pieces, 3)), begin
+        for first in range(0, cells.shape[0], pieces):
+            for n in range(contacts(x, cells, data, first, pieces, 2, functions, found)):
+                if count < touches.shape[0]:
+                    touch = touch_of(x, cells, data, 2, functions, found, n)
+                    set_touch(touches, count, h, touch, cells, v, inverse, spins, functions)
+                count += 1
+        return count
+
+    return Rubbing(meet, recall, sweep, give, WIDTH, SLOTS * NOTED)
