@@ -11,6 +11,7 @@ from rich.panel import Panel
 from rich.table import Table as Grid
 from rich.text import Text
 
+from .errors import InputError
 from .registry import EFFECTS, INTEGRATORS, name_of
 from .results.provenance import web_of
 from .results.units import prefixed
@@ -75,7 +76,7 @@ def print_scene(scene, system):
         step = f"{knob} {getattr(solve, knob):g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
-    corners = []
+    corners, steps = [], []
     if solve.kind == "dynamic" and len(system.corners):
         from .dynamics.schedule import FEW_CORNERS
 
@@ -83,6 +84,11 @@ def print_scene(scene, system):
             from .dynamics.corners import remarks_on_corners
 
             corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
+    if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
+        from .dynamics.expected_cost import expected_cost
+
+        with contextlib.suppress(InputError):  # the run refuses it
+            steps = [("steps", expected_cost(scene.replace(solve=solve), system))]
     _box(
         scene.title,
         [
@@ -92,6 +98,7 @@ def print_scene(scene, system):
             ("effects", ", ".join(counted) or "none"),
             *_stiffness(scene, system),
             ("solve", how),
+            *steps,
             *corners,
         ],
     )

@@ -36,8 +36,8 @@ DIGITS_OF_ORDER_6 = 5
 DIGITS_OF_ADAMS = 8
 """Digits from which Adams methods are cheaper than order 2, where order 6 does not take the forces: central differences
 take √10 times the steps for each, on webs whose load has a factor 0.01 s for 6 where Adams methods take 0.3 s for 9."""
-PER_STEP, PER_ELEMENT = 1e-6, 12e-9
-"""CPU time of a compiled explicit step [s], and of each element in it [s]."""
+PER_STEP, PER_ELEMENT, PER_CELL = 1e-6, 12e-9, 8e-9
+"""CPU time of a compiled explicit step, of each element in it, and of each cell of what acts besides [s]."""
 STEP_OF_CVODE = 100.0
 """Explicit steps that cost as much as one of CVODE, which takes one at least to each corner of a table."""
 QUICK_RUN = 0.5
@@ -99,11 +99,11 @@ def _undamped(system):
 def step_price(system):
     """Estimate of the CPU time of an explicit step of one evaluation of forces [s].
 
-    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away; where
-    kicks are solved for losses of contact, it takes up to twice the time.
+    Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
     """
-    price = PER_STEP + PER_ELEMENT * len(system.net.cells)
-    if any(family.damping is not None for family in system.families):
+    others = sum(len(family.cells) for family in system.families if not family.lines)
+    price = PER_STEP + PER_ELEMENT * len(system.net.cells) + PER_CELL * others
+    if any(family.damping is not None and family.rubbing is None for family in system.families):
         price *= 1.0 + min(_damped(system, _bound(system)), 7.0)
     return price
 

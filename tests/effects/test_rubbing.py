@@ -192,7 +192,8 @@ def test_a_slide_is_of_order_two():
 def test_what_sticks_creeps_as_the_law_has_it(slip):
     """At v_s q/√(1 − q²), q = a/(μ g), with friction that is the pull: no ripple, no way of a share of h a in a step.
 
-    At 1e-9 m/s the creep of twelve contacts that hold four nodes is left at some times v_s, 1e-5 of what a step gives.
+    At 1e-9 m/s sweeps leave the creep of twelve contacts that hold four nodes at some times v_s, 1e-5 of what a step
+    gives; in the first step of a row, which begins without forces, at more: the way is below 1e-5 of the free one.
     """
     pull = 0.2
     found = block(slip, 0.3, along=pull, interval=0.01).results
@@ -200,7 +201,7 @@ def test_what_sticks_creeps_as_the_law_has_it(slip):
     creep = slip * q / np.sqrt(1.0 - q * q)
     near = 1e-6 * creep if slip > 1e-6 else 1e-7
     np.testing.assert_allclose(found["v"].value, creep, rtol=0, atol=near)
-    assert abs(found["way"].value) <= (creep + near) * 0.3
+    assert abs(found["way"].value) <= creep * 0.3 * (1.0 + 1e-6) + (slip < 1e-6) * 1e-5 * 0.5 * pull * GRAVITY * 0.3**2
     weight = 4.0 * NODE * GRAVITY
     np.testing.assert_allclose(found["held"].value, pull * weight, rtol=1e-6)
     assert found["most"].value <= FRICTION_OF_BLOCK * weight * (1.0 + 1e-9)

@@ -38,14 +38,16 @@ PLAIN = {
     "accuracy": {"error": "none"},
 }
 BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, 0.11], "velocity": [0.0, 0.0, -1.0]}
-RUBBING = {"stiffness": 1e5, "friction": 0.3, "damping": 0.1, "slip_velocity": 0.1}
+RUBBING = {"stiffness": 1e5, "friction": 0.3}
 EFFECTS = {
     "gravity": {"gravity": {"acceleration": [0.0, 0.0, -9.81]}},
     "load": {"load": [{"node": "centre", "force": [0.0, 0.0, 1.0]}]},
     "motion": {"motion": [{"node": "rim", "displacement": [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0]]}]},
     "point mass": {"point_mass": [{"node": "centre", "mass": 1.0}]},
     "contact": {"body": [BALL], "contact": {"stiffness": 1e5}},
-    "contact, friction": {"body": [BALL], "contact": RUBBING},
+    "friction": {"body": [BALL], "contact": RUBBING},
+    "friction at 1e-6 m/s": {"body": [BALL], "contact": RUBBING | {"slip_velocity": 1e-6}},
+    "friction, damping": {"body": [BALL], "contact": RUBBING | {"damping": 0.1}},
     "frame": {"frame": {"angular_velocity": [0.0, 0.0, 1.0]}},
     "pressure": {"pressure": [{"lines": "all", "normal": [0.0, 0.0, 1.0], "value": 0.1}]},
     "thrust": {"thrust": [{"node": 0, "line": 0, "force": 1.0}]},

@@ -15,7 +15,8 @@ Each is solved by every method that takes it; a number proves each result:
   momentum as well.
 
 What is no result is a refusal, and its reason is listed. Which method refuses which case, and why, is foreseen in the
-table of cases: a method that refuses another, or takes one that it should refuse, fails the row of its group.
+table of cases: a method that refuses another, or takes one that it should refuse, fails the row of its group. What
+resolves how a line comes to stick at 1e-9 m/s, as CVODE and IDA do, takes hours, and is left out.
 
 The table of random trials counts nets of random lines, slack, supports and loads, and runs of slack nets that are
 thrown about and hit in steps just below the bound of stability. ``python -m pytest -m slow tests/test_hard_cases.py
@@ -302,10 +303,18 @@ def thrown(web, supports, velocity=UP, node=1, **more):
     return free(refweb.Velocity(node=node, value=velocity), web=web, supports=held, **more)
 
 
+def rubbing(*effects, **contact):
+    """An oblique hit with friction."""
+    contact = {"friction": 0.3, **contact}
+    return hit(ball(velocity=(1.0, 0.0, 2.0)), *effects, contact=contact, refused=not_explicit("contact"))
+
+
 THROWN = refweb.Velocity(node="centre", value=UP)
 MASS = refweb.PointMass(node="centre", mass=1.0), THROWN
 CRITICAL = 0.2 / (7e7 / 200.0) ** 0.5
 """Time constant of damping that is critical for the highest frequency 2c/L of lines of 0.2 m [s]."""
+LOSSES = refweb.Damping(time=0.1 * CRITICAL, rate=10.0)
+LIGHT = ball(position=(0.013, 0.003, -0.36), radius=0.35, mass=1e-3, velocity=(2.0, 0.5, 5.0))
 HUB = tuple(float(x) for x in -NODE + [0.0, 0.0, -0.101])
 OUTWARD = [refweb.Velocity(node=i, value=(5.0 * (i - 1.5), 0.0, 0.0)) for i in range(4)]
 TURNING = [refweb.Velocity(node=0, value=(1.0, -0.5, 0.3)), refweb.Velocity(node=7, value=(0.2, 2.0, -1.0))]
@@ -375,6 +384,12 @@ MOTIONS = {
         m: hit(ball(velocity=(1.0, 0.0, 2.0)), contact=dict(friction=m), refused=m and not_explicit("contact"))
         for m in (0.0, 0.1, 1.0, 10.0)
     },
+    "friction and what shares it": {
+        "slip velocity 1e-4 m/s": rubbing(slip_velocity=1e-4),
+        "slip velocity 1e-9 m/s": rubbing(slip_velocity=1e-9) | {"unfinished": ("cvode", "ida")},
+        "many lines on a light ball": hit(LIGHT, contact=dict(friction=1.0), refused=not_explicit("contact")),
+        "with losses of contact and of lines": rubbing(LOSSES, damping=1.0),
+    },
     "damping of contact [s/m]": {
         d: hit(contact=dict(damping=d), refused=d and not_explicit("contact")) for d in (0.0, 0.1, 10.0)
     },
@@ -422,7 +437,7 @@ MOTIONS = {
 
 def scene_of(fields, method):
     """The scene of a case by a method."""
-    fields = {name: value for name, value in fields.items() if name != "refused"}
+    fields = {name: value for name, value in fields.items() if name not in ("refused", "unfinished")}
     solve = fields.pop("solve")(method)
     if solve.kind == "dynamic":
         fields["output"] = refweb.Output(interval=solve.duration / 20, frames=20)
@@ -505,6 +520,9 @@ def matrix(groups, methods, prove, tolerance, reason, quick):
         for name in ends if quick and isinstance(names[0], float) else names:
             line = [f"{group}: {name:g}" if isinstance(name, float) else name]
             for method in methods:
+                if method in members[name].get("unfinished", ()):
+                    line.append("hours")
+                    continue
                 solution, why = attempt(members[name], method)
                 foreseen = members[name]["refused"].get(method)
                 as_foreseen = foreseen in why if foreseen else not why

@@ -89,6 +89,14 @@ def scenes():
         "are cheapest, of order 2 for few digits and of order 6 for many. BDF follows the same waves with steps that "
         "cost far more, and its coarsest runs damp them until their book of energy is open.",
     )
+    rubbing = refweb.Contact(stiffness=1e5, friction=0.3, damping=0.1)
+    spun = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.01, 0.02, -0.105), velocity=(0.7, 0.2, 1.0))
+    yield (
+        scene("Rubbing impact", window("square", 10, 10, 0.1), SOFT, [spun, rubbing], 0.1),
+        "The same web is hit obliquely, with friction at the slip velocity of 0.01 m/s and with losses along the normal. "
+        "Central differences solve for what is lost, with steps that are those of the impact without losses; CVODE and "
+        "IDA, and DOP853 the more, have to resolve how each line comes to stick.",
+    )
     cable = refweb.SingleCable(start=(0, 0, 0), end=(3, 0, 0), elements=30, length=3.2, sag=(0, 1, 0))
     yield (
         scene("Stiff cable", cable, STIFF, [GRAVITY], 0.5),

@@ -1,0 +1,101 @@
+"""What an explicit run will take: its step, what sets that, and the CPU time to expect."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..net.net import AXIAL_STIFFNESS, LENGTH
+from ..registry import INTEGRATORS, load
+from ..results.units import prefixed
+from .method_choice import step_price
+
+TELLING = 0.95
+"""Share of a step below which that where all is touched is told as well."""
+WITH_TWIN = 1.0 + np.sqrt(2.0)
+"""CPU time of a run and its twin over that of the run."""
+
+
+class Rule(NamedTuple):
+    """A step [s], and what sets it."""
+
+    step: float
+    by: str
+
+
+def ruling(integrator, system, reach, speed):
+    """The `Rule` of the bound of stability at the web's position, for what bodies touch within ``reach`` [m].
+
+    The row whose bound is the smallest says it, by the family with the largest part in that: of stiffness, or where
+    that alone would let steps be over √2 times as long, of damping.
+    """
+    net = system.net
+    moving = np.flatnonzero(~system.supported.all(axis=1) & (net.mass > 0.0))
+    stiff, lossy = (
+        _parts(system, [getattr(family, name) for family in system.families], reach, speed)[:, moving]
+        / net.mass[moving]
+        for name in ("bound", "damping_bound")
+    )
+    both = np.sqrt(lossy.sum(axis=0) ** 2 + 4.0 * stiff.sum(axis=0)) + lossy.sum(axis=0)
+    most = both.max(initial=0.0)
+    if not most > 0.0:
+        return Rule(np.inf, "nothing that vibrates")
+    worst = int(both.argmax())
+    damped = most > np.sqrt(2.0) * 2.0 * np.sqrt(stiff[:, worst].sum())
+    family = system.families[int((lossy if damped else stiff)[:, worst].argmax())]
+    row = int(moving[worst])
+    if damped:
+        by = f"damping at {system.row_name(row)}"
+    elif family.lines:
+        at = np.flatnonzero((family.cells == row).any(axis=1))
+        data = net.line_data[at]
+        by = f"elasticity of line {net.line[at[(data[:, AXIAL_STIFFNESS] / data[:, LENGTH]).argmax()]]}"
+    else:
+        name = "friction" if family.rubbing is not None else family.name
+        by = f"{name} at {system.row_name(row)}"
+    return Rule(integrator.safety * integrator.stretch * 4.0 / most, by)
+
+
+def _parts(system, bounds, reach, speed):
+    """What each family adds to the bounds of the row sums, shape (families, rows)."""
+    rates, parts = np.zeros(system.rows), []
+    for family, bound in zip(system.families, bounds, strict=True):
+        before, data = rates.copy(), system.net.line_data if family.lines else family.data
+        if bound is not None:
+            bound(reach, speed, np.zeros((system.rows, 3)), system.net.mass, rates, family.cells, data)
+        parts.append(rates - before)
+    return np.array(parts)
+
+
+def _seconds(value):
+    factor, prefix = prefixed(value)
+    return f"{value / factor:.3g} {prefix}s"
+
+
+def expected_cost(scene, system):
+    """In words, for a method whose steps have a bound; None for others."""
+    method, solve = INTEGRATORS[scene.solve.method], scene.solve
+    if method.knob != "safety":
+        return None
+    integrator = load(method.integrator)(system, **method.keys_of(solve))
+    linear = system.rows - system.net.spins
+    speed = 2.0 * float(np.linalg.norm(system.initial_velocity()[:linear], axis=1).max())
+    rules = [ruling(integrator, system, 0.0, speed)]
+    if system.contact:
+        touched = ruling(integrator, system, np.inf, speed)
+        if touched.step < TELLING * rules[0].step:
+            rules.append(touched)
+    if solve.step_size is not None:
+        bound = _seconds(rules[-1].step / solve.safety)
+        texts = [f"{_seconds(solve.step_size)} as given, of {bound} at most by {rules[-1].by}"]
+        steps = [solve.duration / solve.step_size]
+    else:
+        texts = [f"{_seconds(rule.step)}{', where all is touched' * n}, by {rule.by}" for n, rule in enumerate(rules)]
+        least = solve.duration / scene.output.interval
+        steps = [max(solve.duration / rule.step, least) for rule in rules]
+    price = len(integrator.drifts) * step_price(system) * (WITH_TWIN if scene.accuracy.error == "twin" else 1.0)
+    counts = " to ".join(f"{n:.2g}" for n in dict.fromkeys(steps))
+    seconds = " to ".join(f"{n * price:.2g}" for n in dict.fromkeys(steps))
+    twin = " with the twin" if scene.accuracy.error == "twin" else ""
+    return f"{'; '.join(texts)}; {counts} steps, some {seconds} s of CPU time{twin}"
