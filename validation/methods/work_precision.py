@@ -93,7 +93,7 @@ def scenes():
     spun = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.01, 0.02, -0.105), velocity=(0.7, 0.2, 1.0))
     yield (
         scene("Rubbing impact", window("square", 10, 10, 0.1), SOFT, [spun, rubbing], 0.1),
-        "The same web is hit obliquely, with friction at the slip velocity of 0.01 m/s and with losses along the normal. "
+        "The same web is hit obliquely, with friction at a slip velocity of 0.01 m/s and losses along the normal. "
         "Central differences solve for what is lost, with steps that are those of the impact without losses; CVODE and "
         "IDA, and DOP853 the more, have to resolve how each line comes to stick.",
     )
