@@ -18,7 +18,7 @@ all its digits, which it loses when positions are the unknowns.
 `MEET`         ``(h, x, v, inverse, cells, data, touches, begin)``: writes what touches to rows of ``touches`` from
                ``begin`` on, for a kick of size h from velocities v, ``inverse (rows, 3)`` being 1/m, 0 where a support
                holds; the row behind them, also where ``touches`` has no room for all
-`RECALL`       ``(number, memory, f, touches, begin, end)``: adds to f the forces of what touched in the step before
+`KEPT`         ``(number, memory, f, touches, begin, end)``: adds to f the forces of what touched in the step before
                this one, of a ``number`` > 0
 `SWEEP`        ``(h, number, f, inverse, touches, count)``: solves contacts one after the other and adds what their
                forces change by to f; the largest change of a velocity in a kick [m/s]
@@ -72,7 +72,7 @@ MEET = types.int64(
     _f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2), types.int64
 )
 SWEEP = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
-RECALL = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
+KEPT = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
 GIVE = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
 
 

@@ -13,7 +13,6 @@ import math
 import numpy as np
 
 from ...kernels import copy_rows, kernel
-from ...net.net import LENGTH
 from ...results.probes import PLACE
 from .averages import average, look_for_means, write_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
@@ -38,6 +37,7 @@ from .step import (
     kick_and_drift,
     last_kick,
     move_supports,
+    note_lengths,
     note_state,
     rubbing_kick,
     set_lengths,
@@ -131,16 +131,15 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
     power, length_force, moved = running.power, running.length_force, driven.size > 0
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
-    still, viscous, powers = families.still, families.viscous, families.powers
+    still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
-    signs, followed, sums = observed.signs, observed.followed, observed.sums
+    signs, followed, sums, touches = observed.signs, observed.followed, observed.sums, np.empty((0, model.rubbed.width))
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
-    rubbing, touches = model.rubbed.families.size > 0, np.empty((0, model.rubbed.width))
-    half, was = np.empty((rows if viscous.size or rubbing else 0, 3)), np.empty(reels.lengths.size if changing else 0)
     pushing, push, pushed = model.outside.pushing.size > 0, np.zeros(3), running.ledger.pushed
-    extra = np.zeros((rows if powers.shape[0] or viscous.size or rubbing or pushing else 0, 3))
+    extra = np.zeros((rows if powers.shape[0] + viscous.size + rubbing.size or pushing else 0, 3))
+    half, was = np.empty_like(extra), np.empty(reels.lengths.size if changing else 0)
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
@@ -161,14 +160,13 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         if moved:
             move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            for c in range(was.size):
-                was[c] = reels.lines[c, LENGTH]
+            note_lengths(reels, was)
             set_lengths(now, reels, data[0])
             book_lengths(now, x, reels, was, length_force, work)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])
-        if rubbing:
+        if rubbing.size:
             touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
         elif viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)

@@ -11,21 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.typed import List
 
-from ...kernels import (
-    BOUND,
-    ENERGY,
-    FORCE,
-    GIVE,
-    INDICES,
-    LINES,
-    MATRIX,
-    MEET,
-    RECALL,
-    SWEEP,
-    VECTOR,
-    record,
-    typed_list,
-)
+from ...kernels import BOUND, ENERGY, FORCE, GIVE, INDICES, KEPT, LINES, MATRIX, MEET, SWEEP, VECTOR, record, typed_list
 from ...results.probes import INTEGERS, PROBE
 from .averages import Averages, Windows
 from .energy_book import no_energy
@@ -202,7 +188,7 @@ class Rubbed(NamedTuple):
         return cls(
             families=np.array(families, dtype=np.int64),
             meets=typed_list(MEET, [one.meet for one in own]),
-            recalls=typed_list(RECALL, [one.recall for one in own]),
+            recalls=typed_list(KEPT, [one.recall for one in own]),
             sweeps=typed_list(SWEEP, [one.sweep for one in own]),
             gives=typed_list(GIVE, [one.give for one in own]),
             memories=typed_list(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),

@@ -190,6 +190,13 @@ def turn_supports(t, model, running):
 
 
 @kernel()
+def note_lengths(reels, was):
+    """Write natural lengths that change."""
+    for c in range(was.size):
+        was[c] = reels.lines[c, LENGTH]
+
+
+@kernel()
 def set_lengths(t, reels, lines):
     """Give the elements that change their natural lengths at time t, in the numbers of all ``lines``."""
     for c in range(reels.lengths.size):

@@ -36,7 +36,7 @@ import math
 
 import numpy as np
 
-from ...kernels import GIVE, MEET, RECALL, SWEEP, kernel
+from ...kernels import GIVE, KEPT, MEET, SWEEP, kernel
 from ..base import Rubbing
 from ..vectors import cross, dot
 from .nearest_point import share
@@ -278,7 +278,7 @@ def sweep(h, number, f, inverse, touches, count):
     return most
 
 
-@kernel(RECALL)
+@kernel(KEPT)
 def recall(number, memory, f, touches, begin, end):
     """Begin with the forces of the step before: what sticks then takes few sweeps."""
     for n in range(begin, end):
