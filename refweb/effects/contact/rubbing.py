@@ -39,6 +39,7 @@ import numpy as np
 from ...kernels import GIVE, KEPT, MEET, SWEEP, kernel
 from ..base import Rubbing
 from ..vectors import cross, dot
+from .friction import facing
 from .nearest_point import share
 from .penalty import push_of
 from .places import PLACES, from_axes, places
@@ -176,8 +177,8 @@ def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
     for a in range(2):
         touches[n, SHARES + a] = share(a, 2, functions, touch.place)[0]
     y, g = from_axes(pair.axes, touch.spot.y), from_axes(pair.axes, touch.spot.gradient)
-    steep = math.sqrt(dot(g, g))
-    g = g[0] / steep, g[1] / steep, g[2] / steep
+    steep, g = facing(g)
+    g = g if steep > 0.0 else (1.0, 0.0, 0.0)  # nothing pushes
     least = (1.0, 0.0, 0.0) if abs(g[0]) < 0.6 else (0.0, 1.0, 0.0)
     e = cross(g, least)
     size = math.sqrt(dot(e, e))
