@@ -122,8 +122,7 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
 def take_steps(count, h, changing, scheme, model, observed, running, total):
     """``count`` steps of size h, behind those that are taken of the row; where ``changing`` natural lengths change.
 
-    It writes ``running`` but ``before``, and returns the steps taken: fewer where an event ends the run. A step of more
-    than a kick, a drift and a kick of h times ``kicks`` and ``drifts`` is looked at inside, as the first one is.
+    It returns the steps taken: fewer where an event ends the run. The first one, and longer ones, are looked at inside.
     """
     clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
