@@ -194,4 +194,6 @@ class NullSpace:
         for held in system.unsupported_parts:  # which the tangent's anchors hold
             moves[:, held.rows, held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (SAMPLES, 1))
         free = (np.abs(moves) > OPEN).any(axis=0)
+        # What may move at no cost turns as well, where it goes on: its other components change to second order.
+        free |= free.any(axis=1)[:, None] & ~system.supported
         return Floating(free, moves) if free.any() else None

@@ -87,9 +87,10 @@ class InteriorPoint:
 
         ``most`` bounds the iterations of this call; where they run out the last displacement is returned.
         """
-        for _ in range(most):
-            if self._worst() < tolerance or not self._go_on():
-                break
+        with np.errstate(all="ignore"):  # a step that is not finite is not taken
+            for _ in range(most):
+                if self._worst() < tolerance or not self._go_on():
+                    break
         return self.x
 
     def _open(self):
@@ -134,6 +135,8 @@ class InteriorPoint:
             length = min(1.0, CENTRED * min(_longest(self._s, step[2], np.inf), _longest(self._y, step[3], np.inf)))
             if length > SHORT:
                 break
+        if not all(np.isfinite(change).all() for change in step):
+            return False
         for value, change in zip((self.x, self._z, self._s, self._y), step, strict=True):
             value += length * change
         return length > 1e-6

@@ -21,9 +21,14 @@ from ..effects.elasticity import strains
 from ..errors import SolverError
 from ..net.net import AXIAL_STIFFNESS, G0, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
+from .equilibrium import NotFound
 
 NOTHING = 1e-9
 """Energy over that of the lines and of the loads which counts as none."""
+SURE = 1e-3
+"""Energy that may be missing, over that of the lines and of the loads, from which on it is told."""
+WITH_A_WAY_AROUND, NEAR = 25, 1e-11
+"""Factorizations of Newton's method before an interior point takes over, and how near that comes."""
 SPENT = ("nsteps", "nfev", "njev", "nlu")
 
 
@@ -65,16 +70,26 @@ def lowest(newton, state):
         if starts[1] < starts[0] - none:
             state, above = other, _above(system, other, forces)
         state.stats |= {**spent, "starts": starts}
-    state.stats["above_lowest"] = above
+    state.stats |= {"above_lowest": above, "unsure": above > SURE * _scale(system, state)}
     return state
 
 
 def _without_smoothing(newton, state):
-    """The equilibrium of the same net at η = 0."""
+    """The equilibrium of the same net at η = 0, by the interior point where Newton's method does not end."""
     numbers = newton.system.net.line_data.copy()
     numbers[:, [SMOOTHING, G0]] = 0.0
     numbers[:, R0] = np.abs(numbers[:, SLACKNESS])
-    return type(newton)(newton.system.with_line_data(numbers), newton.progress, state.step).solve(state.step, state.x)
+    plain, t = type(newton)(newton.system.with_line_data(numbers), newton.progress, state.step), state.step
+    try:
+        return plain.solve(t, state.x, most=WITH_A_WAY_AROUND)
+    except NotFound as error:
+        from .interior_point import InteriorPoint
+
+        inner = InteriorPoint(plain.system, t, state.x, plain.anchors)
+        found = plain.solve(t, inner.follow(NEAR), warm=True)
+        spent = {"nsteps": inner.nlu, "nfev": 0, "njev": inner.nlu, "nlu": inner.nlu}
+        found.stats |= {key: found.stats[key] + spent[key] + error.stats.get(key, 0) for key in SPENT}
+        return found
 
 
 def _vectors(net, x):
@@ -111,7 +126,7 @@ def _above(system, state, forces):
     )
     along = (forces * _vectors(net, state.x)).sum(axis=1)
     above = float((natural * (stored + size * (1.0 + there)) - along).sum())
-    return max(above, 0.0) + 2.0 * np.finfo(float).eps * float(np.abs(along).sum())
+    return float(max(above, 0.0)) + 2.0 * np.finfo(float).eps * float(np.abs(along).sum())
 
 
 def _scale(system, state):
