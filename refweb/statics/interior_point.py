@@ -25,6 +25,8 @@ from ..system.factorization import Factor
 
 CENTRED = 0.99
 """Share of the way to the surface of the cone that a step takes."""
+FAR = 1e3
+"""Times the best that was reached at which an iteration has lost its way."""
 SHORT = 0.3
 """Share of a step below which another is tried."""
 NEAREST = 1e-100
@@ -85,13 +87,17 @@ class InteriorPoint:
     def follow(self, tolerance, most=80):
         """Go on until forces, lengths and what the cones leave open are below ``tolerance``; return the displacement.
 
-        ``most`` bounds the iterations of this call; where they run out the last displacement is returned.
+        ``most`` bounds the iterations of this call; where they run out the best displacement is returned.
         """
-        with np.errstate(all="ignore"):  # a step that is not finite is not taken
+        best, nearest = np.inf, self.x.copy()
+        with np.errstate(all="ignore"):  # where rounding has come to the surface, steps may lead anywhere
             for _ in range(most):
-                if self._worst() < tolerance or not self._go_on():
+                worst = self._worst()
+                if worst < best:
+                    best, nearest = worst, self.x.copy()
+                if worst < tolerance or not worst < FAR * best or not self._go_on():
                     break
-        return self.x
+        return nearest
 
     def _open(self):
         """What is left of the equations: of force at rows [N], of tension of bars [N], of the vectors in cones [m]."""
