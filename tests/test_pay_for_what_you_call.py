@@ -214,7 +214,9 @@ TABLES = {
     "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
     "temperature": {"expansion": 1e-5, "change": 10.0},
 }
-LISTED = ("force", "energy", "bound", "bound of damping", "motion", "lengths", "work of lengths", "impulse", "probe")
+SOLVED = ("what touches", "forces before", "sweep", "power")
+LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
+LISTED += ("motion", "lengths", "work of lengths", "impulse", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
@@ -339,6 +341,13 @@ def summed(*effects):
 def test_kernels_with_an_effect_alone(handed, name):
     effects = [name] if name else []
     assert handed(*effects) == summed(*effects)
+
+
+def test_kernels_of_friction(handed, monkeypatch):
+    """A second family, with the four kernels that solve for it, and no bound of damping."""
+    monkeypatch.setitem(TABLES, "contact", {**TABLES["contact"], "friction": 0.3})
+    rubbing = {**summed("contact"), "force": 3, "energy": 3, "bound": 3, **dict.fromkeys(SOLVED, 1)}
+    assert handed("contact") == rubbing
 
 
 @pytest.mark.parametrize("name", KERNELS)
