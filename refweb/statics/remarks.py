@@ -60,12 +60,13 @@ def remarks_on(state, stats, utilisation, equilibrium):
         yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
-    pushing = "bars" if net.law.number == LINEAR else "slack lines"
-    if state.system.dead and net.law.number != TENSION_ONLY and equilibrium.stats.get("above_lowest", 0.0) is None:
-        yield "others", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
-    elif equilibrium.stats.get("unsure"):
-        lower = f"{equilibrium.stats['above_lowest']:.3g} J"
-        yield "others", f"slack lines push: another state may be lower by up to {lower}, which ± does not know"
+    if state.system.dead and net.law.number != TENSION_ONLY and stats["smallest_pivot"] != -1:
+        pushing = "bars" if net.law.number == LINEAR else "slack lines"
+        if equilibrium.stats.get("above_lowest", 0.0) is None:
+            yield "others", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
+        elif equilibrium.stats.get("unsure"):
+            lower = f"{equilibrium.stats['above_lowest']:.3g} J"
+            yield "others", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
     if starts := equilibrium.stats.get("starts"):
         apart = max(starts) - min(starts)
         if apart > 1e-9 * max(map(abs, starts)):

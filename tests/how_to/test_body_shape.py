@@ -160,7 +160,7 @@ def test_a_net_that_flies_into_it_is_thrown_back(body, tmp_path):
     scene = net_scene(
         body,
         contact={"stiffness": 1e4, "friction": 0.3, "slip_velocity": 0.1},
-        solve={"kind": "dynamic", "duration": 0.08},
+        solve={"kind": "dynamic", "duration": 0.08, "safety": 0.125},
         output={"interval": 0.01, "frames": 4},
         accuracy={"error": "none"},
         velocity=[{"node": "all", "value": [0.5, 0.0, -4.0]}],
