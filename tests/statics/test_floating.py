@@ -138,7 +138,7 @@ def check(seed):
     return counted
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_random_nets(seed):
     check(seed)
 

@@ -66,7 +66,7 @@ def check(seed, ratio):
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
-@pytest.mark.parametrize("seed", [8, 15, 20, 36])
+@pytest.mark.parametrize("seed", [8, 15])
 def test_nets_of_different_stiffness(seed, ratio):
     check(seed, ratio)
 
