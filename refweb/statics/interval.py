@@ -70,10 +70,11 @@ class Interval:
         self._turns = coo_array((np.concatenate(signs), (np.concatenate(rows), np.concatenate(columns))), shape).tocsc()
 
     def limits(self, now):
-        """Least and largest position [m] of what is ``now`` at a position."""
+        """Least and largest position [m] of what is ``now`` at a position; None where rounding leaves them open."""
         if not self.bounded:
             return -np.inf, np.inf
-        return now - self._farthest(-1.0), now + self._farthest(1.0)
+        ends = now - self._farthest(-1.0), now + self._farthest(1.0)
+        return ends if np.isfinite(ends).all() else None
 
     def _farthest(self, sign):
         """How far it goes along ``sign`` times the axis [m]."""
@@ -91,7 +92,10 @@ class Interval:
                     break
             off, mean = left - rest, weight @ rest / len(rest)
             share = SHARE if np.abs(weight * off).max() < SHARE * mean else 1.0
-            moved, change = self._newton(line, weight, rest, open_, off, share * mean)
+            try:
+                moved, change = self._newton(line, weight, rest, open_, off, share * mean)
+            except RuntimeError:  # exactly singular, where rounding allows no further step
+                break
             closer = off - _dot(line, (self._turns @ moved).reshape(-1, 3))
             length = min(_longest_step(weight, change), _longest_step(rest, closer))
             t, weight, rest = t + length * moved, weight + length * change, rest + length * closer

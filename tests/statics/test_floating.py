@@ -133,8 +133,8 @@ def check(seed):
         else:
             counted["known"] += 1
             assert result.interval is None
-            # Clarabel's energy is known to 1e-11, of stiffnesses from 1 N/m on, so that positions are to some 1e-5.
-            assert max(abs(result.value - least), abs(result.value - most)) < result.error + 1e-4, (seed, one.name)
+            # Clarabel's energy is known to some 1e-9 J, of stiffnesses from 1e-2 N/m on, which is √(2 · 1e-7) m.
+            assert max(abs(result.value - least), abs(result.value - most)) < result.error + 5e-4, (seed, one.name)
     return counted
 
 

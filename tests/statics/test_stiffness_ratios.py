@@ -62,7 +62,9 @@ def check(seed, ratio):
         rest[node] += load
     rest[list(scene.web.supports)] = 0.0
     # A displacement of some 1 m is rounded to 1e-16, which EA/L of 4e3 N/m makes 1e-12 N of; 1e-9 of the largest force.
-    assert np.abs(rest).max() < 1e-9 * max(np.abs(list(loads.values())).max(), np.abs(force).max()) + 1e-10
+    assert (
+        np.abs(rest).max() < 1e-9 * max(np.abs([*loads.values(), (0.0, 0.0, 0.0)]).max(), np.abs(force).max()) + 1e-10
+    )
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
