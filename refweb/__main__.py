@@ -58,7 +58,7 @@ def main(arguments=None):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
             warnings.filterwarnings("ignore", message="Glyph")  # a title in a script the font of pictures lacks
-            load(COMMANDS[arguments.command]).run(arguments)
+            status = load(COMMANDS[arguments.command]).run(arguments)
         sys.stdout.flush()
     except InputError as error:
         print(f"refweb: {error}", file=sys.stderr)
@@ -75,7 +75,7 @@ def main(arguments=None):
     except Exception as error:
         print(f"refweb: {_reason(error)}", file=sys.stderr)
         return 1
-    return 0
+    return status or 0
 
 
 def _reason(error):

@@ -12,6 +12,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from .errors import InputError
+from .messages import shown
 from .registry import EFFECTS, INTEGRATORS, name_of
 from .results.provenance import web_of
 from .results.units import prefixed
@@ -278,6 +279,47 @@ def print_cost(summary):
     rows.append(("price", summary["sentence"]))
     rows.append(("cost", f"{summary['cost']['cpu_s']:.2f} s CPU, {summary['cost']['wall_s']:.2f} s wall"))
     _box(f"{summary['scene']}: what digits cost", rows)
+
+
+def print_comparison(found):
+    """Print results side by side, and what differs between their scenes, from what `compare` finds."""
+    folders, rows = found["folders"], []
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    for name in ("result", *folders, "difference", ""):
+        grid.add_column(Text(name), justify="left" if name in ("result", "") else "right")
+    for row in found["results"]:
+        name = row["name"] + ("" if row["step"] is None else f", step {row['step']:g}")
+        there = [difference for difference in row["differences"] if difference is not None]
+        apart = there[-1] if len(folders) == 2 else max(there) - min(there)
+        said = "agree" if row["agree"] else "differ"
+        if row["agree"] is None:
+            said = "only in " + next(f for f, value in zip(folders, row["values"], strict=True) if value is not None)
+        difference = "" if row["agree"] is None else readable(apart, None, row["unit"])
+        grid.add_row(Text(name), *map(_compared, row["values"]), Text(difference), Text(said))
+    rows.append(("results", grid))
+    known = (value is None or value["error"] is not None for row in found["results"] for value in row["values"])
+    if not all(known):
+        rows.append(("", "a value without ± has no known error, and agrees with equal ones alone"))
+    rows += [(s, f"is the run in {f}") for f, s in zip(folders, found["status"], strict=True) if s != "solved"]
+    if found["scene"]:
+        grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+        for name in ("key", *folders):
+            grid.add_column(Text(name))
+        for row in found["scene"]:
+            grid.add_row(Text(row["path"]), *(Text("" if value is None else shown(value)) for value in row["values"]))
+        rows.append(("scenes", grid))
+    else:
+        rows.append(("scenes", "are the same"))
+    _box("the results agree" if found["agree"] else "the results differ", rows)
+
+
+def _compared(value):
+    """A value of a comparison as text."""
+    if value is None:
+        return Text("")
+    if value["interval"] is not None:
+        return Text(_between(*value["interval"], value["unit"]))
+    return Text(readable(value["value"], value["error"], value["unit"]))
 
 
 @contextlib.contextmanager

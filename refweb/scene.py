@@ -134,29 +134,36 @@ class Scene:
             raise InputError(f"[output] interval = {interval:g} makes {rows}, at most {MAX_HISTORY_ROWS}")
 
     @staticmethod
-    def load(source):
+    def load(source, values=None):
         """The scene of a TOML file, or of the name of a scene shipped with refweb.
+
+        Parameters
+        ----------
+        source : path-like or str
+            The file, or the name.
+        values : dict, optional
+            Values by path, ``{"solve.duration": 0.5}``, in place of what the file says, see `refweb.reference.paths`.
 
         Raises
         ------
         InputError
             Where there is no such file or scene, or it is wrong.
         """
-        if not isinstance(source, (str, os.PathLike)):
-            raise InputError(f"scene = {shown(source)} must be a Scene, a scene file or the name of a shipped scene")
-        path, shipped = pathlib.Path(source), sorted(SHIPPED_SCENES.glob("*.toml"))
-        if not os.path.isfile(path):
-            known = [p.stem for p in shipped]
-            if str(path).removesuffix(".toml") not in known:
-                hint = nearest(path.stem, known)
-                raise InputError(f"{short(str(source))}: no such file and no shipped scene, {hint}")
-            path = shipped[known.index(path.stem)]
+        path = file_of(source)
         try:
-            given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+            given = {"title": path.stem, **tomllib.loads(path.read_bytes().decode("utf-8-sig"))}
         except (ValueError, OSError, RecursionError) as error:  # a ValueError also for a number of thousands of digits
             raise InputError(f"{path.name}: cannot be read: {error}") from None
-        with in_file(path.name):
-            return Scene.from_dict({"title": path.stem, **given}, path.resolve().parent, path.name)
+        name = path.name
+        if values:
+            from .reference.paths import with_value
+
+            with in_file(name):
+                for key, value in values.items():
+                    given = with_value(given, key, value)
+            name += " with " + ", ".join(f"{short(key)} = {shown(value)}" for key, value in values.items())
+        with in_file(name):
+            return Scene.from_dict(given, path.resolve().parent, name)
 
     @staticmethod
     def from_dict(given, folder=None, file=""):
@@ -293,6 +300,19 @@ class Scene:
                 events=self.event,
                 folder=self.folder,
             )
+
+
+def file_of(source):
+    """Path of a scene file, or of a scene shipped with refweb by its name; refused where there is neither."""
+    if not isinstance(source, (str, os.PathLike)):
+        raise InputError(f"scene = {shown(source)} must be a Scene, a scene file or the name of a shipped scene")
+    path, shipped = pathlib.Path(source), sorted(SHIPPED_SCENES.glob("*.toml"))
+    if os.path.isfile(path):
+        return path
+    known = [p.stem for p in shipped]
+    if str(path).removesuffix(".toml") not in known:
+        raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
+    return shipped[known.index(path.stem)]
 
 
 def slug(title):

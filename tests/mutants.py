@@ -66,6 +66,7 @@ MIRRORS = {
     "dynamics/integrators": "dynamics/integrators/test_cvode.py dynamics/test_dynamics.py",
     "dynamics": "dynamics/test_dynamics.py",
     "results/observables": "results/test_observable_contract.py dynamics/test_accuracy.py statics/test_statics.py",
+    "results/comparison": "results/test_comparison.py",
     "results/state": "results/test_results.py results/test_observable_contract.py",
     "results": "results/test_results.py test_faults.py",
     "studies/predictability": "studies/test_horizon.py",
@@ -74,7 +75,9 @@ MIRRORS = {
     "studies/turning": "studies/test_turning.py",
     "studies/pencil": "studies/test_modes.py",
     "studies": "studies/test_cost.py",
-    "commands": "commands/test_cli.py",
+    "reference": "reference/test_paths.py",
+    "commands/new": "commands/test_new.py",
+    "commands": "commands/test_cli.py commands/test_values.py",
     "__main__": "commands/test_cli.py",
     "scene": "test_scene.py",
 }
@@ -313,6 +316,12 @@ MUTANTS = [
         'if self.supports is not None:\n            given["supports"]',
         'if self.supports:\n            given["supports"]',
     ),
+    # Values by path, new scenes and comparisons
+    Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
+    Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),
+    Mutant("commands/new", "found and here == table", "found"),
+    Mutant("results/comparison", "for least, _ in spans) <= min(", "for least, _ in spans) < min("),
+    Mutant("results/comparison", "None not in spans and max", "max"),
 ]
 
 

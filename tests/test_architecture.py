@@ -46,6 +46,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "The numbers a run is asked for, a file for those that are alike: their value at an instant, and their probe.",
     ),
     ("pictures", "*", "A result folder drawn; it knows folders, and nothing of what made them."),
+    (
+        "reference",
+        "*",
+        "What a scene file may say: values by path, its tables in words and as a schema; it knows no scene.",
+    ),
     ("the scene", "build scene", ""),
     ("statics", "*", "Equilibria and their bounds; it knows no time and no events."),
     (

@@ -22,10 +22,10 @@ of a scene, ``refweb weigh SCENE``::
         print(f"{net.cable_mass / arguments.per:.6g}")
 
 The first sentence of its docstring is its line in ``refweb --help``. ``add_arguments`` gets its
-`argparse.ArgumentParser`, and ``run`` what that parses. Results go to standard output. What the user did wrong is an
-`refweb.InputError` of one line with the value, the limit and the remedy, and leaves with status 2; a
-`refweb.SolverError`, an answer that is not found, with 1; an interruption, also that of a batch queue, with 130. The
-message goes to the error stream; a verb catches none of them.
+`argparse.ArgumentParser`, and ``run`` what that parses. Results go to standard output. What ``run`` returns is the exit
+status, 0 where that is None. What the user did wrong is an `refweb.InputError` of one line with the value, the limit
+and the remedy, and leaves with status 2; a `refweb.SolverError`, an answer that is not found, with 1; an interruption,
+also that of a batch queue, with 130. The message goes to the error stream; a verb catches none of them.
 
 Help loads all verbs, so whatever is heavy, scenes and numpy among them, is imported inside functions.
 

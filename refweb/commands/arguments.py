@@ -6,6 +6,23 @@ def add_scene(parser):
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or the name of a scene shipped with refweb")
 
 
+def add_values(parser):
+    """Values in place of those of the scene."""
+    text = "a value in place of the scene's, by its path, as solve.duration=0.5 or body.0.velocity=[0,0,2]; repeatable"
+    parser.add_argument("--set", dest="values", action="append", default=[], metavar="PATH=VALUE", help=text)
+
+
+def scene_of(arguments):
+    """The scene that `add_scene` and `add_values` ask for."""
+    from ..scene import Scene
+
+    if not arguments.values:
+        return Scene.load(arguments.scene)
+    from ..reference.paths import read_settings
+
+    return Scene.load(arguments.scene, read_settings(arguments.values))
+
+
 def add_force(parser):
     """Leave to replace results."""
     parser.add_argument("--force", action="store_true", help="replace the results of an earlier run in DIR")

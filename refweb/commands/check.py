@@ -1,19 +1,21 @@
 """Check a scene without solving it; writes nothing."""
 
+from .arguments import add_scene, add_values, scene_of
+
 
 def add_arguments(parser):
     """The scene."""
-    parser.add_argument("scene", metavar="SCENE")
+    add_scene(parser)
+    add_values(parser)
 
 
 def run(arguments):
     """Refuse what a run would refuse, else print what it would solve."""
     from ..console import print_scene
     from ..runner import simulation_of
-    from ..scene import Scene
     from ..solution import Solution
 
-    scene = Scene.load(arguments.scene).settled()
+    scene = scene_of(arguments).settled()
     system = scene.build()
     simulation_of(scene, system, Solution(scene))
     print_scene(scene, system)

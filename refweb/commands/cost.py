@@ -2,12 +2,13 @@
 
 import pathlib
 
-from .arguments import add_force, add_scene
+from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
     """The scene, the folder, the time it may take, and what errors are of."""
     add_scene(parser)
+    add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="folder for cost.png and cost.csv (default: none is written)")
     parser.add_argument("--budget", type=float, default=120.0, metavar="SECONDS", help="for all of it (default: 120)")
     parser.add_argument("--observe", metavar="NAME", help="observable that errors are of (default: the first)")
@@ -17,10 +18,9 @@ def add_arguments(parser):
 def run(arguments):
     """Print what is solved, compare the methods, print what they cost."""
     from ..console import print_scene, progress
-    from ..scene import Scene
     from ..studies.work_precision import cost
 
-    scene, out = Scene.load(arguments.scene), arguments.out
+    scene, out = scene_of(arguments), arguments.out
     options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
     with progress() as tell:
         found = cost(scene, progress=tell, announce=print_scene, **options)

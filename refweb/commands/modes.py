@@ -2,12 +2,13 @@
 
 import pathlib
 
-from .arguments import add_force, add_scene
+from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
     """The scene, how many modes, and the folder."""
     add_scene(parser)
+    add_values(parser)
     parser.add_argument("-n", dest="number", type=int, default=10, metavar="N", help="how many (default: 10)")
     parser.add_argument("--out", metavar="DIR", help="result folder (default: the title and -modes)")
     add_force(parser)
@@ -16,10 +17,10 @@ def add_arguments(parser):
 def run(arguments):
     """Print what vibrates, find its modes, print them."""
     from ..console import print_scene, progress
-    from ..scene import Scene, slug
+    from ..scene import slug
     from ..studies.modes import modes
 
-    scene = Scene.load(arguments.scene)
+    scene = scene_of(arguments)
     out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
     with progress() as tell:
         found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=print_scene)

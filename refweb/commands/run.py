@@ -3,12 +3,13 @@
 import pathlib
 
 from ..errors import InputError
-from .arguments import add_force, add_scene
+from .arguments import add_force, add_scene, add_values, scene_of
 
 
 def add_arguments(parser):
     """The scene, the folder, and what is found besides."""
     add_scene(parser)
+    add_values(parser)
     parser.add_argument("--out", metavar="DIR", help="result folder (default: the title, in the current folder)")
     add_force(parser)
     parser.add_argument("--horizon", action="store_true", help="find how long the motion is determined")
@@ -20,9 +21,9 @@ def run(arguments):
 
     from .. import runner
     from ..console import print_scene, print_solution, progress
-    from ..scene import Scene, slug
+    from ..scene import slug
 
-    scene = Scene.load(arguments.scene)
+    scene = scene_of(arguments)
     if arguments.horizon:
         if scene.solve.kind == "static":
             raise InputError(f"--horizon has no meaning for {arguments.scene}: it is static, leave it out")

@@ -323,7 +323,7 @@ def test_a_run_loads_only_what_its_scene_calls_for(tmp_path):
     assert not {"pyvista", "vtk", "matplotlib", "sksundae"} & names
     effects = {name.removeprefix("refweb.effects.") for name in names if name.startswith("refweb.effects.")}
     assert effects == {"base", "elasticity", "gravity", "line_kernels"}
-    assert not {"refweb.pictures.pictures", "refweb.net.lattices"} & names
+    assert not {"refweb.pictures.pictures", "refweb.net.lattices", "refweb.reference"} & names
 
 
 def test_statuses_as_the_shell_sees_them(tmp_path):

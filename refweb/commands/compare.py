@@ -1,0 +1,23 @@
+"""Results of two runs or more side by side: do they agree within ±?"""
+
+import json
+
+
+def add_arguments(parser):
+    """The folders, and how to print."""
+    parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders, two or more")
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def run(arguments):
+    """Print results and what differs between the scenes; 1 where results differ."""
+    from ..results.comparison import compare
+
+    found = compare(arguments.folders)
+    if arguments.json:
+        print(json.dumps(found, indent=1, ensure_ascii=False))
+    else:
+        from ..console import print_comparison
+
+        print_comparison(found)
+    return 0 if found["agree"] else 1

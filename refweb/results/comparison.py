@@ -1,0 +1,144 @@
+"""Result folders side by side: do their results agree within ±, and what differs between their scenes?"""
+
+from __future__ import annotations
+
+import math
+import pathlib
+import tomllib
+
+from ..errors import InputError
+from ..messages import short
+from .folder import read_summary
+
+
+def compare(folders):
+    """Results of some folders and the keys in which their scenes differ.
+
+    Parameters
+    ----------
+    folders : sequence of path-like
+        Two result folders or more.
+
+    Returns
+    -------
+    dict
+        Plain values: ``folders``, ``status`` of each run; ``results``, a list of ``name``, ``step`` (None but for
+        several load steps), ``unit``, ``values``, what each ``run.json`` holds or None, ``differences`` from the first
+        that is there, and ``agree``; ``scene``, a list of ``path`` and ``values``, None where a scene lacks the key;
+        ``agree``, whether all results that are there twice do.
+
+    Raises
+    ------
+    InputError
+        For fewer than two folders, one that holds no results of refweb, and folders without a common result.
+
+    Notes
+    -----
+    Results agree where all intervals value ± error, or those in which an open value may lie, have a point in common. A
+    value without ± agrees with equal ones alone: that others are near shows nothing.
+    """
+    if len(folders) < 2:
+        raise InputError(f"compare {' '.join(map(str, folders))}: needs two result folders or more")
+    folders = [pathlib.Path(folder) for folder in folders]
+    summaries, scenes = zip(*map(_read, folders), strict=True)
+    several = any(len(summary["steps"]) > 1 for summary in summaries)
+    found = [_results(folder, summary, several) for folder, summary in zip(folders, summaries, strict=True)]
+    keys = dict.fromkeys(key for results in found for key in results)
+    rows = [_row(key, [results.get(key) for results in found]) for key in keys]
+    common = [row for row in rows if row["agree"] is not None]
+    if not common:
+        has = "; ".join(
+            f"{f} has {', '.join(dict.fromkeys(n for n, _ in r))}" for f, r in zip(folders, found, strict=True)
+        )
+        raise InputError(f"no result is there twice: {has}")
+    return {
+        "folders": list(map(str, folders)),
+        "status": [summary["status"] for summary in summaries],
+        "results": rows,
+        "scene": _scenes(scenes),
+        "agree": all(row["agree"] for row in common),
+    }
+
+
+def _read(folder):
+    """(``run.json``, ``scene.toml``) of a result folder."""
+    name, summary = short(str(folder)), read_summary(folder)
+    if summary is None:
+        raise InputError(f"{name}: holds no run.json of refweb")
+    if not isinstance(summary.get("results"), dict) or not isinstance(summary.get("steps"), list):
+        raise InputError(f"{name}: its run.json holds no results")
+    try:
+        return summary, tomllib.loads((folder / "scene.toml").read_text(encoding="utf-8"))
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"{name}/scene.toml: cannot be read: {error}") from None
+
+
+def _results(folder, summary, several):
+    """Results of a run by (name, step)."""
+    parts = [(None, summary["results"])]
+    try:
+        if several and summary["steps"]:
+            parts = [(step["step"], step["results"]) for step in summary["steps"]]
+        found = {(name, step): result for step, results in parts for name, result in results.items()}
+        for result in found.values():
+            math.isfinite(result["value"]), math.isfinite(result["error"] or 0.0), result["unit"] + ""
+    except (KeyError, TypeError, AttributeError):
+        raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
+    return found
+
+
+def _row(key, values):
+    """One result in all folders."""
+    there = [value for value in values if value is not None]
+    first = there[0]
+    return {
+        "name": key[0],
+        "step": key[1],
+        "unit": first["unit"],
+        "values": [value and {k: value.get(k) for k in ("value", "error", "interval", "unit")} for value in values],
+        "differences": [value and value["value"] - first["value"] for value in values],
+        "agree": _agree(there) if len(there) > 1 else None,
+    }
+
+
+def _agree(results):
+    """Whether some results may be one value."""
+    if len({result["unit"] for result in results}) > 1:
+        return False
+    if len({result["value"] for result in results}) == 1:
+        return True
+    spans = list(map(_span, results))
+    return None not in spans and max(least for least, _ in spans) <= min(most for _, most in spans)
+
+
+def _span(result):
+    """Least and largest value that a result may have, None where that is not known."""
+    if result.get("interval") is not None:
+        least, most = result["interval"]
+        return -math.inf if least is None else least, math.inf if most is None else most
+    if result["error"] is None:
+        return None
+    return result["value"] - result["error"], result["value"] + result["error"]
+
+
+def _scenes(scenes):
+    """Paths at which scenes differ, and what stands there in each."""
+    leaves = [dict(_leaves(scene)) for scene in scenes]
+    rows = [(path, [own.get(path) for own in leaves]) for path in dict.fromkeys(path for own in leaves for path in own)]
+    return [{"path": path, "values": values} for path, values in rows if any(one != values[0] for one in values)]
+
+
+def _leaves(value, path=""):
+    """Paths and values of whatever is no table; tables of a list go by name where each has one, else by number."""
+    parts = None
+    if isinstance(value, dict):
+        parts = value.items()
+    elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
+        names = [one.get("name") for one in value]
+        named = all(isinstance(name, str) for name in names) and len(set(names)) == len(names)
+        parts = zip(names if named else range(len(value)), value, strict=True)
+    if parts is None:
+        yield path, value
+    else:
+        for key, one in parts:
+            yield from _leaves(one, f"{path}.{key}" if path else str(key))

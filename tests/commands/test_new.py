@@ -1,0 +1,105 @@
+"""``refweb list`` and ``refweb new``: what is listed is there, and what is written passes the check."""
+
+import re
+import tomllib
+
+import pytest
+
+import refweb
+from refweb.__main__ import main
+from refweb.commands.new import START
+from refweb.scene import SHIPPED_SCENES
+
+SHIPPED = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder to work in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_list_has_a_line_for_each_shipped_scene(capsys):
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for line, (name, text) in zip(lines, SHIPPED.items(), strict=True):
+        title = tomllib.loads(text)["title"]
+        assert line.split("  ")[0] == name and title in line and len(line) <= 140
+        said = line.split(title)[1].strip()
+        assert said == text.splitlines()[0].removeprefix("# ") and re.fullmatch(r"[A-Z].{20,80}\.", said)
+
+
+def test_new_writes_a_scene_that_passes_the_check(here, capsys):
+    assert main(["new", "my-net"]) == 0
+    assert capsys.readouterr().out == "my-net.toml is written: refweb check my-net.toml, refweb run my-net.toml\n"
+    assert (here / "my-net.toml").read_text(encoding="utf-8") == START.replace('"Start"', '"my-net"')
+    assert main(["check", "my-net.toml"]) == 0 and "my-net" in capsys.readouterr().out
+    assert [path.name for path in here.iterdir()] == ["my-net.toml"]
+
+
+def test_what_is_commented_out_passes_the_check_as_well(here):
+    text = re.sub(r"(?m)^# (\[|\w+ = )", r"\1", START)
+    assert len([line for line in text.splitlines() if line.startswith("# ")]) == 3
+    (here / "all.toml").write_text(text, encoding="utf-8")
+    scene = refweb.Scene.load("all.toml")
+    assert scene.supports and scene.accuracy.digits == 2 and len(scene.effects) == 5 and scene.cable.prestrain > 0.0
+    assert main(["check", "all.toml"]) == 0
+
+
+@pytest.mark.parametrize("name", ["catenary", "spinning-web"])
+def test_a_copy_has_another_title_and_nothing_else(here, name):
+    assert main(["new", "copy.toml", "--from", name]) == 0
+    text = (here / "copy.toml").read_text(encoding="utf-8")
+    title = tomllib.loads(SHIPPED[name])["title"]
+    assert text == SHIPPED[name].replace(f'title = "{title}"', 'title = "copy"') != SHIPPED[name]
+
+
+def test_a_copy_of_a_file_finds_its_mesh(here, capsys):
+    """Relative paths lead to the same file from another folder; comments on the same line stay."""
+    given = """title = 'a "title"' # mine
+[web]
+kind = "file" # path = "here.vtu"
+path = "net.vtu"
+[cable]
+modulus = 1.0
+area = 1.0
+density = 1.0
+[solve]
+kind = "static"
+"""
+    (here / "meshes").mkdir()
+    (here / "meshes" / "net.toml").write_text(given, encoding="utf-8")
+    assert main(["new", "сеть", "--from", "meshes/net.toml"]) == 0
+    text = (here / "сеть.toml").read_text(encoding="utf-8")
+    changed = given.replace("""'a "title"'""", '"сеть"').replace('\npath = "net', '\npath = "meshes/net')
+    assert text == changed
+    assert main(["new", "meshes/other", "--from", "meshes/net.toml"]) == 0
+    assert (here / "meshes" / "other.toml").read_text(encoding="utf-8") == given.replace("""'a "title"'""", '"other"')
+    (here / "meshes" / "net.toml").write_text(
+        "web.path = 'net.vtu'\nweb.kind = 'file'\n" + given[given.index("[cab") :]
+    )
+    capsys.readouterr()
+    assert main(["new", "third", "--from", "meshes/net.toml"]) == 2
+    assert "third.toml: web.path of net.toml cannot be changed where they stand" in capsys.readouterr().err
+    assert not (here / "third.toml").exists()
+
+
+def test_new_does_not_overwrite(here, capsys):
+    (here / "net.toml").write_text("mine")
+    (here / "folder.toml").mkdir()
+    (here / "wrong.toml").write_text("[web]\nkind = 'paper'\n")
+    for arguments, message in [
+        (["net"], "net.toml: is there already: choose another name, or force (--force) to replace it"),
+        (["folder", "--force"], "folder.toml: is there already: choose another name\n"),
+        (["no/net"], "no/net.toml: there is no folder no"),
+        (["other", "--from", "catenari"], 'catenari: no such file and no shipped scene, did you mean "catenary"?'),
+        (["other", "--from", "wrong.toml"], "wrong.toml: [cable] is missing"),
+        (["x" * 201], "title = "),
+    ]:
+        assert main(["new", *arguments]) == 2
+        out, err = capsys.readouterr()
+        assert out == "" and message in err and err.count("\n") == 1
+    assert sorted(path.name for path in here.iterdir()) == ["folder.toml", "net.toml", "wrong.toml"]
+    assert (here / "net.toml").read_text() == "mine"
+    assert main(["new", "net", "--force"]) == 0 and (here / "net.toml").read_text(encoding="utf-8") != "mine"
