@@ -230,12 +230,22 @@ def _check_event(event, earlier, observables, system):
         bodies = [body.name for body in system.net.bodies]
         if event.body is not None and event.body not in bodies:
             raise InputError(f"body = {shown(event.body)} is no body, {nearest(event.body, bodies)}")
-    if event.kind == "taut" and event.line >= len(system.net.web.lines):
-        raise InputError(f"line = {event.line} must be 0 … {len(system.net.web.lines) - 1}")
+    if event.kind == "taut":
+        _check_taut(event, system.net)
     if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
         raise InputError(f"observe = {shown(event.observe)} is no observable, {nearest(event.observe, names)}")
     if event.kind == "threshold" and (average := observables[names.index(event.observe)].average) is not None:
         raise InputError(
             f"observe = {shown(event.observe)} is a mean, average = {average:g}, and events are found by values of an "
             "instant: name an observable without average"
+        )
+
+
+def _check_taut(event, net):
+    """Refuse lines that the web does not have, and such as do not snap taut at one strain."""
+    slackness = net.slackness[np.isin(net.line, net.web.find_lines(event.line, "line"))]
+    if np.ptp(slackness) > 0.0:
+        raise InputError(
+            f"line = {shown(event.line)}: these lines have slackness {slackness.min():g} … {slackness.max():g}, and "
+            "snap taut at different strains: name lines of one slackness"
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from .errors import InputError
 from .messages import shown
 from .registry import INTEGRATORS, STATICS
-from .tables import Table, boolean, choice, components, field, integer, node_number, nodes, numbers_list, real, text
+from .tables import Table, boolean, choice, components, integer, nodes, numbers_list, real, text
 
 START_STATES = ("web", "equilibrium")
 """What ``start`` may be besides a result folder."""
@@ -150,11 +150,12 @@ class Event(Table):
     name : str
         Its name.
     kind : {"contact", "taut", "threshold"}
-        A body first touches the web; a line that is slack snaps taut; an observable passes a value, either way.
+        A body first touches the web; a line that is slack snaps taut, of several slack ones the first; an observable
+        passes a value, either way.
     body : str, optional
         Body of a contact, by default any.
-    line : int, optional
-        Line that snaps taut.
+    line : int, str or list, optional
+        Lines of which one snaps taut, by number or group, see `refweb.net.groups`.
     observe : str, optional
         Name of the observable of a threshold.
     value : float, optional
@@ -166,14 +167,14 @@ class Event(Table):
     ------
     InputError
         Where the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind;
-        from `Scene.build`, for a body, line or observable that the scene does not have, "contact" without a contact,
-        and two events of one name.
+        from `Scene.build`, for a body, line or observable that the scene does not have, lines of different slackness,
+        "contact" without a contact, and two events of one name.
     """
 
     name: str = text(most=80)
     kind: str = choice("contact", "taut", "threshold")
     body: str | None = text(None)
-    line: int | None = field(node_number, None)
+    line: object = nodes(None, what="line")
     observe: str | None = text(None)
     value: float | None = real(None)
     stop: bool = boolean(False)

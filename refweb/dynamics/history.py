@@ -49,8 +49,9 @@ def _probes_of_warnings(system, followed):
 
 
 def _of_tension(probe):
-    """Whether a probe follows the largest of tensions, each times a scale, and no mean of it."""
-    return probe.kernel is probes.line and probe.rows[0] == 0 and probe.sign > 0.0 and not probe.average
+    """Whether a probe follows the largest of all tensions, each times a scale, and no mean of it."""
+    every = probe.kernel is probes.line and list(probe.rows[1:]) == [0, len(probe.data)]
+    return every and probe.rows[0] == 0 and probe.sign > 0.0 and not probe.average
 
 
 def _tells_strain(system, scale):

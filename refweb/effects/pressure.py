@@ -19,9 +19,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from ..messages import nearest, shown
 from ..net.net import REFERENCE
-from ..tables import Table, checked, field, node_number, numbers_list, real, rows, vector
+from ..tables import Table, nodes, real, rows, vector
 from .outer_load import factor_at, outer_load
 
 # Columns of data: p n; dX/dξ; the factor.
@@ -86,12 +85,6 @@ def kernels(nodes, shares, couples):
     return force, stiffness, bound
 
 
-def _lines(name, value):
-    if isinstance(value, str):
-        return value
-    return checked(name, value, numbers_list(number=node_number))
-
-
 @dataclass(frozen=True, kw_only=True)
 class Pressure(Table):
     """A force per current length, at right angles to lines and to the normal of a plane.
@@ -102,8 +95,8 @@ class Pressure(Table):
 
     Parameters
     ----------
-    lines : "all", str or list of int
-        Lines by number, those of a group, or all.
+    lines : int, str or list
+        Lines, by number or group (see `refweb.net.groups`), or "all".
     normal : sequence of 3 float
         Normal of the plane, of any length.
     value : float
@@ -129,7 +122,7 @@ class Pressure(Table):
 
     several = True
 
-    lines: object = field(_lines)
+    lines: object = nodes(what="line")
     normal: tuple = vector()
     value: float = real(unit="N/m")
     away_from: tuple | None = vector(None, unit="m")
@@ -142,7 +135,7 @@ class Pressure(Table):
 
     def on(self, net):
         """The family of the elements of these lines; ``out`` is the power [W]."""
-        lines = self._found(net.web)
+        lines = net.web.find_lines(self.lines)
         at = np.flatnonzero(np.isin(net.line, lines))
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
@@ -151,22 +144,6 @@ class Pressure(Table):
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
-
-    def _found(self, web):
-        """Numbers of the lines."""
-        count = len(web.lines)
-        if self.lines == "all":
-            return np.arange(count)
-        if isinstance(self.lines, str):
-            found = np.flatnonzero(np.array(web.groups) == self.lines)
-            if not len(found):
-                known = ("all", *sorted(set(web.groups) - {""}))
-                raise InputError(f"lines = {shown(self.lines)} names no lines, {nearest(self.lines, known)}")
-            return found
-        for line in self.lines:
-            if line >= count:
-                raise InputError(f"lines = {line} must be 0 … {count - 1}")
-        return np.array(self.lines)
 
     def _sides(self, web, lines, normal):
         """Of each line 1 if it pushes away from the point by itself, −1 if not."""

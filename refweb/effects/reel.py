@@ -18,7 +18,7 @@ class Reel(Table):
     Parameters
     ----------
     lines : int, str or list
-        Lines, by number or group, "all", or "rim": those between two nodes of the rim.
+        Lines, by number or group (see `refweb.net.groups`), or "all".
     factor : sequence of (t, factor)
         Natural length over its own [1], > 0; linear in between, end values held. In statics t is the load step.
 
@@ -26,7 +26,7 @@ class Reel(Table):
     ------
     InputError
         For a factor that is not > 0, a table without rows, and times that do not increase; from ``on``, for a line or a
-        group that the web does not have, and "rim" where no line joins two of its nodes.
+        group that the web does not have.
     """
 
     several = True

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, short, shown
+from ..messages import short
+from ..net.groups import givers
 from ..tables import Table, by_group, checked, field, real, rows
 from .length_factor import scaled
 
@@ -37,13 +38,13 @@ class Temperature(Table):
         Difference ΔT [K] to the temperature at which natural lengths are their own, at all times, or linear in between
         and end values held. In statics t is the load step.
     groups : dict of str to GroupTemperature
-        Values that differ by group of lines.
+        Values that differ by group of lines; groups that share lines give them different keys.
 
     Raises
     ------
     InputError
         For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines; from
-        ``on``, for a group that no line has.
+        ``on``, for a group that no line has, and two groups that give the same key to one line.
     """
 
     expansion: float = real(unit="1/K")
@@ -52,28 +53,36 @@ class Temperature(Table):
 
     def check(self):
         """Refuse a natural length that is not positive."""
-        for group in (None, *self.groups):
-            for _, factor in self._factor(group):
-                if not factor > 0.0:
-                    where = "" if group is None else f"groups.{short(group)} "
-                    raise InputError(f"{where}1 + expansion × change = {factor:g} must be > 0: no length is left")
-
-    def _factor(self, group=None):
-        """Table of 1 + α ΔT."""
-        own = self.groups.get(group, self)
-        expansion = self.expansion if own.expansion is None else own.expansion
-        change = self.change if own.change is None else own.change
-        table = change if isinstance(change, tuple) else ((0.0, change),)
-        return [(t, 1.0 + expansion * value) for t, value in table]
+        for name in (None, *self.groups):
+            own = self.groups.get(name, self)
+            _refuse_none(
+                self if own.expansion is None else own,
+                self if own.change is None else own,
+                "" if name is None else f"groups.{short(name)} ",
+            )
 
     def on(self, net):
-        """The drives of the natural lengths, one for each group."""
-        groups = np.array(net.web.groups)
-        for name in self.groups:
-            if name not in groups:
-                known = sorted(set(net.web.groups) - {""})
-                hint = nearest(name, known) if known else "this web has no groups"
-                raise InputError(f"groups {shown(name)} is the group of no line, {hint}")
-        apart = [scaled(net, np.flatnonzero(groups == name), self._factor(name)) for name in self.groups]
-        rest = np.flatnonzero([name not in self.groups for name in groups])
-        return [scaled(net, rest, self._factor()), *apart]
+        """The drives of the natural lengths, one for the lines of each pair of α and ΔT."""
+        web, tables = net.web, list(self.groups.values())
+        found = givers(web.groups, self.groups, len(web.lines))
+        none = np.full(len(web.lines), -1)
+        given = np.stack([found.get("expansion", none), found.get("change", none)], axis=1)
+        drives = []
+        for one in np.unique(given, axis=0):
+            own = [tables[number] if number >= 0 else self for number in one]
+            _refuse_none(*own, "groups ")
+            drives.append(scaled(net, np.flatnonzero((given == one).all(axis=1)), _factor(*own)))
+        return drives
+
+
+def _factor(expanding, changing):
+    """Table of 1 + α ΔT, of the two tables that give α and ΔT."""
+    change = changing.change if isinstance(changing.change, tuple) else ((0.0, changing.change),)
+    return [(t, 1.0 + expanding.expansion * value) for t, value in change]
+
+
+def _refuse_none(expanding, changing, where):
+    """Refuse natural lengths that are not positive."""
+    for _, factor in _factor(expanding, changing):
+        if not factor > 0.0:
+            raise InputError(f"{where}1 + expansion × change = {factor:g} must be > 0: no length is left")

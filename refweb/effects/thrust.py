@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import shown
 from ..net.net import REFERENCE
-from ..tables import Table, field, node_number, nodes, real, rows
+from ..tables import Table, nodes, real, rows
 from .outer_load import factor_at, outer_load
 
 SHORTER = 0.5
@@ -91,8 +91,8 @@ class Thrust(Table):
     ----------
     node : int or str
         One node, by number or name.
-    line : int
-        A line that ends at it.
+    line : int, str or list
+        The line that ends at it, by number or group; of several lines one ends there.
     force : float
         Force [N]; a positive one pulls the node into the line, towards its other end.
     factor : sequence of (t, factor), optional
@@ -109,22 +109,18 @@ class Thrust(Table):
     several = True
 
     node: object = nodes()
-    line: int = field(node_number)
+    line: object = nodes(what="line")
     force: float = real(unit="N")
     factor: tuple | None = rows(2, None, increasing=True)
 
     def on(self, net):
         """The family of one element; ``out`` is the power [W]."""
-        found, count = net.web.find(self.node), len(net.web.lines)
+        found = net.web.find(self.node)
         if len(found) != 1:
             raise InputError(f"node = {shown(self.node)} is {len(found)} nodes, must be one")
-        if self.line >= count:
-            raise InputError(f"line = {self.line} must be 0 … {count - 1}")
-        ends = net.web.lines[self.line]
-        if found[0] not in ends:
-            raise InputError(f"node = {shown(self.node)} must be an end of line {self.line}, {ends[0]} or {ends[1]}")
-        second = int(found[0] == ends[1])
-        cell = np.flatnonzero(net.line == self.line)[-second]
+        line = self._line(net.web, found[0])
+        second = int(found[0] == net.web.lines[line, 1])
+        cell = np.flatnonzero(net.line == line)[-second]
         place, sign = float(second), 1.0 - 2.0 * second
         order = np.argsort(abs(net.places - place))
         power = np.arange(len(order))
@@ -135,3 +131,14 @@ class Thrust(Table):
         force, stiffness, bound = kernels(len(order))
         own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
         return outer_load(net, "thrust", cells, data, self.factor, **own)
+
+    def _line(self, web, node):
+        """Number of the line that ends at a node."""
+        lines = web.find_lines(self.line, "line")
+        here = lines[(web.lines[lines] == node).any(axis=1)]
+        if len(here) == 1:
+            return int(here[0])
+        if len(lines) == 1:
+            ends = web.lines[lines[0]]
+            raise InputError(f"node = {shown(self.node)} must be an end of line {lines[0]}, {ends[0]} or {ends[1]}")
+        raise InputError(f"line = {shown(self.line)}: {len(here)} of its lines end at node {node}, must be one")

@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, shown
 from ..tables import LARGEST, Table, by_group, choice, integer, real
+from .groups import givers
 from .tension_laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")
@@ -73,14 +73,15 @@ class Cable(Table):
     subdivide : int
         Elements per line.
     groups : dict of str to Group
-        Values that differ by group of lines.
+        Values that differ by group of lines; groups that share lines give them different keys.
 
     Raises
     ------
     InputError
         For an unknown law or order, a number out of these bounds, and slackness or smoothing, of a group as well, with
-        another law than the smooth one; from ``properties``, for a group that no line has, prestrain of a web whose
-        natural lengths are given, and a line whose stiffness or mass is above `refweb.tables.LARGEST`.
+        another law than the smooth one; from ``properties``, for a group that no line has, two groups that give one key
+        to the same line, prestrain of a web whose natural lengths are given, and a line whose stiffness or mass is
+        above `refweb.tables.LARGEST`.
     """
 
     law: str = choice(*NAMES, default="smooth")
@@ -119,23 +120,19 @@ class Cable(Table):
         Raises
         ------
         InputError
-            For a group that no line has, or prestrain beside given natural lengths.
+            For a group that no line has, two groups that give the same key to one line, or prestrain beside given
+            natural lengths.
         """
-        known = sorted(set(web.groups) - {""})
-        unknown = [name for name in self.groups if name not in known]
-        if unknown:
-            hint = nearest(unknown[0], known) if known else "this web has no groups"
-            raise InputError(f"[cable.groups] {shown(unknown[0])} is the group of no line, {hint}")
+        given = givers(web.groups, self.groups, len(web.lines), "[cable.groups]")
         values = {}
         for f in fields(Group):
             own = getattr(self, f.name)
             missing = np.inf if f.name == "strength" else 0.0
             values[f.name] = np.full(len(web.lines), missing if own is None else own)
-        if self.groups:
-            group_of = np.array(web.groups)
-            for name, group in self.groups.items():
-                for key, value in group.to_dict().items():
-                    values[key][group_of == name] = value
+        for key, by in given.items():
+            for number, group in enumerate(self.groups.values()):
+                if getattr(group, key) is not None:
+                    values[key][by == number] = getattr(group, key)
         prestrain = values.pop("prestrain")
         if web.length_given and prestrain.any():
             worst = prestrain[np.argmax(np.abs(prestrain))]

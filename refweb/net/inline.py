@@ -36,6 +36,12 @@ def _names(name, value):
     return result
 
 
+def _groups(name, value):
+    if not isinstance(value, dict):
+        return checked(name, value, texts())
+    return {key: checked(f"{name}.{key}", lines, numbers_list(number=node_number)) for key, lines in value.items()}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Inline(Table):
     """A web given node by node and line by line.
@@ -52,8 +58,8 @@ class Inline(Table):
         Nodes that are fixed unless the scene says otherwise.
     names : dict of str to int or list of int
         Names for nodes.
-    groups : list of str, optional
-        Group of each line.
+    groups : list of str or dict of str to list of int, optional
+        Group of each line, "" for none; or the lines of each group, where a line may be in several.
 
     Raises
     ------
@@ -68,7 +74,7 @@ class Inline(Table):
     natural_length: tuple | float | str = field(_lengths, "distance", "m")
     supports: tuple = numbers_list((), number=node_number, empty=True)
     names: dict = field(_names, factory=dict)
-    groups: tuple | None = texts(None)
+    groups: tuple | dict | None = field(_groups, None)
 
     def check(self):
         """Refuse supports that are none of the nodes."""

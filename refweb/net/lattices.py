@@ -3,12 +3,30 @@
 The paper is *Dynamic modelling and analysis of space webs*, Sci China-Phys Mech Astron 54 (2011). Lattice points have
 integer coordinates in steps of `STEP` sides; the meshes are polygons of such points, and shared points and sides of
 the polygons are the web's nodes and lines.
+
+Groups of lines, beside ``rim``, ``anchors`` and ``inner`` of `refweb.net.groups`:
+
+============= =========================================================================
+``rows``      lines along x
+``columns``   lines along y
+``rising``    lines aslant, up to the right
+``falling``   lines aslant, down to the right
+``diagonals`` ``rising`` and ``falling``
+``ring-K``    of layers: the outline of the innermost K layers, K = 1 … N
+``spokes``    of layers: lines between two meshes of one layer, most from ring to ring
+============= =========================================================================
+
+Webs have those that have lines: squares ``rows`` and ``columns``, triangles no ``columns`` but for links at the rim,
+hexagons no ``rows`` but for these. Ends that are held stand at the ends of links: webs of the paper's rule have no
+``rim``, and the links are their ``anchors``. In a web of layers the outline is held, its ``rim``; where a line cuts off
+a corner of a triangle, both of its nodes are on that as well, and ``ring-N`` is the outline alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,27 +49,75 @@ _DOWN = ((0, 0), (1, 1), (-1, 1))
 _SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 _HEXAGON = ((0, -2), (1, -1), (1, 1), (0, 2), (-1, 1), (-1, -1))
 _MOST_CELLS = 1_000_000
+_PARALLEL = 1e-9  # sine of the angle below which a line lies along an axis
+
+
+def _places(counts):
+    """Row and column of each polygon, ``counts[j]`` in row j."""
+    row = np.repeat(np.arange(len(counts)), counts)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _rows(counts, first, polygon, pitch=(2, 1)):
     """Copies of a polygon, ``counts[j]`` in row j from x = ``first[j]`` on; integer array (polygons, corners, 2)."""
-    row = np.repeat(np.arange(len(counts)), counts)
-    column = np.arange(len(row)) - np.repeat(np.cumsum(counts) - counts, counts)
+    row, column = _places(counts)
     place = np.stack([pitch[0] * column + np.asarray(first)[row], pitch[1] * row], axis=1)
     return place[:, None, :] + np.array(polygon)
 
 
+class Tessellation(NamedTuple):
+    """Polygons of lattice points as a net.
+
+    Attributes
+    ----------
+    nodes : ndarray of int, shape (nodes, 2)
+        Shared corners, row by row.
+    lines : ndarray of int, shape (lines, 2)
+        Shared sides.
+    frame : ndarray of bool, shape (lines,)
+        Which of them belong to one polygon only.
+    sides : ndarray of int, shape (polygons, corners)
+        The line of each side.
+    """
+
+    nodes: np.ndarray
+    lines: np.ndarray
+    frame: np.ndarray
+    sides: np.ndarray
+
+
 def _tessellation(polygons):
-    """Shared corners and sides: nodes (n, 2) row by row, lines (e, 2), and which lines belong to one polygon only."""
+    """The `Tessellation` of polygons, an integer array of shape (polygons, corners, 2)."""
     corners = polygons.reshape(-1, 2)
     low = corners.min(axis=0)
     width = np.ptp(corners[:, 0]) + 1
     key, number = np.unique((corners - low) @ [1, width], return_inverse=True)
     number = number.reshape(polygons.shape[:2])
-    sides = np.sort(np.stack([number, np.roll(number, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    sides, count = np.unique(sides @ [len(key), 1], return_counts=True)
+    ends = np.sort(np.stack([number, np.roll(number, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    sides, of, count = np.unique(ends @ [len(key), 1], return_inverse=True, return_counts=True)
     lines = np.stack([sides // len(key), sides % len(key)], axis=1)
-    return np.stack([key % width, key // width], axis=1) + low, lines, count == 1
+    nodes = np.stack([key % width, key // width], axis=1) + low
+    return Tessellation(nodes, lines, count == 1, of.reshape(number.shape))
+
+
+def _directions(points, lines):
+    """Groups by the direction of lines in the plane, of the names above."""
+    x, y, _ = (points[lines[:, 1]] - points[lines[:, 0]]).T
+    along, up = abs(y) < _PARALLEL * abs(x), abs(x) < _PARALLEL * abs(y)
+    aslant, rising = ~(along | up), x * y > 0.0
+    found = dict(rows=along, columns=up, rising=aslant & rising, falling=aslant & ~rising, diagonals=aslant)
+    return {name: np.flatnonzero(these) for name, these in found.items() if these.any()}
+
+
+def _rings(net, layer):
+    """Groups of a `Tessellation` whose polygons are in layers 1 … N."""
+    low, high = np.full(len(net.lines), layer.max() + 1), np.zeros(len(net.lines), dtype=int)
+    each = np.repeat(layer, net.sides.shape[1])
+    np.minimum.at(low, net.sides.ravel(), each)
+    np.maximum.at(high, net.sides.ravel(), each)
+    ring = np.where(net.frame | (low < high), low, 0)
+    found = {f"ring-{k}": np.flatnonzero(ring == k) for k in range(1, layer.max() + 1)}
+    return found | ({"spokes": np.flatnonzero(ring == 0)} if (ring == 0).any() else {})
 
 
 def _placed(nodes, mesh, side):
@@ -65,7 +131,7 @@ def _window(mesh, rows, columns, side, kind):
     if mesh == "triangle":
         odd = np.arange(rows - 1) % 2
         polygons = np.concatenate([_rows(columns - 1 + odd, 1 - odd, _UP), _rows(columns - odd, 1 + odd, _DOWN)])
-        nodes, lines, _ = _tessellation(polygons)
+        nodes, lines, *_ = _tessellation(polygons)
         points = _placed(nodes, mesh, side)
         outward = [
             (np.flatnonzero(nodes[:, axis] == end), axis, sign)
@@ -83,17 +149,20 @@ def _window(mesh, rows, columns, side, kind):
             polygons = _rows(np.full(rows, columns), 0 * odd, _SQUARE, (1, 1))
         else:
             polygons = _rows(columns - odd, odd, _HEXAGON, (2, 3))
-        nodes, lines, frame = _tessellation(polygons)
+        nodes, lines, frame, _ = _tessellation(polygons)
         used, inner = np.unique(lines[~frame], return_inverse=True)
         rim = np.flatnonzero(np.isin(used, lines[frame]))
         points = _placed(nodes[used], mesh, side)
         lines = inner.reshape(-1, 2)
-    return Web(points, lines, rim=rim, kind=kind, cells=len(polygons))
+    return Web(points, lines, rim=rim, kind=kind, cells=len(polygons), groups=_directions(points, lines))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Paper(Table):
     """One of the three webs of the paper's section 3.2, exactly.
+
+    Groups of lines: ``anchors``, the links at the rim; ``inner``, all others; of these and of links ``rows``,
+    ``columns``, ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.
 
     Parameters
     ----------
@@ -129,6 +198,9 @@ class Paper(Table):
 @dataclass(frozen=True, kw_only=True)
 class Window(Table):
     """A web by the rule of `Paper`, at any size: closed inner web, every outermost node linked to a fixed end.
+
+    Groups of lines: ``anchors``, the links at the rim; ``inner``, all others; of these and of links ``rows``,
+    ``columns``, ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.
 
     Parameters
     ----------
@@ -170,6 +242,10 @@ class Window(Table):
 class Layers(Table):
     """A web of concentric layers with its frame, fixed at every node of the frame (section 3.1, Figure 9).
 
+    Groups of lines: ``rim``, lines between two nodes of the frame; ``anchors``, lines with one node there; ``inner``,
+    all others; ``ring-1`` … ``ring-N``, the outline of so many layers; ``spokes``, lines between two meshes of one
+    layer; ``rows``, ``columns``, ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.
+
     Parameters
     ----------
     mesh : {"triangle", "square", "hexagon"}
@@ -201,17 +277,37 @@ class Layers(Table):
         cells = _cells(self.mesh, n)
         if cells > _MOST_CELLS:
             raise InputError(f"layers = {n} makes {cells} cells, must be ≤ {_MOST_CELLS}")
-        if self.mesh == "triangle":
-            row = np.arange(3 * n - 2)
-            polygons = np.concatenate([_rows(len(row) - row, row, _UP), _rows(len(row) - 1 - row, row + 2, _DOWN)])
-        elif self.mesh == "square":
-            polygons = _rows(np.full(2 * n - 1, 2 * n - 1), np.zeros(2 * n - 1, dtype=int), _SQUARE, (1, 1))
-        else:
-            away = abs(np.arange(2 * n - 1) - (n - 1))
-            polygons = _rows(2 * n - 1 - away, away, _HEXAGON, (2, 3))
-        nodes, lines, frame = _tessellation(polygons)
-        points = _placed(nodes, self.mesh, _side(self.mesh, self.cell_area))
-        return Web(points, lines, rim=np.unique(lines[frame]), kind="layers", cells=len(polygons))
+        polygons, layer = _layers(self.mesh, n)
+        net = _tessellation(polygons)
+        points = _placed(net.nodes, self.mesh, _side(self.mesh, self.cell_area))
+        groups = _directions(points, net.lines) | _rings(net, layer)
+        rim = np.unique(net.lines[net.frame])
+        return Web(points, net.lines, rim=rim, kind="layers", cells=len(polygons), groups=groups)
+
+
+def _layers(mesh, n):
+    """Polygons of n layers, and the layer of each, 1 for those in the centre."""
+    if mesh == "triangle":
+        row = np.arange(3 * n - 2)
+        up, down = len(row) - row, len(row) - 1 - row
+        polygons = np.concatenate([_rows(up, row, _UP), _rows(down, row + 2, _DOWN)])
+        return polygons, n - np.concatenate([_from_sides(up), _from_sides(down)])
+    if mesh == "square":
+        counts = np.full(2 * n - 1, 2 * n - 1)
+        row, column = _places(counts)
+        layer = 1 + np.maximum(abs(row - (n - 1)), abs(column - (n - 1)))
+        return _rows(counts, 0 * counts, _SQUARE, (1, 1)), layer
+    away = abs(np.arange(2 * n - 1) - (n - 1))
+    row, column = _places(2 * n - 1 - away)
+    x = abs(2 * column + away[row] - (2 * n - 2))  # in halves of a mesh
+    layer = 1 + np.maximum(away[row], (away[row] + x) // 2)
+    return _rows(2 * n - 1 - away, away, _HEXAGON, (2, 3)), layer
+
+
+def _from_sides(counts):
+    """Rows of triangles between each triangle of a large one and its nearest side."""
+    row, column = _places(counts)
+    return np.minimum(np.minimum(row, column), counts[row] - 1 - column)
 
 
 def _side(mesh, cell_area):

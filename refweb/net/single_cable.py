@@ -18,6 +18,9 @@ _PARALLEL = 1e-9
 class SingleCable(Table):
     """One cable with both ends fixed, of lines of equal natural length.
 
+    Groups of lines: ``anchors``, the first and the last; ``inner``, all others; one line alone is ``rim``, see
+    `refweb.net.groups`.
+
     Parameters
     ----------
     start, end : tuple of 3 floats

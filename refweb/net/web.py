@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..messages import nearest, shown
 from ..tables import node_number
+from .groups import by_place, members
 
 SELECTIONS = ("centre", "rim", "corners", "all")
 _TIE = 1e-9  # two distances are equal if they differ by less than this part of the web's size
@@ -35,8 +36,10 @@ class Web:
         Number of meshes, by default lines − nodes + components.
     names : dict of str to tuple of int
         The user's names for nodes.
-    groups : tuple of str, optional
-        Group of each line, "" for none.
+    groups : sequence of str or dict of str to sequence of int, optional
+        Group of each line, "" for none, or the lines of each group, which may share lines. As an attribute the lines of
+        each group, a dict of increasing int64 arrays, with those of `refweb.net.groups` that the web's own supports
+        make.
     length_given : bool, optional
         Whether natural lengths are data of their own and not distances; by default whether ``natural_length`` is given.
 
@@ -57,7 +60,7 @@ class Web:
     kind: str = "inline"
     cells: int | None = None
     names: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    groups: tuple[str, ...] | None = None
+    groups: object = None
     length_given: bool | None = None
 
     def __post_init__(self):
@@ -78,11 +81,10 @@ class Web:
             raise InputError(f"natural_length has {length.size} entries for {len(lines)} lines")
         for i in _first(~((length > 0) & np.isfinite(length))):
             raise InputError(f"natural_length[{i}] = {length[i]:g} must be finite and > 0 [m]")
-        groups = ("",) * len(lines) if self.groups is None else tuple(map(str, self.groups))
-        if len(groups) != len(lines):
-            raise InputError(f"groups has {len(groups)} entries for {len(lines)} lines")
+        groups = members(self.groups, len(lines))
         names = {name: _named(name, numbers, len(points)) for name, numbers in self.names.items()}
         rim = np.unique(in_range("rim", self.rim, len(points))).astype(np.int32)
+        groups |= {name: own for name, own in by_place(lines, rim, len(points)).items() if name not in groups}
         given = self.natural_length is not None if self.length_given is None else bool(self.length_given)
         for name, value in (("points", points), ("lines", lines), ("natural_length", length), ("rim", rim)):
             value.setflags(write=False)
@@ -175,13 +177,15 @@ class Web:
             found = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
 
-    def find_lines(self, selection):
+    def find_lines(self, selection, name="lines"):
         """Line numbers of a selection.
 
         Parameters
         ----------
         selection : int, str or list of them
-            Line numbers, groups, "rim" (the lines between two nodes of the rim) or "all".
+            Line numbers, groups, or "all".
+        name : str
+            What messages call the selection.
 
         Returns
         -------
@@ -194,9 +198,9 @@ class Web:
             For a number out of range, or a name that is that of no line.
         """
         if isinstance(selection, (list, tuple, np.ndarray)):
-            found = [self._find_lines(f"lines[{i}]", one) for i, one in enumerate(selection)]
+            found = [self._find_lines(f"{name}[{i}]", one) for i, one in enumerate(selection)]
         else:
-            found = [self._find_lines("lines", selection)]
+            found = [self._find_lines(name, selection)]
         return np.unique(np.concatenate(found)).astype(np.int64)
 
     def _find_lines(self, name, one):
@@ -204,17 +208,13 @@ class Web:
             if not 0 <= node_number(name, one) < len(self.lines):
                 raise InputError(f"{name} = {one} must be 0 … {len(self.lines) - 1}")
             return [one]
-        known = [group for group in dict.fromkeys(self.groups) if group]
-        if one in known:
-            return np.flatnonzero(np.array(self.groups) == one)
+        if one in self.groups:
+            return self.groups[one]
         if one == "all":
             return np.arange(len(self.lines))
-        if one != "rim":
-            raise InputError(f"{name} = {shown(one)} names no line, {nearest(one, ('rim', 'all', *known))}")
-        found = np.flatnonzero(np.isin(self.lines, self.rim).all(axis=1))
-        if not len(found):
+        if one == "rim":
             raise InputError(f'{name} = "rim": no line of this web joins two nodes of its rim, give line numbers')
-        return found
+        raise InputError(f"{name} = {shown(one)} names no line, {nearest(one, ('all', *self.groups))}")
 
     def _find_one(self, name, one):
         if not isinstance(one, str):

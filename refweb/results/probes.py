@@ -167,6 +167,17 @@ def line(t, x, v, f, lines, rows, data, where):
 
 
 @kernel(PROBE)
+def line_of(t, x, v, f, lines, rows, data, where):
+    """Largest of data × column over some elements; ``rows`` is (column, element, element, ...)."""
+    column, best = rows[0], -math.inf
+    for n in range(1, rows.size):
+        value = lines[rows[n], column] * data[rows[n], 0]
+        if n == 1 or value > best:
+            best, where[0] = value, rows[n]
+    return best
+
+
+@kernel(PROBE)
 def slack_fraction(t, x, v, f, lines, rows, data, where):
     """Share of elements whose strain is at most data."""
     count = 0

@@ -436,10 +436,10 @@ def test_work_of_a_run_and_not_of_statics():
     "effect, message",
     [
         (lambda: refweb.Pressure(lines="all", normal=(0, 0, 0), value=1.0), "normal = .* must have a direction"),
-        (lambda: refweb.Pressure(lines=[4], normal=UP, value=1.0), r"lines = 4 must be 0 … 3"),
+        (lambda: refweb.Pressure(lines=[4], normal=UP, value=1.0), r"lines\[0\] = 4 must be 0 … 3"),
         (lambda: refweb.Pressure(lines=[-1], normal=UP, value=1.0), r"lines\[0\] = -1 must be ≥ 0"),
-        (lambda: refweb.Pressure(lines=[], normal=UP, value=1.0), "lines = .* at least one number"),
-        (lambda: refweb.Pressure(lines="egde", normal=UP, value=1.0), '"egde" names no lines, did you mean "edge"'),
+        (lambda: refweb.Pressure(lines=[], normal=UP, value=1.0), "lines = .* at least one line"),
+        (lambda: refweb.Pressure(lines="egde", normal=UP, value=1.0), '"egde" names no line, did you mean "edge"'),
         (
             lambda: refweb.Pressure(lines=[0], normal=UP, value=1.0, away_from=(7.0, 0.0, 3.0)),
             "away_from = .* is on neither side of line 0",

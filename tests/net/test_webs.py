@@ -75,7 +75,7 @@ def test_paper(mesh):
     assert (degree[web.rim] == 1).all()
     inner = np.delete(degree, web.rim)
     assert (inner == {"square": 4, "hexagon": 3}[mesh]).all() if mesh != "triangle" else inner.max() == 6
-    assert not web.length_given and web.kind == "paper" and set(web.groups) == {""}
+    assert not web.length_given and web.kind == "paper"
 
 
 def test_triangle_links_stand_normal_to_the_sides():
@@ -319,7 +319,7 @@ def test_inline():
     np.testing.assert_allclose(web.natural_length, [3, 4, 5, 5], rtol=1e-15)
     np.testing.assert_array_equal(web.rim, [1, 3])
     assert (web.cells, web.area, web.centre, web.kind, web.length_given) == (1, 20.0, 0, "inline", False)
-    assert web.groups == ("leg", "leg", "", "mast")
+    assert [web.find_lines(name).tolist() for name in ("leg", "mast")] == [[0, 1], [3]]
     assert web.find(["feet", "tip", 3, "rim", "centre"], "nodes").tolist() == [3, 0, 2, 1]
     given = Inline(**TRIANGLE, natural_length=2.5).web()
     assert given.natural_length.tolist() == [2.5] * 3 and given.length_given
@@ -455,7 +455,8 @@ def test_file_round_trip(mesh, tmp_path, name):
     web = File(path=name).web(tmp_path)
     np.testing.assert_allclose(web.points, mesh.points, rtol=1e-15)
     assert web.lines.tolist() == [[0, 1], [1, 2], [2, 3]] and web.natural_length.tolist() == [1.5, 2.5, 3.5]
-    assert web.rim.tolist() == [0, 3] and web.groups == ("7", "8", "8")
+    assert web.rim.tolist() == [0, 3] and web.find_lines("8").tolist() == [1, 2]
+    assert web.find_lines("7").tolist() == [0]
     assert (web.kind, web.length_given, web.cells) == ("file", True, 0)
     assert len(File(path=str(tmp_path / name)).web("/nowhere").lines) == 3
 
@@ -464,7 +465,7 @@ def test_file_without_data_takes_distances(mesh, tmp_path):
     mesh.write(tmp_path / "net.vtu")
     web = File(path="net.vtu").web(tmp_path)
     np.testing.assert_allclose(web.natural_length, distances(web), rtol=1e-15)
-    assert not web.length_given and len(web.rim) == 0 and set(web.groups) == {""}
+    assert not web.length_given and len(web.rim) == 0 and web.groups == {}
 
 
 def test_file_of_pyvista(mesh, tmp_path):

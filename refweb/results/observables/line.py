@@ -1,10 +1,9 @@
-"""Tension, stress and strain: of a line its largest, without one that of all lines."""
+"""Tension, stress and strain: of a line its largest, of several lines the largest of all of these."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...errors import InputError
 from ...net.net import AXIAL_STIFFNESS
 from .observable import Observable, Value
 
@@ -20,24 +19,34 @@ class Line(Observable):
     column = 0
 
     def on(self, system):
-        """Refuse a line that the net does not have."""
-        count = len(system.net.web.lines)
-        if self.observe.line is not None and self.observe.line >= count:
-            raise InputError(f"line = {self.observe.line} must be 0 … {count - 1}")
+        """Refuse lines that the net does not have."""
+        self.lines(system.net)
+
+    def lines(self, net):
+        """Numbers of the lines that are looked at, increasing; None for all."""
+        line = self.observe.line
+        return None if line is None else net.web.find_lines(line, "line")
+
+    def elements(self, net):
+        """Numbers of their elements, increasing, shape (k,)."""
+        lines = self.lines(net)
+        return np.arange(len(net.line)) if lines is None else np.flatnonzero(np.isin(net.line, lines))
 
     def of(self, state):
-        """That of its line, or the largest."""
-        values, line = self.values(state), self.observe.line
-        at = int(np.argmax(values)) if line is None else line
+        """The largest of its lines, or of all."""
+        values, lines = self.values(state), self.lines(state.system.net)
+        at = int(np.argmax(values) if lines is None else lines[np.argmax(values[lines])])
         return Value(float(values[at]), at)
 
     def probe(self, system):
-        """Of the elements of its line, or of all."""
-        from ..probes import Probe, line
+        """Of the elements of its lines, or of all."""
+        from ..probes import Probe, line, line_of
 
-        net, own = system.net, self.observe.line
-        elements = np.arange(len(net.line)) if own is None else np.flatnonzero(net.line == own)
-        return Probe(line, [self.column, elements[0], elements[-1] + 1], self.scale(net)[:, None])
+        elements, scale = self.elements(system.net), self.scale(system.net)[:, None]
+        first, last = int(elements[0]), int(elements[-1])
+        if len(elements) == last + 1 - first:
+            return Probe(line, [self.column, first, last + 1], scale)
+        return Probe(line_of, [self.column, *elements.tolist()], scale)
 
     def place(self, system, at):
         """The line of an element."""
@@ -51,9 +60,9 @@ class Line(Observable):
         """The proven bound of duality, where there is one, and the rounding of lines that both ends hold."""
         if equilibrium.duality_bound is None:
             return super().error(state, equilibrium)
-        net, line = state.system.net, self.observe.line
-        bound = self.bound(equilibrium.duality_bound.tension, net)
-        return float((bound if line is None else bound[net.line == line]).max()) + self.of_held_lines(state)
+        net = state.system.net
+        bound = self.bound(equilibrium.duality_bound.tension, net)[self.elements(net)]
+        return float(bound.max()) + self.of_held_lines(state)
 
 
 class Tension(Line):

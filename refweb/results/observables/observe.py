@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ...errors import InputError
 from ...messages import nearest, shown
 from ...registry import OBSERVABLES, load
-from ...tables import Table, choice, component, field, node_number, nodes, real, text
+from ...tables import Table, choice, component, field, nodes, real, text
 
 SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 """Sign of the peaks that a probe follows, by ``reduce``."""
@@ -34,8 +34,9 @@ class Observe(Table):
         without ``node`` that is over all.
     body : str, optional
         Body of a nodal quantity; its reaction is the contact force on it.
-    line : int, optional
-        Line of a line quantity; without it the largest over all lines.
+    line : int, str or list, optional
+        Lines of a line quantity, by number or group, see `refweb.net.groups`. Of several the one with the largest
+        value counts; without ``line`` that is over all.
     component : {0, 1, 2, "x", "y", "z"}, optional
         Axis of a nodal quantity; without it the magnitude.
     reduce : {"max", "min", "final"}
@@ -62,7 +63,7 @@ class Observe(Table):
     quantity: str = field(_quantity)
     node: object = nodes(None)
     body: str | None = text(None)
-    line: int | None = field(node_number, None)
+    line: object = nodes(None, what="line")
     component: int | None = component(None)
     reduce: str = choice("max", "min", "final", default="final")
     average: float | None = real(None, above=0.0, unit="s")

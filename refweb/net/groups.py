@@ -1,0 +1,104 @@
+"""Groups of lines: the names by which a scene speaks of many lines at once. A line may be in several.
+
+Every web has groups by its own supports, the nodes of its rim, unless the user has given these names to others:
+
+========== ==========================================================================
+``rim``     lines between two nodes of the rim: the cable along a rim that is held
+``anchors`` lines with one node of the rim: those that hang the web up
+``inner``   all others
+========== ==========================================================================
+
+Each line is in one of these three. A group without lines is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..messages import nearest, shown
+
+PLACES = ("inner", "anchors", "rim")
+"""Groups by the number of a line's ends that are in the rim."""
+
+
+def members(given, count):
+    """Numbers of the lines of each group, a dict of increasing int64 arrays.
+
+    Parameters
+    ----------
+    given : None, sequence of str or dict of str to sequence of int
+        The group of each line, "" for none; or the lines of each group.
+    count : int
+        Number of lines.
+    """
+    if given is None:
+        return {}
+    if isinstance(given, dict):
+        return {str(name): _numbers(name, lines, count) for name, lines in given.items() if len(lines)}
+    names = list(map(str, given))
+    if len(names) != count:
+        raise InputError(f"groups has {len(names)} entries for {count} lines")
+    number = {name: i for i, name in enumerate(dict.fromkeys(names))}
+    of = np.array([number[name] for name in names], dtype=np.int64)
+    order = np.argsort(of, kind="stable")
+    parts = np.split(order, np.cumsum(np.bincount(of, minlength=len(number)))[:-1])
+    return {name: part for name, part in zip(number, parts, strict=True) if name}
+
+
+def _numbers(name, lines, count):
+    lines = np.asarray(lines)
+    if lines.ndim != 1 or lines.dtype.kind not in "iu":
+        raise InputError(f"groups.{name} = {shown(lines.tolist())} must be line numbers")
+    for line in lines[(lines < 0) | (lines >= count)][:1]:
+        raise InputError(f"groups.{name} has line {line}, must be 0 … {count - 1}")
+    return np.unique(lines).astype(np.int64)
+
+
+def by_place(lines, rim, nodes):
+    """The groups of `PLACES` that have lines, as `members`."""
+    held = np.zeros(nodes, dtype=np.int64)
+    held[rim] = 1
+    ends = held[lines].sum(axis=1)
+    found = {name: np.flatnonzero(ends == k) for k, name in enumerate(PLACES)} if len(rim) else {}
+    return {name: found[name] for name in reversed(PLACES) if name in found and len(found[name])}
+
+
+def givers(groups, tables, count, where="groups"):
+    """Which of some tables by group gives each key of a line.
+
+    Parameters
+    ----------
+    groups : dict of str to ndarray of int
+        Lines of each group of a web.
+    tables : dict of str to refweb.tables.Table
+        Tables by name of the group; a key that is None is not given.
+    count : int
+        Number of lines.
+    where : str
+        How messages begin.
+
+    Returns
+    -------
+    dict of str to ndarray of int64, shape (lines,)
+        Of each key that is given the number of the table, −1 where none gives it.
+
+    Raises
+    ------
+    InputError
+        For a group that the web does not have, and a line to which two groups give the same key.
+    """
+    found, names = {}, list(tables)
+    for number, (name, table) in enumerate(tables.items()):
+        if name not in groups:
+            hint = nearest(name, groups) if groups else "this web has no groups"
+            raise InputError(f"{where} {shown(name)} is the group of no line, {hint}")
+        for key in table.to_dict():
+            by = found.setdefault(key, np.full(count, -1))
+            for line in groups[name][by[groups[name]] >= 0][:1]:
+                raise InputError(
+                    f"{where} {shown(names[by[line]])} and {shown(name)} both give {key} to line {line}: give it in "
+                    "one of them"
+                )
+            by[groups[name]] = number
+    return found
