@@ -37,6 +37,21 @@ EFFECTS = {
     "temperature": "refweb.effects.temperature:Temperature",
 }
 """Effects by the name of their table."""
+SOLVES = {"static": "refweb.settings:Static", "dynamic": "refweb.settings:Dynamic"}
+"""Kinds of ``[solve]``."""
+PARTS = {
+    "cable": "refweb.net.cable:Cable",
+    "supports": "refweb.settings:Supports",
+    "output": "refweb.settings:Output",
+    "accuracy": "refweb.settings:Accuracy",
+}
+"""Tables of a scene besides webs, effects and ``[solve]`` that stand once."""
+LISTS = {
+    "support": "refweb.settings:Supports",
+    "observe": "refweb.results.observables.observe:Observe",
+    "event": "refweb.settings:Event",
+}
+"""Those that may stand several times."""
 OBSERVABLES = {
     "displacement": "refweb.results.observables.nodal:Displacement",
     "position": "refweb.results.observables.nodal:Position",
@@ -107,6 +122,8 @@ COMMANDS = {
     "check": "refweb.commands.check",
     "list": "refweb.commands.list",
     "new": "refweb.commands.new",
+    "help": "refweb.commands.help",
+    "schema": "refweb.commands.schema",
     "info": "refweb.commands.info",
     "compare": "refweb.commands.compare",
     "picture": "refweb.commands.picture",

@@ -10,13 +10,13 @@ import os
 import pathlib
 import re
 import tomllib
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 from .errors import InputError, in_file, refused_at
 from .messages import nearest, short, shown
-from .registry import EFFECTS, WEBS, load, name_of
-from .settings import START_STATES, Accuracy, Dynamic, Event, Output, Static, Supports
-from .tables import Table, checked, choice, integer, text
+from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of
+from .settings import START_STATES, Accuracy, Head, Output, Static, Supports
+from .tables import Table
 
 CLASSES_OF_PARTS = {
     "cable": ("Cable",),
@@ -91,8 +91,9 @@ class Scene:
     chosen: tuple = field(default=(), compare=False)
 
     def __post_init__(self):
-        for key, kind in (("title", text(most=200)), ("seed", integer(at_least=0, at_most=2**63 - 1))):
-            object.__setattr__(self, key, checked(key, getattr(self, key), kind))
+        head = Head(title=self.title, seed=self.seed)
+        for key in ("title", "seed"):
+            object.__setattr__(self, key, getattr(head, key))
         for key in ("effects", "support", "observe", "event"):
             if not isinstance(getattr(self, key), (list, tuple)):
                 raise InputError(f"{key} = {shown(getattr(self, key))} must be a list")
@@ -171,26 +172,24 @@ class Scene:
 
         ``file`` is the name that begins the messages of `build`.
         """
-        single = {"cable": "refweb.net.cable:Cable", "supports": Supports, "output": Output, "accuracy": Accuracy}
-        several = {"support": Supports, "observe": "refweb.results.observables.observe:Observe", "event": Event}
-        known = ["schema", "title", "seed", "web", "solve", *single, *several, *EFFECTS]
+        known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]
         for key in given:
             if key not in known:
                 raise InputError(f"{_as_given(key, given[key])}: unknown table or key, {nearest(key, known)}")
-        checked("schema", given.get("schema", 1), choice(1))
+        Head(schema=given.get("schema", 1))
         parts = {key: given[key] for key in ("title", "seed") if key in given}
         parts |= {"folder": folder, "file": file}
         for key in ("web", "cable", "solve"):
             if key not in given:
                 raise InputError(f"[{key}] is missing: every scene has one")
         parts["web"] = _by_kind("web", given["web"], WEBS)
-        parts["solve"] = _by_kind("solve", given["solve"], {"static": Static, "dynamic": Dynamic})
-        for key, table in single.items():
+        parts["solve"] = _by_kind("solve", given["solve"], SOLVES)
+        for key in PARTS:
             if key in given:
-                parts[key] = _resolve(table).read(f"[{key}]", given[key])
-        for key, table in several.items():
+                parts[key] = load(PARTS[key]).read(f"[{key}]", given[key])
+        for key in LISTS:
             if key in given:
-                parts[key] = _each(key, _resolve(table), given[key])
+                parts[key] = _each(key, load(LISTS[key]), given[key])
         effects = []
         for key in given:
             if key in EFFECTS:
@@ -330,10 +329,6 @@ def _as_given(key, value):
     return f"{name} = {shown(value)}"
 
 
-def _resolve(table):
-    return load(table) if isinstance(table, str) else table
-
-
 def _each(key, table, given):
     if not isinstance(given, (list, tuple)):
         raise InputError(f"[{key}] = {shown(given)} must be a list of tables: write [[{key}]]")
@@ -350,7 +345,7 @@ def _by_kind(key, given, kinds):
         raise InputError(f"[{key}] kind is missing: one of {', '.join(kinds)}")
     if not isinstance(kind, str) or kind not in kinds:
         raise InputError(f"[{key}] kind = {shown(kind)}: unknown kind, {nearest(kind, kinds)}")
-    return _resolve(kinds[kind]).read(f"[{key}]", given)
+    return load(kinds[kind]).read(f"[{key}]", given)
 
 
 def _axes(table):

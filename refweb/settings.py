@@ -14,6 +14,30 @@ START_STATES = ("web", "equilibrium")
 
 
 @dataclass(frozen=True, kw_only=True)
+class Head(Table):
+    """What stands at the head of a scene file, before its tables.
+
+    Parameters
+    ----------
+    schema : {1}
+        Version of the format.
+    title : str
+        Title, by default the name of the file, and in Python "scene". Results of a run go to a folder of that name.
+    seed : int
+        Seed of whatever is random.
+
+    Raises
+    ------
+    InputError
+        For another schema, an empty title or one above 200 characters, and a negative seed.
+    """
+
+    schema: int = choice(1, default=1)
+    title: str = text("scene", most=200)
+    seed: int = integer(0, at_least=0, at_most=2**63 - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Supports(Table):
     """Nodes whose displacement is held at zero in some components.
 
@@ -29,6 +53,15 @@ class Supports(Table):
     InputError
         For a negative number of a node, what is no axis, and an empty list of axes; from `Scene.build`, for a node that
         the web does not have.
+
+    Examples
+    --------
+        [supports]
+        nodes = "corners"
+
+        [[support]]
+        nodes = "all"
+        components = ["z"]
     """
 
     nodes: object = nodes(empty=True)
@@ -52,6 +85,12 @@ class Static(Table):
     ------
     InputError
         For an unknown method or mass, and load steps that are none, not finite or more than 100 000.
+
+    Examples
+    --------
+        [solve]
+        kind = "static"
+        load_steps = [1, 2, 3]
     """
 
     kind: str = choice("static", default="static")
@@ -105,6 +144,13 @@ class Dynamic(Table):
     InputError
         For a duration, step or tolerance that is not > 0, a safety above 1 and an rtol that is not 1e-13 … 0.1; for a
         key of another method, order 5, and a BDF method of an order above 5.
+
+    Examples
+    --------
+        [solve]
+        kind = "dynamic"
+        duration = 0.25
+        method = "auto"
     """
 
     kind: str = choice("dynamic", default="dynamic")
@@ -169,6 +215,14 @@ class Event(Table):
         Where the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind;
         from `Scene.build`, for a body, line or observable that the scene does not have, lines of different slackness,
         "contact" without a contact, and two events of one name.
+
+    Examples
+    --------
+        [[event]]
+        name = "first-touch"
+        kind = "contact"
+        body = "ball"
+        stop = true
     """
 
     name: str = text(most=80)
@@ -207,6 +261,12 @@ class Output(Table):
     InputError
         For an interval that is not > 0 and frames < 1; from `Scene`, for an interval in statics, one above the duration
         or one that makes more than `refweb.scene.MAX_HISTORY_ROWS` rows.
+
+    Examples
+    --------
+        [output]
+        interval = 1e-3
+        frames = 10
     """
 
     interval: float | None = real(None, above=0, unit="s")
@@ -237,6 +297,12 @@ class Accuracy(Table):
     InputError
         For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, and digits without a
         twin; from `Scene`, for digits and horizon in statics.
+
+    Examples
+    --------
+        [accuracy]
+        digits = 3
+        refine = true
     """
 
     error: str = choice("twin", "none", default="twin")

@@ -12,6 +12,7 @@ import math
 import numbers
 from dataclasses import MISSING
 
+from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
 from .messages import closest, nearest, short, shown
 
@@ -26,6 +27,7 @@ def _refuse(name, value, limit):
     raise InputError(f"{name} = {shown(value)} must be {limit}")
 
 
+@accepts(limits("number", at_least=-LARGEST, at_most=LARGEST))
 def _number(name, value, unit=""):
     unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
@@ -86,6 +88,7 @@ def checked(name, value, kind):
 def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit=""):
     """A finite real number within bounds."""
 
+    @accepts(limits("number", above, -LARGEST if at_least is None else at_least, below, at_most))
     def read(name, value):
         return _bounded(name, _number(name, value, unit), unit, above, at_least, below, at_most)
 
@@ -95,6 +98,7 @@ def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARG
 def integer(default=MISSING, *, at_least=None, at_most=None):
     """A whole number within bounds."""
 
+    @accepts(limits("integer", at_least=at_least, at_most=at_most))
     def read(name, value):
         return _bounded(name, _whole(name, value), "", None, at_least, None, at_most)
 
@@ -104,14 +108,17 @@ def integer(default=MISSING, *, at_least=None, at_most=None):
 def choice(*names, default=MISSING):
     """One of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
 
+    def valid():
+        return [one for given in names for one in (given if isinstance(given, dict) else [given])]
+
+    @accepts(lambda: {"type": "string" if isinstance(valid()[0], str) else "integer", "enum": valid()})
     def read(name, value):
-        valid = [one for given in names for one in (given if isinstance(given, dict) else [given])]
-        for known in valid:
+        for known in valid():
             if type(value) is type(known) and value == known:
                 return known
-        close = closest(value, [n for n in valid if isinstance(n, str)]) if isinstance(value, str) else None
+        close = closest(value, [n for n in valid() if isinstance(n, str)]) if isinstance(value, str) else None
         hint = f' — did you mean "{close}"?' if close else ""
-        _refuse(name, value, ("one of " if len(valid) > 1 else "") + ", ".join(map(shown, valid)) + hint)
+        _refuse(name, value, ("one of " if len(valid()) > 1 else "") + ", ".join(map(shown, valid())) + hint)
 
     return field(read, default)
 
@@ -119,6 +126,7 @@ def choice(*names, default=MISSING):
 def boolean(default=MISSING):
     """True or false."""
 
+    @accepts({"type": "boolean"})
     def read(name, value):
         if not isinstance(value, bool):
             _refuse(name, value, "true or false")
@@ -130,6 +138,7 @@ def boolean(default=MISSING):
 def text(default=MISSING, *, most=4096):
     """A string that is not empty, stands on one line and has at most ``most`` characters."""
 
+    @accepts({"type": "string", "pattern": r"\S", "maxLength": most})
     def read(name, value):
         if not isinstance(value, str) or not value.strip() or not value.isprintable():
             _refuse(name, value, "a printable text on one line")
@@ -143,6 +152,7 @@ def text(default=MISSING, *, most=4096):
 def vector(default=MISSING, unit=""):
     """Three finite numbers."""
 
+    @accepts(array(_number.accepts, 3, 3))
     def read(name, value):
         value = _list(name, value, "a vector [x, y, z]" + (f" [{unit}]" if unit else ""))
         if len(value) != 3:
@@ -155,6 +165,7 @@ def vector(default=MISSING, unit=""):
 def rows(width, default=MISSING, *, unit="", increasing=False, number=_number):
     """A list of rows of ``width`` numbers; ``increasing`` asks that of the first column (a table over time)."""
 
+    @accepts(array(array(number.accepts, width, width), 1))
     def read(name, value):
         value = _list(name, value, f"a list of rows of {width} numbers")
         if not value:
@@ -174,6 +185,7 @@ def rows(width, default=MISSING, *, unit="", increasing=False, number=_number):
     return field(read, default, unit)
 
 
+@accepts({"type": "integer", "minimum": 0})
 def node_number(name, value):
     """Read one whole number ≥ 0."""
     return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
@@ -182,6 +194,7 @@ def node_number(name, value):
 def numbers_list(default=MISSING, *, number=_number, empty=False):
     """A list of numbers; ``number=node_number`` for whole numbers ≥ 0."""
 
+    @accepts(array(number.accepts, 1 - empty))
     def read(name, value):
         value = _list(name, value, "a list of numbers")
         if not value and not empty:
@@ -194,6 +207,7 @@ def numbers_list(default=MISSING, *, number=_number, empty=False):
 def texts(default=MISSING):
     """A list of strings."""
 
+    @accepts(array({"type": "string"}))
     def read(name, value):
         value = _list(name, value, "a list of texts")
         for i, x in enumerate(value):
@@ -207,6 +221,9 @@ def texts(default=MISSING):
 def nodes(default=MISSING, *, empty=False, what="node"):
     """A number of a node (or a line), a name, or a list of them; `refweb.net.web.Web.find` turns it into numbers."""
 
+    either = [node_number.accepts, {"type": "string"}]
+
+    @accepts(any_of(*either, array(any_of(*either), 1 - empty)))
     def read(name, value):
         if hasattr(value, "tolist"):
             value = value.tolist()
@@ -227,6 +244,7 @@ def nodes(default=MISSING, *, empty=False, what="node"):
 def component(default=MISSING):
     """An axis: 0, 1, 2 or "x", "y", "z"; read as 0, 1 or 2."""
 
+    @accepts({"type": ["integer", "string"], "enum": [0, 1, 2, "x", "y", "z"]})
     def read(name, value):
         if isinstance(value, str) and value in ("x", "y", "z"):
             return "xyz".index(value)
@@ -240,6 +258,7 @@ def component(default=MISSING):
 def components(default=MISSING):
     """A list of axes; read as a sorted tuple of 0, 1, 2."""
 
+    @accepts(array(component().metadata["read"].accepts, 1))
     def read(name, value):
         value = _list(name, value, 'a list of "x", "y", "z"')
         if not value:
@@ -309,6 +328,7 @@ class Table:
 def by_group(kind, where):
     """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
 
+    @accepts(by_name(kind))
     def read(name, value):
         if not isinstance(value, dict):
             raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")

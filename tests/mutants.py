@@ -75,7 +75,9 @@ MIRRORS = {
     "studies/turning": "studies/test_turning.py",
     "studies/pencil": "studies/test_modes.py",
     "studies": "studies/test_cost.py",
-    "reference": "reference/test_paths.py",
+    "reference/paths": "reference/test_paths.py",
+    "reference": "reference/test_help.py reference/test_schema.py",
+    "accepted": "reference/test_schema.py",
     "commands/new": "commands/test_new.py",
     "commands": "commands/test_cli.py commands/test_values.py",
     "__main__": "commands/test_cli.py",
@@ -168,7 +170,7 @@ MUTANTS = [
         "(0.0, 1.0) if net.quasi_static else (1.0, 0.0)",
         "(1.0, 0.0) if net.quasi_static else (0.0, 1.0)",
     ),
-    Mutant("effects/temperature", "1.0 + expansion * value", "1.0 - expansion * value"),
+    Mutant("effects/temperature", "1.0 + expanding.expansion * value", "1.0 - expanding.expansion * value"),
     Mutant("effects/base", "return ((2.0 * self.data[:, :3] + u) * u)", "return ((2.0 * self.data[:, :3] - u) * u)"),
     Mutant(
         "effects/base",
@@ -319,7 +321,10 @@ MUTANTS = [
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),
-    Mutant("commands/new", "found and here == table", "found"),
+    Mutant("commands/new", "os.path.relpath(folder / value, target)", "os.path.relpath(folder / value, folder)"),
+    Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
+    Mutant("reference/schema", "without=every - set(own)", "without=()"),
+    Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),
     Mutant("results/comparison", "for least, _ in spans) <= min(", "for least, _ in spans) < min("),
     Mutant("results/comparison", "None not in spans and max", "max"),
 ]

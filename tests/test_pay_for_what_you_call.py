@@ -25,8 +25,23 @@ MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__
 
 # Modules
 
-EVERY = {"errors", "messages", "tables", "kernels", "memory", "settings", "registry", "scene", "build", "runner"}
-EVERY |= {"net", *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web"))}
+EVERY = {
+    "accepted",
+    "errors",
+    "messages",
+    "tables",
+    "kernels",
+    "memory",
+    "settings",
+    "registry",
+    "scene",
+    "build",
+    "runner",
+}
+EVERY |= {
+    "net",
+    *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web", "groups")),
+}
 EVERY |= {"net.rigid_body", "effects.line_kernels"}
 EVERY |= {
     "solution",

@@ -12,6 +12,8 @@ from ..messages import short
 START = """# What this scene shows, in a line.
 #
 # Units are SI. A table that is present is an effect that is present; take the # away from what is wanted.
+# `refweb help` lists all tables, `refweb help web` says what [web] may hold. For an editor that completes keys write
+# `refweb schema > refweb.schema.json`, and begin this file with the line `#:schema ./refweb.schema.json`.
 schema = 1
 title = "Start"
 
@@ -145,13 +147,7 @@ def _moved(given, folder, target):
 
 
 def _with_text(text, path, value):
-    """A scene file with another text at a path, which stands on a line of its own in its table; else as it is."""
-    *table, key = path.split(".")
-    lines, here = text.splitlines(keepends=True), []
-    for i, line in enumerate(lines):
-        if header := re.match(r"\s*\[+([^\]]*)\]", line):
-            here = [part.strip() for part in header[1].split(".")]
-        found = re.match(rf"""(\s*{key}\s*=\s*)("(?:[^"\\]|\\.)*"|'[^']*')""", line)
-        if found and here == table:
-            lines[i] = found[1] + json.dumps(value, ensure_ascii=False) + line[found.end() :]
-    return "".join(lines)
+    """A scene file with another text at a path, where the key begins a line and its text ends on it; else as it is."""
+    key = path.rpartition(".")[2]
+    found = rf"""(?m)^([ \t]*{key}[ \t]*=[ \t]*)("(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
+    return re.sub(found, lambda line: line[1] + json.dumps(value, ensure_ascii=False), text)

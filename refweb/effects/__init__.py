@@ -95,5 +95,6 @@ has. It sees what steps miss where ``impulse=impulse`` brings ∫F dt as a kerne
 A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
 `refweb.effects.length_factor`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
 returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every
-effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README.
+effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README, and
+``tests/reference`` for an ``Examples`` section of its docstring, which is its page in ``refweb help``.
 """

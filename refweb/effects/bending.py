@@ -175,6 +175,11 @@ class Bending(Table):
     ----------
     The springs B/L̄ are those of the multi-particle model of *Dynamic modelling and analysis of space webs*, Sci
     China-Phys Mech Astron 54 (2011), section 2.3.
+
+    Examples
+    --------
+        [bending]
+        stiffness = 1e-3
     """
 
     stiffness: float = real(above=0, unit="N·m²")

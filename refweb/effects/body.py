@@ -71,6 +71,15 @@ class Body(Table):
         right angles, a rounding above half the smallest size, and a name that is no file name; for a free body that has
         no mass or is a box or a cylinder, a fixed one that moves, and a ring that turns about another axis than its
         normal; from ``extend``, for a name that stands twice, and a free body in statics.
+
+    Examples
+    --------
+        [[body]]
+        name = "ball"
+        radius = 0.1
+        mass = 1.0
+        position = [0.0, 0.0, -0.11]
+        velocity = [0.0, 0.0, 2.0]
     """
 
     several = True

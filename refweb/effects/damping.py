@@ -193,6 +193,12 @@ class Damping(Table):
     The material is that of Kelvin and Voigt, on the tangent of the law and without its push: W. Thomson, "On the
     elasticity and viscosity of metals", Proc. R. Soc. Lond. 14 (1865) 289–297; W. Voigt, "Ueber innere Reibung fester
     Körper, insbesondere der Metalle", Ann. Phys. 283 (1892) 671–693.
+
+    Examples
+    --------
+        [damping]
+        time = 1e-5
+        rate = 0.1
     """
 
     time: float = real(0.0, at_least=0, unit="s")

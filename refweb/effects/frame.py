@@ -137,6 +137,11 @@ class Frame(Table):
     References
     ----------
     L. D. Landau, E. M. Lifshitz, "Mechanics", 3rd ed. 1976, §39: the forces, and the energy that is kept.
+
+    Examples
+    --------
+        [frame]
+        angular_velocity = [0.0, 0.0, 6.283]
     """
 
     angular_velocity: tuple = vector(unit="rad/s")

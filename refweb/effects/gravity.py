@@ -45,6 +45,11 @@ class Gravity(Table):
     ------
     InputError
         For an acceleration that is not three finite numbers.
+
+    Examples
+    --------
+        [gravity]
+        acceleration = [0.0, 0.0, -9.81]
     """
 
     acceleration: tuple = vector(unit="m/s²")

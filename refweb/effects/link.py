@@ -26,6 +26,11 @@ class Link(Table):
     InputError
         For fewer than two nodes; from ``on``, for a name that is not one node of the web, and for neighbours in the
         list that are at one place.
+
+    Examples
+    --------
+        [[link]]
+        nodes = ["centre", 1]
     """
 
     several = True

@@ -56,6 +56,13 @@ class Load(Table):
     InputError
         For a force that is not three finite numbers, and a factor without rows or whose times do not increase; from
         ``on``, for a node that the web does not have.
+
+    Examples
+    --------
+        [[load]]
+        node = "centre"
+        force = [0.0, 0.0, 1.0]
+        factor = [[0.0, 0.0], [0.1, 1.0]]
     """
 
     several = True

@@ -35,6 +35,12 @@ class Motion(Table):
     InputError
         For a table without rows, rows that are not four finite numbers, and times that do not increase; from ``on``,
         for a node that the web does not have.
+
+    Examples
+    --------
+        [[motion]]
+        node = [0, 1]
+        displacement = [[0.0, 0.0, 0.0, 0.0], [1.0, -0.2, 0.0, 0.0]]
     """
 
     several = True

@@ -24,6 +24,12 @@ class PointMass(Table):
     ------
     InputError
         For a mass that is not finite or < 0; from ``extend``, for a node that the web does not have.
+
+    Examples
+    --------
+        [[point_mass]]
+        node = "corners"
+        mass = 0.25
     """
 
     several = True

@@ -118,6 +118,14 @@ class Pressure(Table):
     ----------
     K. Schweizerhof, E. Ramm, "Displacement dependent pressure loads in nonlinear finite element analyses", Comput.
     Struct. 18 (1984) 1099–1114: stiffness of such loads, and when they have a potential.
+
+    Examples
+    --------
+        [[pressure]]
+        lines = "rim"
+        normal = [0.0, 0.0, 1.0]
+        value = 0.5
+        away_from = [0.0, 0.0, 0.0]
     """
 
     several = True

@@ -27,6 +27,12 @@ class Reel(Table):
     InputError
         For a factor that is not > 0, a table without rows, and times that do not increase; from ``on``, for a line or a
         group that the web does not have.
+
+    Examples
+    --------
+        [[reel]]
+        lines = "rim"
+        factor = [[0.1, 1.0], [0.5, 0.5]]
     """
 
     several = True

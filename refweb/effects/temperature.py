@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
@@ -13,6 +14,7 @@ from ..tables import Table, by_group, checked, field, real, rows
 from .length_factor import scaled
 
 
+@accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
 def _change(name, value):
     table = isinstance(value, (list, tuple)) or hasattr(value, "tolist")
     return checked(name, value, rows(2, increasing=True) if table else real(unit="K"))
@@ -20,7 +22,14 @@ def _change(name, value):
 
 @dataclass(frozen=True, kw_only=True)
 class GroupTemperature(Table):
-    """What may differ on the lines of one group; None keeps the value of `Temperature`."""
+    """What may differ on the lines of one group; None keeps the value of `Temperature`.
+
+    Examples
+    --------
+        [temperature.groups.rim]
+        expansion = 1.2e-5
+        change = 40.0
+    """
 
     expansion: float | None = real(None, unit="1/K")
     change: object = field(_change, None)
@@ -45,6 +54,12 @@ class Temperature(Table):
     InputError
         For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines; from
         ``on``, for a group that no line has, and two groups that give the same key to one line.
+
+    Examples
+    --------
+        [temperature]
+        expansion = -2e-6
+        change = [[0.0, 0.0], [60.0, -80.0]]
     """
 
     expansion: float = real(unit="1/K")

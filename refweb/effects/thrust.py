@@ -104,6 +104,13 @@ class Thrust(Table):
     InputError
         For a force that is not finite, and a factor without rows or whose times do not increase; from ``on``, for what
         is not one node of the web, and a line that does not end at it.
+
+    Examples
+    --------
+        [[thrust]]
+        node = "centre"
+        line = 2
+        force = 3.0
     """
 
     several = True

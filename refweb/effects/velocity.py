@@ -24,6 +24,12 @@ class Velocity(Table):
     InputError
         For a velocity that is not three finite numbers; from ``start``, in statics, for a node that the web does not
         have, and for one that is named and supported along a component that is not 0.
+
+    Examples
+    --------
+        [[velocity]]
+        node = "all"
+        value = [0.0, 0.0, 4.0]
     """
 
     several = True

@@ -37,6 +37,12 @@ class Group(Table):
     ------
     InputError
         For a number that is not finite or out of these bounds.
+
+    Examples
+    --------
+        [cable.groups.rim]
+        area = 2e-4
+        prestrain = 1e-3
     """
 
     modulus: float | None = real(None, above=0, unit="Pa")
@@ -63,7 +69,7 @@ class Cable(Table):
     density : float
         ρ [kg/m³], ≥ 0; mass follows natural length.
     slackness, smoothing : float
-        ε0 and η of the smooth law [1].
+        ε0 and η of the smooth law [1], 0 and 1e-5 by default.
     prestrain : float
         Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
     strength : float, optional
@@ -82,6 +88,14 @@ class Cable(Table):
         another law than the smooth one; from ``properties``, for a group that no line has, two groups that give one key
         to the same line, prestrain of a web whose natural lengths are given, and a line whose stiffness or mass is
         above `refweb.tables.LARGEST`.
+
+    Examples
+    --------
+        [cable]
+        law = "tension-only"
+        modulus = 7e7
+        area = 1e-4
+        density = 200.0
     """
 
     law: str = choice(*NAMES, default="smooth")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError
 from ..messages import shown
 from ..tables import Table, checked, choice, field, node_number, numbers_list, real, rows, texts
@@ -14,6 +15,7 @@ from .web import Web, in_range
 LENGTH = real(above=0, unit="m")
 
 
+@accepts(any_of({"enum": ["distance"]}, LENGTH.metadata["read"].accepts, array(LENGTH.metadata["read"].accepts)))
 def _lengths(name, value):
     if isinstance(value, str):
         if value != "distance":
@@ -24,6 +26,7 @@ def _lengths(name, value):
     return checked(name, value, LENGTH)
 
 
+@accepts(by_name(any_of(node_number.accepts, array(node_number.accepts, 1))))
 def _names(name, value):
     if not isinstance(value, dict):
         raise InputError(f"{name} = {shown(value)} must be a table of node numbers, such as {{tip = 3}}")
@@ -36,6 +39,7 @@ def _names(name, value):
     return result
 
 
+@accepts(any_of(array({"type": "string"}), by_name(array(node_number.accepts, 1))))
 def _groups(name, value):
     if not isinstance(value, dict):
         return checked(name, value, texts())
@@ -66,6 +70,15 @@ class Inline(Table):
     InputError
         For rows that are not of three, or two, numbers, a natural length that is not > 0, a name without nodes, and a
         support that is none of the nodes; from ``web``, for whatever `refweb.Web` refuses.
+
+    Examples
+    --------
+        [web]
+        kind = "inline"
+        points = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+        lines = [[0, 1], [1, 2]]
+        supports = [0, 2]
+        names = { tip = 1 }
     """
 
     kind: str = choice("inline", default="inline")

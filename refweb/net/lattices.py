@@ -175,6 +175,13 @@ class Paper(Table):
     ------
     InputError
         For an unknown mesh, and a length that is not finite and > 0.
+
+    Examples
+    --------
+        [web]
+        kind = "paper"
+        mesh = "hexagon"
+        cable_length = 201.4
     """
 
     kind: str = choice("paper", default="paper")
@@ -216,7 +223,17 @@ class Window(Table):
     Raises
     ------
     InputError
-        For sizes at which nothing hangs together, and above a million cells.
+        For sizes at which nothing hangs together, of rows below 2, and of columns below 2, of triangles 1, of hexagons
+        3; and for rows × columns above a million.
+
+    Examples
+    --------
+        [web]
+        kind = "window"
+        mesh = "square"
+        rows = 20
+        columns = 20
+        side = 0.1
     """
 
     kind: str = choice("window", default="window")
@@ -264,6 +281,14 @@ class Layers(Table):
     -----
     N layers of hexagons have 3N² − 3N + 1 cells and 9N² − 3N lines; the paper's section 3.1.3 repeats the formulas of
     the square. The limit of the length-area ratio that it states is that of hexagons.
+
+    Examples
+    --------
+        [web]
+        kind = "layers"
+        mesh = "triangle"
+        layers = 4
+        cell_area = 0.01
     """
 
     kind: str = choice("layers", default="layers")

@@ -38,6 +38,12 @@ class File(Table):
     -----
     meshio reads the file. Of other formats that it knows some refer to files of their own, and it does not come to an
     end on some that are cut off; it converts them: ``meshio convert net.inp net.vtu``.
+
+    Examples
+    --------
+        [web]
+        kind = "file"
+        path = "net.vtu"
     """
 
     kind: str = choice("file", default="file")

@@ -37,6 +37,15 @@ class SingleCable(Table):
     ------
     InputError
         If the ends coincide, ``sag`` is parallel to the chord, or one line would be longer than the distance.
+
+    Examples
+    --------
+        [web]
+        kind = "cable"
+        start = [-1.5, 0.0, 0.0]
+        end = [1.5, 0.0, 0.0]
+        elements = 100
+        length = 4.0
     """
 
     kind: str = choice("cable", default="cable")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest, shown
 from ...tables import Table, field, real
@@ -19,6 +20,7 @@ from ..base import Family
 from .pair import AWAY, pair_data
 
 
+@accepts({"enum": [1, 1.5]})
 def _exponent(name, value):
     if isinstance(value, bool) or value not in (1, 1.5):
         raise InputError(f"{name} = {shown(value)} must be 1 or 1.5")
@@ -27,7 +29,14 @@ def _exponent(name, value):
 
 @dataclass(frozen=True, kw_only=True)
 class BodyContact(Table):
-    """What differs for one body; the keys are those of `Contact`."""
+    """What differs for one body; the keys are those of `Contact`.
+
+    Examples
+    --------
+        [contact.bodies.ball]
+        stiffness = 1e4
+        friction = 0.5
+    """
 
     stiffness: float | None = real(None, above=0, unit="N/m")
     exponent: float | None = field(_exponent, None)
@@ -36,6 +45,7 @@ class BodyContact(Table):
     slip_velocity: float | None = real(None, above=0, unit="m/s")
 
 
+@accepts(by_name(BodyContact))
 def _bodies(name, value):
     if not isinstance(value, dict):
         raise InputError(f"{name} must be a table by body, [contact.bodies.NAME]")
@@ -72,6 +82,13 @@ class Contact(Table):
         For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from
         ``extend``, for a body that turns and has no friction; from ``on``, without a body, and for one of ``bodies``
         that is none.
+
+    Examples
+    --------
+        [contact]
+        stiffness = 1e5
+        damping = 0.1
+        friction = 0.2
     """
 
     stiffness: float | None = real(None, above=0, unit="N/m")

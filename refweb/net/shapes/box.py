@@ -26,6 +26,15 @@ class Box(Shape):
     rounding : float, optional
         Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. How depth
         goes on below says `refweb.net.grown_core`.
+
+    Examples
+    --------
+        [[body]]
+        name = "deck"
+        shape = "box"
+        size = [2.0, 2.0, 0.1]
+        position = [0.0, 0.0, -0.2]
+        fixed = true
     """
 
     size: tuple = vector(unit="m")

@@ -26,6 +26,17 @@ class Cylinder(Shape):
     rounding : float, optional
         Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. How depth
         goes on below says `refweb.net.grown_core`.
+
+    Examples
+    --------
+        [[body]]
+        name = "mast"
+        shape = "cylinder"
+        radius = 0.1
+        length = 1.0
+        axis = [0.0, 1.0, 0.0]
+        position = [0.0, 0.0, -0.2]
+        fixed = true
     """
 
     radius: float = real(above=0, unit="m")

@@ -25,6 +25,16 @@ class Ring(Shape):
         Its radius [m], > 0.
     normal : sequence of 3 float
         Its normal.
+
+    Examples
+    --------
+        [[body]]
+        name = "ring"
+        shape = "ring"
+        radius = 0.08
+        normal = [0.0, 1.0, 0.0]
+        mass = 1.0
+        position = [0.0, 0.0, -0.1]
     """
 
     free = True

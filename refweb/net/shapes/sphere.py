@@ -16,6 +16,15 @@ class Sphere(Shape):
     ----------
     radius : float
         Its radius [m], > 0.
+
+    Examples
+    --------
+        [[body]]
+        name = "post"
+        shape = "sphere"
+        radius = 0.1
+        position = [0.0, 0.0, -0.11]
+        fixed = true
     """
 
     free = True

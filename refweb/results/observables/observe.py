@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...accepted import accepts
 from ...errors import InputError
 from ...messages import nearest, shown
 from ...registry import OBSERVABLES, load
@@ -13,6 +14,7 @@ SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 """Sign of the peaks that a probe follows, by ``reduce``."""
 
 
+@accepts(lambda: {"type": "string", "enum": list(OBSERVABLES)})
 def _quantity(name, value):
     if value not in tuple(OBSERVABLES):
         raise InputError(f"{name} = {shown(value)} must be one of the quantities, {nearest(value, OBSERVABLES)}")
@@ -28,7 +30,7 @@ class Observe(Table):
     name : str
         Its name in results and history.
     quantity : str
-        One of `refweb.registry.OBSERVABLES`.
+        What is followed, one of `refweb.registry.OBSERVABLES`.
     node : int, str or list, optional
         Node of a nodal quantity. Of several nodes the one with the largest value counts, for a reaction their sum;
         without ``node`` that is over all.
@@ -57,6 +59,15 @@ class Observe(Table):
         name with commas or quotes or above 80 characters, a window that is not above 0, and one of a booked quantity;
         from ``on``, for what the net does not have, an energy whose effect is not in the scene, and in statics what
         needs velocity, work that depends on the path, and a window.
+
+    Examples
+    --------
+        [[observe]]
+        name = "deflection"
+        quantity = "displacement"
+        node = "centre"
+        component = "z"
+        reduce = "max"
     """
 
     name: str = text(most=80)

@@ -1,0 +1,39 @@
+"""What readers of values accept, as JSON Schema of draft 4 has it; a reader carries it as ``accepts``."""
+
+from __future__ import annotations
+
+
+def accepts(schema):
+    """Say what a reader accepts: a dict, or a function that returns one where that may change.
+
+    A class of tables may stand where a schema does: it stands for that of its keys.
+    """
+
+    def told(read):
+        read.accepts = schema
+        return read
+
+    return told
+
+
+def limits(kind, above=None, at_least=None, below=None, at_most=None):
+    """Numbers of a kind, "number" or "integer", within bounds."""
+    least, most = at_least if above is None else above, at_most if below is None else below
+    ends = {"minimum": least, "exclusiveMinimum": above is not None or None, "maximum": most}
+    given = {"type": kind, **ends, "exclusiveMaximum": below is not None or None}
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def array(items, least=0, most=None):
+    """Lists of so many items."""
+    return {"type": "array", "items": items, "minItems": least} | ({"maxItems": most} if most else {})
+
+
+def by_name(items):
+    """Tables whose keys are names."""
+    return {"type": "object", "additionalProperties": items}
+
+
+def any_of(*schemas):
+    """What one of these accepts."""
+    return {"anyOf": list(schemas)}

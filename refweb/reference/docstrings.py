@@ -1,0 +1,69 @@
+"""What a docstring in the style of numpydoc says, part by part."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+
+
+def sections(documented):
+    """Lines of the sections of a docstring by title; what stands before the first one has the title ""."""
+    lines, found = (inspect.getdoc(documented) or "").splitlines(), {"": []}
+    title, skipped = "", 0
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        if skipped:
+            skipped -= 1
+        elif line and re.fullmatch("-{3,}", below):
+            title, skipped = line, 1
+            found[title] = []
+        else:
+            found[title].append(line)
+    return found
+
+
+def plain(text):
+    """A text without the marks of references: names stand in single backticks."""
+    return text.replace("``", "`")
+
+
+def paragraphs(lines):
+    """Paragraphs as one line each; tables and what is indented stay as they are."""
+    blocks = [block for block in re.split(r"\n\s*\n", "\n".join(lines)) if block.strip()]
+    kept = [bool(re.search(r"(?m)^( {2,}|=+ +=)", block)) for block in blocks]
+    return [plain(block if keep else " ".join(block.split())) for block, keep in zip(blocks, kept, strict=True)]
+
+
+def summary(documented):
+    """The first paragraph."""
+    return (paragraphs(sections(documented)[""]) or [""])[0]
+
+
+def prose(documented):
+    """Paragraphs behind the first one, and those of its notes."""
+    found = sections(documented)
+    return [*paragraphs(found[""])[1:], *paragraphs(found.get("Notes", []))]
+
+
+def parameters(documented):
+    """What is said of each parameter, by name."""
+    found, names = {}, []
+    for line in sections(documented).get("Parameters", []):
+        if line and not line.startswith(" "):
+            names = [name.strip() for name in line.partition(" : ")[0].split(",")]
+            found |= dict.fromkeys(names, "")
+        else:
+            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
+    return {name: plain(text) for name, text in found.items()}
+
+
+def refusals(documented):
+    """What is refused with an InputError, without the places in the code that refuse it."""
+    _, *lines = sections(documented).get("Raises", [""])
+    text = plain(" ".join(" ".join(lines).split()))
+    return re.sub(r"from `[\w.]+`, ", "", text)
+
+
+def example(documented):
+    """The example, as lines of a scene file; empty where there is none."""
+    return textwrap.dedent("\n".join(sections(documented).get("Examples", []))).strip("\n")

@@ -1,0 +1,238 @@
+"""The pages of the reference: for each table what it is, its keys and what they take, what is refused, and an example.
+
+All of it is read off the classes that check scenes: fields say what keys take, docstrings what they mean.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from dataclasses import MISSING
+from typing import NamedTuple
+
+from ..errors import InputError
+from ..messages import nearest
+from ..registry import EFFECTS, INTEGRATORS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, WEBS, load
+from ..settings import Head
+from .docstrings import example, parameters, prose, refusals, summary
+from .schema import accepted
+
+FIRST = ("web", "cable", "supports", "support")
+"""Tables that the reference begins with."""
+LARGE = 1e18
+"""Bounds of this size and above are those of all numbers, and not told with each."""
+SUMMARIES = {
+    "web": "Nodes, lines and natural lengths: one of these kinds.",
+    "solve": "What is solved, and how.",
+    "supports": "Supports in place of the web's own.",
+    "support": "Supports in addition to others.",
+}
+"""What tables are that share a class, or have one for each kind."""
+
+
+class Key(NamedTuple):
+    """A key of a table, in words."""
+
+    name: str
+    takes: str
+    unit: str
+    default: str
+    meaning: str
+
+
+class Listing(NamedTuple):
+    """Rows of words below a page's keys."""
+
+    columns: tuple
+    rows: list
+
+
+class Page(NamedTuple):
+    """What the reference says of one table, or of one kind of it.
+
+    Attributes
+    ----------
+    name : str
+        What ``refweb help`` calls it: the table, and behind a dot the kind, or the key of tables inside of it.
+    header : str
+        How it stands in a scene file.
+    summary : str
+        What it is.
+    prose : list of str
+        What else there is to say.
+    keys : list of Key
+        Its keys.
+    refused : str
+        What is refused beyond what a key takes.
+    example : str
+        Lines of a scene file.
+    listing : Listing, optional
+        What its keys may be, row by row.
+    """
+
+    name: str
+    header: str
+    summary: str
+    prose: list
+    keys: list
+    refused: str
+    example: str
+    listing: Listing | None = None
+
+
+def names():
+    """Names of the tables of a scene, in the order of the reference."""
+    rest = [name for name in (*PARTS, *LISTS) if name not in FIRST]
+    return ["scene", *FIRST, *EFFECTS, "solve", *rest]
+
+
+def pages_of(name):
+    """The pages of a table, or of one kind of it: ``web``, ``web.cable``, ``[[body]]``.
+
+    Raises
+    ------
+    InputError
+        For a name that is none, with the nearest that is.
+    """
+    table = name.strip().strip("[]").strip()
+    head = table.partition(".")[0]
+    known = names()
+    if head not in known:
+        raise InputError(f"help {name}: there is no such table, {nearest(head, known)}")
+    found = list(_PAGES.get(head, _part)(head))
+    if table == head:
+        return found
+    kinds = [page.name for page in found]
+    if table not in kinds:
+        raise InputError(f"help {name}: there is no such table, {nearest(table, [head, *kinds])}")
+    return [page for page in found if page.name == table]
+
+
+def line_of(name):
+    """What a table is, in a line."""
+    if name == "scene":
+        return summary(Head)
+    return SUMMARIES.get(name) or summary(load({**PARTS, **LISTS, **EFFECTS}[name]))
+
+
+def header_of(name):
+    """How a table stands in a scene file."""
+    if name == "scene":
+        return "schema, title, seed"
+    several = name in LISTS or (name in EFFECTS and load(EFFECTS[name]).several)
+    return f"[[{name}]]" if several else f"[{name}]"
+
+
+def _page(name, header, kind, like=None, without=(), **more):
+    """The page of a class of tables; ``like`` describes keys of which the class itself says nothing."""
+    said = (parameters(like) if like else {}) | parameters(kind)
+    keys = [_key(f, said.get(f.name, "")) for f in dataclasses.fields(kind) if f.name not in without]
+    given = {"summary": summary(kind), "prose": prose(kind), "refused": refusals(kind), "example": example(kind)}
+    return Page(name=name, header=header, keys=keys, **(given | more))
+
+
+def _key(f, meaning):
+    default = "required"
+    if f.default is not MISSING:
+        default = "" if f.default is None else _toml(f.default)
+    elif f.default_factory is not MISSING:
+        default = ""
+    return Key(f.name, takes(accepted(f)), f.metadata["unit"], default, meaning)
+
+
+def _toml(value):
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    return f"{value:g}" if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+
+
+def takes(schema):
+    """What a schema accepts, in words."""
+    if "anyOf" in schema:
+        *first, last = schema["anyOf"]
+        if last.get("items") == {"anyOf": first}:
+            return f"{takes({'anyOf': first})}, or a list of them"
+        return " or ".join(dict.fromkeys(map(takes, schema["anyOf"])))
+    if "enum" in schema:
+        return ", ".join(map(_toml, schema["enum"]))
+    kind = schema.get("type")
+    if kind in ("number", "integer"):
+        return ("number" if kind == "number" else "whole number") + _bounds(schema)
+    if kind == "array":
+        item, most = schema["items"], schema.get("maxItems")
+        one = takes(item)
+        if one.endswith(" numbers"):
+            return f"rows of {one}"
+        return f"{most} {one}s" if most else f"[{one}, ...]"
+    if kind == "object":
+        own = schema["additionalProperties"]
+        return "tables by name" if "properties" in own else f"{{name = {takes(own)}}}"
+    return {"boolean": "true, false", "string": "text"}.get(kind, "value")
+
+
+def _bounds(schema):
+    """Bounds of a number in words."""
+    least, most = schema.get("minimum"), schema.get("maximum")
+    least = None if least is None or least <= -LARGE else least
+    most = None if most is None or most >= LARGE else most
+    above, below = schema.get("exclusiveMinimum"), schema.get("exclusiveMaximum")
+    if None not in (least, most) and not above and not below:
+        return f", {_toml(least)} … {_toml(most)}"
+    parts = [] if least is None else [f"{'>' if above else '≥'} {_toml(least)}"]
+    parts += [] if most is None else [f"{'<' if below else '≤'} {_toml(most)}"]
+    return (" " + ", ".join(parts)) if parts else ""
+
+
+def _inner(name, kind):
+    """Pages of the tables by name inside a table."""
+    for f in dataclasses.fields(kind):
+        own = getattr(f.metadata["read"], "accepts", None)
+        inner = own.get("additionalProperties") if isinstance(own, dict) else None
+        if isinstance(inner, type):
+            yield _page(f"{name}.{f.name}", f"[{name}.{f.name}.NAME]", inner, like=kind)
+
+
+def _scene(name):
+    example = 'schema = 1\ntitle = "Net with a weight"\nseed = 7'
+    rows = [[f"`{header_of(one)}`", line_of(one)] for one in names()[1:]]
+    yield _page("scene", header_of("scene"), Head, example=example, listing=Listing(("table", "what it is"), rows))
+
+
+def _web(name):
+    for kind, reference in WEBS.items():
+        yield _page(f"web.{kind}", f'[web] kind = "{kind}"', load(reference), without=["kind"])
+
+
+def _part(name):
+    kind = load({**PARTS, **LISTS, **EFFECTS}[name])
+    more = {"summary": SUMMARIES[name], "prose": [summary(kind)]} if name in SUMMARIES else {}
+    yield _page(name, header_of(name), kind, **more)
+    yield from _inner(name, kind)
+
+
+def _body(name):
+    kind = load(EFFECTS[name])
+    yield _page(name, header_of(name), kind, without=["form"])
+    for shape, reference in SHAPES.items():
+        yield _page(f"body.{shape}", f'[[body]] shape = "{shape}"', load(reference))
+
+
+def _observe(name):
+    rows = []
+    for quantity, reference in OBSERVABLES.items():
+        kind = load(reference)
+        keys = ", ".join(f"`{key}`" for key in kind.keys)
+        rows.append([f"`{quantity}`", kind.unit, keys, summary(kind)])
+    (page,) = _part(name)
+    yield page._replace(listing=Listing(("quantity", "unit", "keys", "what it is"), rows))
+
+
+def _solve(name):
+    yield _page("solve.static", '[solve] kind = "static"', load(SOLVES["static"]), without=["kind"])
+    rows = [[f'`"{method}"`', ", ".join(f"`{key}`" for key in own.keys)] for method, own in INTEGRATORS.items()]
+    rows.append(['`"auto"`', ""])
+    more = {"without": ["kind"], "listing": Listing(("method", "keys that it has alone"), rows)}
+    yield _page("solve.dynamic", '[solve] kind = "dynamic"', load(SOLVES["dynamic"]), **more)
+
+
+_PAGES = {"scene": _scene, "web": _web, "body": _body, "observe": _observe, "solve": _solve}

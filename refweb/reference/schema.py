@@ -1,0 +1,124 @@
+"""The JSON Schema of scene files, made of the tables that check them; of draft 4, which editors of TOML read."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import MISSING
+
+from ..registry import EFFECTS, INTEGRATORS, LISTS, PARTS, SHAPES, SOLVES, WEBS, load
+from ..settings import Head
+from ..tables import Table
+from .docstrings import parameters, summary
+
+DRAFT = "http://json-schema.org/draft-04/schema#"
+
+
+def schema():
+    """The schema of scene files, a dict of plain values."""
+    head, tables = _table(Head), {"web": _webs(), "solve": _solves()}
+    tables |= {key: _table(load(reference)) for key, reference in PARTS.items()}
+    tables |= {key: _list(_table(load(reference))) for key, reference in LISTS.items()}
+    for key, reference in EFFECTS.items():
+        kind = load(reference)
+        own = _bodies(kind) if key == "body" else _table(kind)
+        tables[key] = _list(own) if kind.several else own
+    return {
+        "$schema": DRAFT,
+        "title": "A scene of refweb",
+        "description": "A scene file of refweb, in SI units: a table that is present is an effect that is present.",
+        **{key: value for key, value in head.items() if key != "description"},
+        "properties": {**head["properties"], **tables},
+        "required": ["web", "cable", "solve"],
+    }
+
+
+def accepted(f, like=None):
+    """The schema of what a field accepts; that of anything where its reader says nothing.
+
+    ``like`` is the class of tables whose keys are described where a table in the field says nothing of its own.
+    """
+    given = getattr(f.metadata["read"], "accepts", {})
+    return _plain(given() if callable(given) and not isinstance(given, type) else given, like)
+
+
+def _plain(given, like):
+    """A schema with classes of tables as theirs."""
+    if isinstance(given, type):
+        return _table(given, like=like)
+    if isinstance(given, dict):
+        return {key: _plain(value, like) for key, value in given.items()}
+    return [_plain(value, like) for value in given] if isinstance(given, (list, tuple)) else given
+
+
+def _table(kind, *more, fixed=None, without=(), optional=(), like=None):
+    """The schema of a table with the keys of some classes.
+
+    Parameters
+    ----------
+    kind, more : class
+        Classes of tables: the first one describes the table, the keys are those of all.
+    fixed : dict, optional
+        Values of keys that make the table what it is.
+    without : collection of str
+        Keys that it does not have.
+    optional : collection of str
+        Keys of ``fixed`` that may be left out.
+    like : class, optional
+        Describes keys of which the class itself says nothing.
+    """
+    fixed, properties, required = fixed or {}, {}, [key for key in fixed or {} if key not in optional]
+    for owner in (kind, *more):
+        said = (parameters(like) if like else {}) | parameters(owner)
+        for f in dataclasses.fields(owner):
+            if f.name in without or (f.name in properties and f.name in fixed):
+                continue
+            own = {"enum": [fixed[f.name]]} if f.name in fixed else accepted(f, kind)
+            properties[f.name] = {**own, **_described(f, said.get(f.name, ""))}
+            if f.default is MISSING and f.default_factory is MISSING and f.name not in fixed:
+                required.append(f.name)
+    found = {"type": "object", "description": summary(kind), "properties": properties}
+    return found | ({"required": required} if required else {}) | {"additionalProperties": False}
+
+
+def _described(f, text):
+    """Description and default of a key."""
+    unit = f.metadata["unit"]
+    text += f" [{unit}]" if unit and f"[{unit}]" not in text else ""
+    default = f.default.to_dict() if isinstance(f.default, Table) else f.default
+    told = {"description": text.strip()} if text.strip() else {}
+    return told | ({} if default is MISSING or default is None else {"default": _listed(default)})
+
+
+def _listed(value):
+    return [_listed(one) for one in value] if isinstance(value, tuple) else value
+
+
+def _list(table):
+    return {"type": "array", "items": table, "minItems": 1}
+
+
+def _webs():
+    return {"oneOf": [_table(load(reference), fixed={"kind": kind}) for kind, reference in WEBS.items()]}
+
+
+def _solves():
+    """Statics, and dynamics by every method, each with its own keys."""
+    kinds = {kind: load(reference) for kind, reference in SOLVES.items()}
+    default = next(f.default for f in dataclasses.fields(kinds["dynamic"]) if f.name == "method")
+    keys = {name: method.keys for name, method in INTEGRATORS.items()} | {"auto": ()}
+    every = {key for own in keys.values() for key in own}
+    forms = [_table(kinds["static"], fixed={"kind": "static"})]
+    for method, own in keys.items():
+        fixed, optional = {"kind": "dynamic", "method": method}, ["method"] if method == default else []
+        forms.append(_table(kinds["dynamic"], fixed=fixed, optional=optional, without=every - set(own)))
+    return {"oneOf": forms}
+
+
+def _bodies(kind):
+    """Bodies by shape, each with the keys of its own."""
+    default = next(f.default for f in dataclasses.fields(kind) if f.name == "shape")
+    forms = []
+    for shape, reference in SHAPES.items():
+        optional = ["shape"] if shape == default else []
+        forms.append(_table(kind, load(reference), fixed={"shape": shape}, optional=optional, without=["form"]))
+    return {"oneOf": forms}

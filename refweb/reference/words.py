@@ -1,0 +1,92 @@
+"""Pages of the reference as text for a terminal and as Markdown."""
+
+from __future__ import annotations
+
+import textwrap
+
+from .pages import header_of, line_of, names, pages_of
+
+RULES = (
+    "Units are SI. A table that is present is an effect that is present. Tables and keys that are not here are "
+    "refused, with the nearest that is; so are numbers that are not finite or above 1e100 in size.",
+    'A node is a number, from 0, or a name: "centre", the node nearest the origin; "rim", the nodes that the web '
+    'itself supports; "corners", those of a flat web; "all"; or one of the web\'s own names. Lines are numbers, '
+    'groups, or "all".',
+    "`refweb schema` prints these tables as JSON Schema for editors: save it as `refweb.schema.json`, and begin a "
+    "scene file with the line `#:schema ./refweb.schema.json`.",
+)
+"""What holds for all tables."""
+
+
+def overview():
+    """All tables, a line each."""
+    lines = {header_of(name): line_of(name) for name in names()}
+    width = max(map(len, lines))
+    listed = [f"{header:{width}}  {line}" for header, line in lines.items()]
+    return "\n".join([*listed, "", "refweb help TABLE says what a table may hold, such as refweb help web"])
+
+
+def as_text(name, width=100):
+    """The pages of a table for a terminal."""
+    return "\n\n".join(_text(page, width) for page in pages_of(name))
+
+
+def _text(page, width):
+    wrapped = lambda text, indent="": textwrap.fill(text, width, initial_indent=indent, subsequent_indent=indent)  # noqa: E731
+    parts = [page.header, wrapped(page.summary, "  ")]
+    parts += [text if "\n" in text else wrapped(text, "  ") for text in page.prose]
+    keys = []
+    for key in page.keys:
+        told = key.takes + (f" [{key.unit}]" if key.unit else "")
+        told += {"": "", "required": "; required"}.get(key.default, f"; default {key.default}")
+        keys.append(f"    {key.name}")
+        keys += [wrapped(text, "        ") for text in (told, key.meaning) if text]
+    parts.append("\n".join(keys))
+    if page.listing is not None:
+        rows = [[cell.replace("`", "") for cell in row] for row in (page.listing.columns, *page.listing.rows)]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        rows = ["  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)) for row in rows]
+        parts.append("\n".join(f"    {row}".rstrip() for row in rows))
+    if page.refused:
+        parts.append(wrapped(f"Refused: {page.refused}", "  "))
+    if page.example:
+        parts.append("  Example\n\n" + textwrap.indent(page.example, "    "))
+    return "\n\n".join(parts)
+
+
+def as_markdown():
+    """The whole reference."""
+    parts = ["# Reference of scene files", *RULES]
+    for name in names():
+        found = pages_of(name)
+        parts.append(f"## {header_of(name) if name == 'scene' else f'`{header_of(name)}`'}")
+        if len(found) > 1 and found[0].name != name:
+            parts.append(line_of(name))
+        for page in found:
+            parts += [f"### `{page.header}`"] if page.name != name else []
+            parts += _markdown(page)
+    return "\n\n".join(parts) + "\n"
+
+
+def _markdown(page):
+    """Parts of a page."""
+    yield page.summary
+    for text in page.prose:
+        yield f"```\n{text}\n```" if "\n" in text else text
+    cells = [[f"`{key.name}`", key.takes, key.unit, _quoted(key.default), key.meaning] for key in page.keys]
+    yield _grid(("key", "takes", "unit", "default", "what it is"), cells)
+    if page.listing is not None:
+        yield _grid(*page.listing)
+    if page.refused:
+        yield f"Refused: {page.refused}"
+    if page.example:
+        yield f"```toml\n{page.example}\n```"
+
+
+def _quoted(default):
+    return default if default in ("", "required") else f"`{default}`"
+
+
+def _grid(columns, rows):
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
