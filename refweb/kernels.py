@@ -104,11 +104,11 @@ class _CacheByName(FunctionCache):
         return signature, codegen.magic_tuple(), self._py_func.__qualname__
 
 
-class _CacheOfBodies(FunctionCache):
+class _CacheOfBodies(_CacheByName):
     """Machine code of a function without its entry from Python, kept beside that with one."""
 
     def _index_key(self, signature, codegen):
-        return signature, codegen.magic_tuple(), self._py_func.__qualname__, "body"
+        return *super()._index_key(signature, codegen), "body"
 
 
 def _with_signature(function, signature, options):

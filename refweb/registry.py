@@ -98,9 +98,13 @@ class Method(NamedTuple):
         """Name of the key that trades accuracy for time."""
         return self.keys[0]
 
-    def keys_of(self, solve):
-        """Those of its keys that a `refweb.Dynamic` gives, as its integrator takes them."""
-        return {key: value for key in self.keys if (value := getattr(solve, key)) is not None}
+    def integrator_of(self, solve, system, *looked_at, **keys):
+        """Its integrator with those of its keys that a `refweb.Dynamic` gives, or with others in their place.
+
+        ``looked_at`` are probes, sums and events, see `refweb.dynamics.integrators.integrator.Integrator`.
+        """
+        given = {key: value for key in self.keys if (value := getattr(solve, key)) is not None}
+        return load(self.integrator)(system, *looked_at, **(given | keys))
 
 
 _STEPS, _TOLERANCES = ("safety", "step_size"), ("rtol", "atol_position", "atol_velocity")

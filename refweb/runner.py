@@ -21,8 +21,6 @@ STIFFENINGS = 8
 """Largest number of times that a run is repeated with a stiffer contact."""
 MOST_TIMES = 200
 """Largest number of times at which it is looked whether what acts from outside moves anything."""
-EVALUATIONS_WITH_TWIN = 2.4
-"""Evaluations of forces of a run and its twin over those of the run."""
 
 
 def run(scene, out=None, force=False, progress=None, announce=None):
@@ -230,7 +228,9 @@ def _cpu_by_effect(system, solution):
     state, share, scene = solution.state, {}, solution.scene
     calls = solution.solver["nfev"] or 0
     if scene.solve.kind == "dynamic":
-        calls *= EVALUATIONS_WITH_TWIN if scene.accuracy.error == "twin" else 1.0
+        from .dynamics.twin_error import steps_with_twin
+
+        calls *= steps_with_twin(scene)
     for family in system.families if state is not None else ():
         best = np.inf
         for _ in range(3):

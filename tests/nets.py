@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+import refweb
 from refweb.effects.elasticity import Elasticity
 from refweb.net import discretisation
 from refweb.net.cable import Cable
@@ -15,6 +17,27 @@ LAWS = {
     "tension-only": dict(law="tension-only"),
     "linear": dict(law="linear"),
 }
+
+METHODS = {
+    "central-difference": {},
+    "order 4": dict(method="explicit", order=4),
+    "order 6": dict(method="explicit", order=6),
+    "bdf": dict(method="cvode"),
+    "adams": dict(method="cvode", family="adams"),
+    "ida": dict(method="ida"),
+}
+"""Every kind of steps, as keys of ``[solve]``."""
+
+
+def interrupt(scene, folder):
+    """Run a scene into a folder, and interrupt it when half of it is done."""
+
+    def stop(text, share):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refweb.run(scene, out=folder, progress=stop)
 
 
 def skew_web():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..registry import INTEGRATORS, load
+from ..registry import INTEGRATORS
 from .schedule import FEW_CORNERS, row_times
 
 TOLD = 1.5
@@ -27,8 +27,7 @@ def remarks_on_corners(scene, system):
     if len(corners) <= FEW_CORNERS:
         return []
     apart = f"{len(corners)} corners of tables, {end / len(corners):.3g} s apart on average, end steps"
-    method = INTEGRATORS[scene.solve.method]
-    integrator = load(method.integrator)(system, **method.keys_of(scene.solve))
+    integrator = INTEGRATORS[scene.solve.method].integrator_of(scene.solve, system)
     if not hasattr(integrator, "steps_in"):
         return [f"{apart}: {scene.solve.method} takes at least as many"]
     rows = row_times(scene)

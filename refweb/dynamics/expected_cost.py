@@ -7,14 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, LENGTH
-from ..registry import INTEGRATORS, load
+from ..registry import INTEGRATORS
 from ..results.units import prefixed
 from .method_choice import step_price
+from .twin_error import steps_with_twin
 
 TELLING = 0.95
 """Share of a step below which that where all is touched is told as well."""
-WITH_TWIN = 1.0 + np.sqrt(2.0)
-"""CPU time of a run and its twin over that of the run."""
 
 
 class Rule(NamedTuple):
@@ -78,7 +77,7 @@ def expected_cost(scene, system):
     method, solve = INTEGRATORS[scene.solve.method], scene.solve
     if method.knob != "safety":
         return None
-    integrator = load(method.integrator)(system, **method.keys_of(solve))
+    integrator = method.integrator_of(solve, system)
     linear = system.rows - system.net.spins
     speed = 2.0 * float(np.linalg.norm(system.initial_velocity()[:linear], axis=1).max())
     rules = [ruling(integrator, system, 0.0, speed)]
@@ -94,7 +93,7 @@ def expected_cost(scene, system):
         texts = [f"{_seconds(rule.step)}{', where all is touched' * n}, by {rule.by}" for n, rule in enumerate(rules)]
         least = solve.duration / scene.output.interval
         steps = [max(solve.duration / rule.step, least) for rule in rules]
-    price = len(integrator.drifts) * step_price(system) * (WITH_TWIN if scene.accuracy.error == "twin" else 1.0)
+    price = len(integrator.drifts) * step_price(system) * steps_with_twin(scene)
     counts = " to ".join(f"{n:.2g}" for n in dict.fromkeys(steps))
     seconds = " to ".join(f"{n * price:.2g}" for n in dict.fromkeys(steps))
     twin = " with the twin" if scene.accuracy.error == "twin" else ""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, SolverError
-from ..registry import INTEGRATORS, load
+from ..registry import INTEGRATORS
 from .method_choice import Choice, decided, given_to
 
 OTHERS = (
@@ -106,9 +106,8 @@ class Ways:
 
     def _takes(self, solve):
         """Whether a method takes the scene."""
-        method = INTEGRATORS[solve.method]
         try:
-            load(method.integrator)(self._system, **method.keys_of(solve))
+            INTEGRATORS[solve.method].integrator_of(solve, self._system)
         except InputError:
             return False
         return True

@@ -159,13 +159,13 @@ class Watch:
 
     def results(self, course, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
-        results, extremes = {}, course.extremes
+        results, extremes, unfilled = {}, course.extremes, self.unfilled(course)
         state = State(self.system, course.time, course.x, course.v)
         for i, o in enumerate(self._observables):
             value, when, where = float(last[1 + i]), course.time, None
             at = self._slot(o)
             if at is not None and o.reduce != "final":
-                if o.name not in self.unfilled(course):
+                if o.name not in unfilled:
                     value, when = float(extremes.values[at]), float(extremes.times[at])
             if o in self._probed and o.average is None:
                 final = o.reduce == "final"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, NoEnd, SolverError
-from ..registry import INTEGRATORS, load
+from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import Standing, follow
@@ -113,8 +113,8 @@ class Simulation:
     def integrator_at(self, knob):
         """The integrator that the scene asks for, at a value of its knob."""
         method, solve, watch = INTEGRATORS[self.scene.solve.method], self.scene.solve, self.watch
-        keys = method.keys_of(solve) | {method.knob: knob}
-        return load(method.integrator)(self.system, watch.probes, watch.sums, watch.events, **keys)
+        looked_at = watch.probes, watch.sums, watch.events
+        return method.integrator_of(solve, self.system, *looked_at, **{method.knob: knob})
 
     def follow(self, folder, tell):
         """Run from start to end, as often as it takes.

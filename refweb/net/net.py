@@ -136,6 +136,19 @@ class Net:
         return csr_array((entries, columns.ravel(), starts), shape=(points * len(self.cells), len(self.points)))
 
     @property
+    def bar_lengths(self):
+        """Natural length of each bar [m], shape (bars,)."""
+        return (self.natural_length[:, None] * self.weights).ravel()
+
+    def per_bar(self, column):
+        """A column of ``line_data`` for each bar, shape (bars,)."""
+        return np.repeat(self.line_data[:, column], len(self.weights))
+
+    def bar_vectors(self, x):
+        """Vector of each bar [m] at the displacement x, shape (bars, 3)."""
+        return self.bars @ self.points + self.bars @ x
+
+    @property
     def unit_tension(self):
         """Stiffness of an element of unit length under unit tension and nothing else, shape (3 nodes, 3 nodes)."""
         unit = np.einsum("q,qa,qb->ab", self.weights, self.gradients, self.gradients)

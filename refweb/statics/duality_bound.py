@@ -77,11 +77,10 @@ class _Bars:
     """What the bars of a net are at a displacement: arrays over them."""
 
     def __init__(self, net, x):
-        points = len(net.weights)
-        axial = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points)
-        self.natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.natural_length, points)
+        axial = net.per_bar(AXIAL_STIFFNESS)
+        self.natural = net.bar_lengths
         self.stiffness = axial / self.natural
-        vector = net.bars @ net.points + net.bars @ x
+        vector = net.bar_vectors(x)
         self.length = np.linalg.norm(vector, axis=1)
         self.tension = axial * np.maximum(strains(net, x).ravel(), 0.0)
         self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]

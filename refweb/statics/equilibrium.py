@@ -17,6 +17,8 @@ from ..net.net import AXIAL_STIFFNESS
 TOLERANCE = 1e-10
 """Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
 LIMIT = 1e-9
+WITH_A_WAY_AROUND = 25
+"""Largest number of factorizations of Newton's method where an interior point can take over."""
 
 
 class NotFound(SolverError):
@@ -61,6 +63,12 @@ class Equilibrium:
     duality_bound: object = None
     deviations: object = None
     floating: object = None
+
+
+def add_spent(stats, other):
+    """Add what another iteration has spent to the ``stats`` of one."""
+    for key in ("nsteps", "nfev", "njev", "nlu"):
+        stats[key] += other.get(key, 0)
 
 
 def check_supported(system, t):

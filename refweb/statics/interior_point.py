@@ -20,8 +20,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS, LENGTH
+from ..net.net import AXIAL_STIFFNESS, SLACKNESS
 from ..system.factorization import Factor
+from .equilibrium import NotFound, add_spent
 
 CENTRED = 0.99
 """Share of the way to the surface of the cone that a step takes."""
@@ -31,6 +32,50 @@ SHORT = 0.3
 """Share of a step below which another is tried."""
 NEAREST = 1e-100
 """Distance from the surface, of vectors in m or N, at which rounding has brought one there."""
+
+
+NEARER = 1e-7, 1e-11, 1e-16
+"""Distances from the end of the central path at which Newton's method is started, in turn."""
+
+
+def by_interior_point(newton, t, x):
+    """Equilibrium from the central path; the nearer its end, the better Newton's start.
+
+    Parameters
+    ----------
+    newton : refweb.statics.newton.Newton
+        Of a system under dead loads.
+    t : float
+        Load step.
+    x : ndarray, shape (rows, 3)
+        Start [m], supports in place.
+
+    Returns
+    -------
+    refweb.statics.equilibrium.Equilibrium
+        With all that was spent in its stats.
+
+    Raises
+    ------
+    refweb.statics.equilibrium.NotFound
+        Where Newton's method does not end from the nearest point either; all that was spent is in its stats.
+    """
+    inner, spent = InteriorPoint(newton.system, t, x, newton.anchors), dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    nearer = NEARER if inner.loaded else NEARER[-1:]  # without load all that is left is too much
+    for tolerance in nearer:
+        start, last = inner.follow(tolerance), tolerance == nearer[-1]
+        try:
+            state = newton.solve(t, start, warm=True, most=200 if last else 15)
+        except NotFound as error:
+            add_spent(spent, error.stats)
+            if last:
+                error.stats = spent
+                raise
+        else:
+            break
+    add_spent(spent, {"nsteps": inner.nlu, "njev": inner.nlu, "nlu": inner.nlu})
+    add_spent(state.stats, spent)
+    return state
 
 
 class InteriorPoint:
@@ -58,12 +103,10 @@ class InteriorPoint:
     def __init__(self, system, t, x, anchors):
         self.system, self.x, self.anchors = system, x.copy(), anchors
         net = system.at(t).net
-        points = len(net.weights)
         self._bars, self._reference = net.bars, net.points
         self._ends = net.weights[:, None] * net.gradients
-        length = np.tile(net.weights, len(net.cells)) * np.repeat(net.line_data[:, LENGTH], points)
-        self._stiffness = np.repeat(net.line_data[:, AXIAL_STIFFNESS], points) / length
-        self._natural = length * (1.0 + np.repeat(net.slackness, points))
+        self._stiffness = net.per_bar(AXIAL_STIFFNESS) / net.bar_lengths
+        self._natural = net.bar_lengths * (1.0 + net.per_bar(SLACKNESS))
         self._outer = sum(system.force_of(f, t, x) for f in system.families if not f.internal)
         load = np.abs(self._outer.ravel()[system.free]).max(initial=0.0)
         self.loaded, self._load = bool(load > 0.0), max(load, np.finfo(float).tiny)

@@ -11,11 +11,11 @@ import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, G0
 from ..net.tension_laws import LINEAR, TENSION_ONLY
-from .equilibrium import NotFound
+from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 from .newton import Newton
 
-MOST, WITH_A_WAY_AROUND = 400, 25
-"""Largest number of factorizations from the last state; the second where an interior point can take over."""
+MOST = 400
+"""Largest number of factorizations from the last state, where no interior point can take over."""
 PATIENCE = 3000
 """Largest number of factorizations of the smooth law where the central path has led to nothing."""
 SOFTEST = 1e-2
@@ -68,10 +68,13 @@ def _equilibrium(newton, t, x, warm):
     except NotFound as error:
         if not path:
             raise
-        _add(spent, error.stats)
+        add_spent(spent, error.stats)
         try:
-            state = _by_interior_point(newton, t, x, spent)
-        except NotFound:
+            from .interior_point import by_interior_point
+
+            state = by_interior_point(newton, t, x)
+        except NotFound as error:
+            add_spent(spent, error.stats)
             if convex:
                 state = _by_stiffening(newton, t, x, spent)
             else:  # slack lines that push fold up, one after another
@@ -82,32 +85,7 @@ def _equilibrium(newton, t, x, warm):
         state = lowest(newton, state)
     if not (convex or newton.follows):
         state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
-    _add(state.stats, spent)
-    return state
-
-
-def _add(stats, other):
-    for key in ("nsteps", "nfev", "njev", "nlu"):
-        stats[key] += other.get(key, 0)
-    return stats
-
-
-def _by_interior_point(newton, t, x, spent):
-    """Equilibrium from the central path; the nearer its end, the better Newton's start."""
-    from .interior_point import InteriorPoint
-
-    inner = InteriorPoint(newton.system, t, x, newton.anchors)
-    for tolerance in (1e-7, 1e-11, 1e-16) if inner.loaded else (1e-16,):  # without load all that is left is too much
-        start = inner.follow(tolerance)
-        try:
-            state = newton.solve(t, start, warm=True, most=15 if tolerance > 1e-16 else 200)
-        except NotFound as error:
-            _add(spent, error.stats)
-            if tolerance == 1e-16:
-                raise
-        else:
-            break
-    _add(spent, {"nsteps": inner.nlu, "njev": inner.nlu, "nlu": inner.nlu})
+    add_spent(state.stats, spent)
     return state
 
 
@@ -119,7 +97,7 @@ def _by_stiffening(newton, t, x, spent):
         numbers = system.net.line_data.copy()
         numbers[:, AXIAL_STIFFNESS] /= softer
         state = Newton(system.with_line_data(numbers), newton.progress, t).solve(t, x)
-        _add(spent, state.stats)
+        add_spent(spent, state.stats)
         x, softer = state.x, softer / 10.0
     return newton.solve(t, x, warm=True)
 

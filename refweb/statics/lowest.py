@@ -21,15 +21,12 @@ from ..effects.elasticity import strains
 from ..errors import SolverError
 from ..net.net import AXIAL_STIFFNESS, G0, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
-from .equilibrium import NotFound
+from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 
 NOTHING = 1e-9
 """Energy over that of the lines and of the loads which counts as none."""
 SURE = 1e-3
 """Energy that may be missing, over that of the lines and of the loads, from which on it is told."""
-WITH_A_WAY_AROUND, NEAR = 25, 1e-11
-"""Factorizations of Newton's method before an interior point takes over, and how near that comes."""
-SPENT = ("nsteps", "nfev", "njev", "nlu")
 
 
 def lowest(newton, state):
@@ -57,19 +54,21 @@ def lowest(newton, state):
         plain = _without_smoothing(newton, state)
     except SolverError:
         return state
-    state.stats |= {key: state.stats[key] + plain.stats[key] for key in SPENT}
+    add_spent(state.stats, plain.stats)
     forces = _forces(system, plain)
     above, none = _above(system, state, forces), NOTHING * _scale(system, state)
     if above > none:
         try:
             other = newton.solve(state.step, plain.x, warm=True)
-        except SolverError:
-            other = state
-        spent = {key: state.stats[key] + other.stats[key] for key in SPENT} if other is not state else {}
+        except SolverError as error:
+            other, spent = state, getattr(error, "stats", {})
+        else:
+            spent = other.stats
         starts = [system.energy(state.step, one.x) for one in (state, other)]
         if starts[1] < starts[0] - none:
-            state, above = other, _above(system, other, forces)
-        state.stats |= {**spent, "starts": starts}
+            state, above, spent = other, _above(system, other, forces), state.stats
+        add_spent(state.stats, spent)
+        state.stats["starts"] = starts
     state.stats |= {"above_lowest": above, "unsure": above > SURE * _scale(system, state)}
     return state
 
@@ -83,27 +82,19 @@ def _without_smoothing(newton, state):
     try:
         return plain.solve(t, state.x, most=WITH_A_WAY_AROUND)
     except NotFound as error:
-        from .interior_point import InteriorPoint
+        from .interior_point import by_interior_point
 
-        inner = InteriorPoint(plain.system, t, state.x, plain.anchors)
-        found = plain.solve(t, inner.follow(NEAR), warm=True)
-        spent = {"nsteps": inner.nlu, "nfev": 0, "njev": inner.nlu, "nlu": inner.nlu}
-        found.stats |= {key: found.stats[key] + spent[key] + error.stats.get(key, 0) for key in SPENT}
+        found = by_interior_point(plain, t, state.x)
+        add_spent(found.stats, error.stats)
         return found
-
-
-def _vectors(net, x):
-    """Vector of each bar [m], shape (bars, 3)."""
-    return net.bars @ net.points + net.bars @ x
 
 
 def _forces(system, plain):
     """Forces of the bars in an equilibrium at η = 0, vectors [N] of shape (bars, 3)."""
     net = system.at(plain.step).net
     strain = strains(net, plain.x).ravel()
-    points = len(net.weights)
-    axial, slackness = (np.repeat(net.line_data[:, column], points) for column in (AXIAL_STIFFNESS, SLACKNESS))
-    line = _vectors(net, plain.x)
+    axial, slackness = net.per_bar(AXIAL_STIFFNESS), net.per_bar(SLACKNESS)
+    line = net.bar_vectors(plain.x)
     length = np.linalg.norm(line, axis=1)
     tension = axial * np.maximum(strain - slackness, 0.0)
     return (tension / np.where(length > 0.0, length, 1.0))[:, None] * line
@@ -112,20 +103,16 @@ def _forces(system, plain):
 def _above(system, state, forces):
     """How far a state may lie above the lowest one [J], by forces that balance the loads."""
     net = system.at(state.step).net
-    points, law = len(net.weights), net.law
-    natural = np.tile(net.weights, len(net.cells)) * np.repeat(net.natural_length, points)
-    axial, slackness, smoothing, g0 = (
-        np.repeat(net.line_data[:, column], points) for column in (AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0)
-    )
+    axial, slackness, smoothing, g0 = map(net.per_bar, (AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0))
     size = np.linalg.norm(forces, axis=1)
     g = size / axial + g0  # = (s + √(s² + 4η²))/2 at s = ε − ε0, so that s = g − η²/g
     there = np.where(size > 0.0, slackness + g - smoothing**2 / np.where(g > 0.0, g, 1.0), 0.0)
     stored = axial * (
-        law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
-        - law.energy_density(there, 1.0, slackness, smoothing)
+        net.law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
+        - net.law.energy_density(there, 1.0, slackness, smoothing)
     )
-    along = (forces * _vectors(net, state.x)).sum(axis=1)
-    above = float((natural * (stored + size * (1.0 + there)) - along).sum())
+    along = (forces * net.bar_vectors(state.x)).sum(axis=1)
+    above = float((net.bar_lengths * (stored + size * (1.0 + there)) - along).sum())
     return float(max(above, 0.0)) + 2.0 * np.finfo(float).eps * float(np.abs(along).sum())
 
 

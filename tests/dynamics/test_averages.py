@@ -4,6 +4,7 @@ A mass on a line that is linear and without mass is an oscillator, v sin(ωt)/ω
 that ends at t is v sin(ω(t − ½w)) sin(½ωw)/(½ω²w).
 """
 
+import nets
 import numpy as np
 import pytest
 
@@ -14,14 +15,7 @@ STIFFNESS, MASS, SPEED, DURATION = 7e3, 1.0, 1.0, 0.1
 WINDOWS = {"short": 1e-4, "rows": 3.7e-3, "long": 2e-2, "whole": DURATION}
 """Shorter than a step, longer than several rows of 1e-3 s and no multiple of them, of many rows, and all of the run."""
 REDUCE = ("max", "min", "final")
-METHODS = {
-    "central-difference": {},
-    "order 4": dict(method="explicit", order=4),
-    "order 6": dict(method="explicit", order=6),
-    "bdf": dict(method="cvode"),
-    "adams": dict(method="cvode", family="adams"),
-    "ida": dict(method="ida", rtol=1e-5),
-}
+METHODS = nets.METHODS | {"ida": dict(method="ida", rtol=1e-5)}
 
 
 def of_way(name, average, reduce="max", quantity="displacement"):

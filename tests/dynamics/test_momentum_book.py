@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+import nets
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -294,13 +295,7 @@ def test_a_run_that_goes_on_keeps_its_book(tmp_path):
     thrust = refweb.Thrust(node=5, line=5, force=3.0)
     given = scene("central-difference", thrust, WEIGHT, refweb.Damping(rate=5.0), pulse(1e-3), BALL, contact("bdf"))
     given = given.replace(output=refweb.Output(interval=0.001, frames=5))
-
-    def stop(text, share):
-        if share > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        refweb.run(given, out=tmp_path / "run", progress=stop)
+    nets.interrupt(given, tmp_path / "run")
     again, undisturbed = refweb.resume(tmp_path / "run"), refweb.run(given)
     assert 0.0 < undisturbed.solver["momentum_drift"] <= ROUNDING
     assert again.solver["momentum_drift"] == undisturbed.solver["momentum_drift"]

@@ -4,6 +4,7 @@ A free sphere on a line that is held at both ends is an oscillator as long as it
 the largest force k √(d0² + v²/ω²) where v is inwards, else that of the start.
 """
 
+import nets
 import numpy as np
 import pytest
 
@@ -14,14 +15,7 @@ from refweb.dynamics.integrators.measurements import top_of
 STIFFNESS, MASS, RADIUS, DEPTH = 1e4, 1.0, 0.1, 2e-3
 OMEGA = np.sqrt(STIFFNESS / MASS)
 PHASES = np.linspace(-0.48, 0.48, 30) * np.pi
-METHODS = {
-    "central-difference": {},
-    "order 4": dict(method="explicit", order=4),
-    "order 6": dict(method="explicit", order=6),
-    "bdf": dict(method="cvode"),
-    "adams": dict(method="cvode", family="adams"),
-    "ida": dict(method="ida", rtol=1e-4),
-}
+METHODS = nets.METHODS | {"ida": dict(method="ida", rtol=1e-4)}
 LINE = refweb.Inline(points=[[-1, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0, 1])
 
 

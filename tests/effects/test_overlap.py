@@ -6,6 +6,7 @@ A line of one element between two supports does not give way: a ball on it is an
 import json
 import tomllib
 
+import nets
 import numpy as np
 import pytest
 
@@ -248,12 +249,7 @@ def test_a_resumed_run_has_the_stiffness_it_began_with(tmp_path):
     """And what was chosen is still refweb's to choose."""
     scene = hit()
 
-    def stop(text, share):
-        if share > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        refweb.run(scene, out=tmp_path / "run", progress=stop)
+    nets.interrupt(scene, tmp_path / "run")
     resumed, undisturbed = refweb.resume(tmp_path / "run"), refweb.run(scene)
     assert resumed.bodies == undisturbed.bodies and resumed.scene.chosen == ("ball",)
     assert np.array_equal(resumed.state.x, undisturbed.state.x)

@@ -143,7 +143,7 @@ def weigh(touches, n, i, j, inverse):
 @kernel()
 def turn_tangents(touches, n, inverse):
     """Turn the tangents of a contact so that J M⁻¹ Jᵀ has no mixed term between them."""
-    first, last, mixed = weigh(touches, n, 1, 1, inverse), weigh(touches, n, 2, 2, inverse), 0.0
+    first, last = weigh(touches, n, 1, 1, inverse), weigh(touches, n, 2, 2, inverse)
     mixed = weigh(touches, n, 1, 2, inverse)
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
@@ -302,7 +302,7 @@ def give(number, memory, v, touches, begin, end, out):
             for i in range(3):
                 memory[c, at + 1 + k] += touches[n, FORCE + i] * touches[n, AXES + 3 * i + k]
         for i in range(3):
-            out[int(touches[n, CELL]), 0] += touches[n, FORCE + i] * along(touches, n, i, v)
+            out[c, 0] += touches[n, FORCE + i] * along(touches, n, i, v)
 
 
 @functools.cache

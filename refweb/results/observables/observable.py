@@ -71,14 +71,18 @@ class Observable:
         """
         if equilibrium.deviations is None or self.floats(state, equilibrium):
             return None
-        value, changes = self.of(state).value, []
-        for deviation in equilibrium.deviations:
-            size = np.abs(deviation).max()
-            share = 1e-7 * state.system.natural_length(state.time).min() / size if size > 0.0 else 0.0
-            there = type(state)(state.system, state.time, state.x + share * deviation)
-            changes.append(abs(self.of(there).value - value) / share if share > 0.0 else 0.0)
-        rounding = 2.0 * np.finfo(float).eps * abs(value) + self.of_held_lines(state)
+        changes = [self._change(state, deviation) for deviation in equilibrium.deviations]
+        rounding = 2.0 * np.finfo(float).eps * abs(self.of(state).value) + self.of_held_lines(state)
         return float(changes[0] + 3.0 * max(changes[1:]) + rounding)
+
+    def _change(self, state, move):
+        """Size of the change of the value under a move of the rows, to first order."""
+        size = np.abs(move).max()
+        if size == 0.0:
+            return 0.0
+        share = SHARE * state.system.natural_length(state.time).min() / size
+        there = type(state)(state.system, state.time, state.x + share * move)
+        return abs(self.of(there).value - self.of(state).value) / share
 
     def of_held_lines(self, state):
         """What rounding of their strains by `ROUNDING` makes of the value by lines that both ends hold.
@@ -102,13 +106,8 @@ class Observable:
         """Whether moves at no cost change the value, beside what other moves of their size change."""
         if equilibrium.floating is None:
             return False
-        value, share = self.of(state).value, 1e-7 * state.system.natural_length(state.time).min()
         some = np.random.default_rng(0).uniform(-1.0, 1.0, state.x.shape) * ~state.system.supported
-
-        def change(move):
-            return abs(self.of(type(state)(state.system, state.time, state.x + share * move)).value - value)
-
-        return max(map(change, equilibrium.floating.moves)) > 1e-4 * change(some)
+        return max(self._change(state, move) for move in equilibrium.floating.moves) > 1e-4 * self._change(state, some)
 
     def interval(self, state, equilibrium):
         """Least and largest value in all equilibria, where parts of the net float; None where that is not known."""
