@@ -1,25 +1,69 @@
-"""refweb, a reference solver for space webs: equilibrium and dynamics of cable nets.
+"""refweb, a reference solver for space webs: equilibrium and dynamics of cable nets, with the error of every result.
 
 Names are imported when they are used: ``import refweb`` loads nothing that a scene does not need.
 """
 
 __version__ = "0.1.0"
 
+TYPE_CHECKING = False  # as of `typing`, which is not imported for it
+if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same names
+    from .effects.bending import Bending as Bending
+    from .effects.body import Body as Body
+    from .effects.contact.table import Contact as Contact
+    from .effects.damping import Damping as Damping
+    from .effects.frame import Frame as Frame
+    from .effects.gravity import Gravity as Gravity
+    from .effects.link import Link as Link
+    from .effects.load import Load as Load
+    from .effects.motion import Motion as Motion
+    from .effects.point_mass import PointMass as PointMass
+    from .effects.pressure import Pressure as Pressure
+    from .effects.reel import Reel as Reel
+    from .effects.temperature import Temperature as Temperature
+    from .effects.thrust import Thrust as Thrust
+    from .effects.velocity import Velocity as Velocity
+    from .errors import InputError as InputError
+    from .errors import SolverError as SolverError
+    from .net.cable import Cable as Cable
+    from .net.cable import Group as Group
+    from .net.inline import Inline as Inline
+    from .net.lattices import Layers as Layers
+    from .net.lattices import Paper as Paper
+    from .net.lattices import Window as Window
+    from .net.mesh_file import File as File
+    from .net.single_cable import SingleCable as SingleCable
+    from .net.tension_laws import Law as Law
+    from .net.web import Web as Web
+    from .results.observables.observe import Observe as Observe
+    from .runner import resume as resume
+    from .runner import run as run
+    from .scene import Scene as Scene
+    from .settings import Accuracy as Accuracy
+    from .settings import Dynamic as Dynamic
+    from .settings import Event as Event
+    from .settings import Output as Output
+    from .settings import Static as Static
+    from .settings import Supports as Supports
+    from .solution import Solution as Solution
+    from .studies.cost import Cost as Cost
+    from .studies.modes import Modes as Modes
+    from .studies.modes import modes as modes
+    from .studies.work_precision import cost as cost
+else:
 
-def __getattr__(name):
-    from .registry import exports, load
+    def __getattr__(name):
+        from .registry import exports, load
 
-    names = exports()
-    if name == "__all__":
-        return sorted(names)
-    if name not in names:
-        from .messages import nearest
+        names = exports()
+        if name == "__all__":
+            return sorted(names)
+        if name not in names:
+            from .messages import nearest
 
-        raise AttributeError(f"module 'refweb' has no attribute {name!r}, {nearest(name, names)}")
-    return load(names[name])
+            raise AttributeError(f"module 'refweb' has no attribute {name!r}, {nearest(name, names)}")
+        return load(names[name])
 
+    def __dir__():
+        from .registry import exports
 
-def __dir__():
-    from .registry import exports
-
-    return sorted(exports())
+        return sorted(exports())

@@ -10,13 +10,13 @@ import os
 import pathlib
 import re
 import tomllib
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 
 from .errors import InputError, in_file, refused_at
 from .messages import nearest, short, shown
 from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of
 from .settings import START_STATES, Accuracy, Head, Output, Static, Supports
-from .tables import Table
+from .tables import Several, Table, table
 
 CLASSES_OF_PARTS = {
     "cable": ("Cable",),
@@ -35,7 +35,7 @@ MAX_HISTORY_ROWS = 10_000_000
 """Largest number of history rows."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Scene:
     """What refweb computes.
 
@@ -76,14 +76,14 @@ class Scene:
 
     web: object
     cable: object
-    effects: tuple = ()
+    effects: Several = ()
     supports: Supports | None = None
-    support: tuple = ()
+    support: Several = ()
     solve: Static = field(default_factory=Static)
     output: Output = field(default_factory=Output)
     accuracy: Accuracy | None = None
-    observe: tuple = ()
-    event: tuple = ()
+    observe: Several = ()
+    event: Several = ()
     title: str = "scene"
     seed: int = 0
     folder: pathlib.Path | None = field(default=None, compare=False)
@@ -193,8 +193,8 @@ class Scene:
         effects = []
         for key in given:
             if key in EFFECTS:
-                table = load(EFFECTS[key])
-                effects += _each(key, table, given[key]) if table.several else [table.read(f"[{key}]", given[key])]
+                kind = load(EFFECTS[key])
+                effects += _each(key, kind, given[key]) if kind.several else [kind.read(f"[{key}]", given[key])]
         return Scene(**parts, effects=tuple(effects))
 
     def to_dict(self):

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from .errors import InputError
 from .messages import shown
 from .registry import INTEGRATORS, STATICS
-from .tables import Table, boolean, choice, components, integer, nodes, numbers_list, real, text
+from .tables import Several, Table, boolean, choice, components, integer, nodes, numbers_list, real, table, text
 
 START_STATES = ("web", "equilibrium")
 """What ``start`` may be besides a result folder."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Head(Table):
     """What stands at the head of a scene file, before its tables.
 
@@ -33,11 +31,11 @@ class Head(Table):
     """
 
     schema: int = choice(1, default=1)
-    title: str = text("scene", most=200)
-    seed: int = integer(0, at_least=0, at_most=2**63 - 1)
+    title: str = text(default="scene", most=200)
+    seed: int = integer(default=0, at_least=0, at_most=2**63 - 1)
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Supports(Table):
     """Nodes whose displacement is held at zero in some components.
 
@@ -64,11 +62,11 @@ class Supports(Table):
         components = ["z"]
     """
 
-    nodes: object = nodes(empty=True)
-    components: tuple = components(("x", "y", "z"))
+    nodes: Several = nodes(empty=True)
+    components: Several = components(default=("x", "y", "z"))
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Static(Table):
     """Static solution at a list of load steps.
 
@@ -95,7 +93,7 @@ class Static(Table):
 
     kind: str = choice("static", default="static")
     method: str = choice(STATICS, default="newton")
-    load_steps: tuple = numbers_list((1.0,))
+    load_steps: Several = numbers_list(default=(1.0,))
     mass: str = choice("lumped", "consistent", default="lumped")
 
     def check(self):
@@ -104,7 +102,7 @@ class Static(Table):
             raise InputError(f"load_steps has {len(self.load_steps)} numbers, must be at most 100000")
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Dynamic(Table):
     """Motion over a time.
 
@@ -156,17 +154,17 @@ class Dynamic(Table):
     kind: str = choice("dynamic", default="dynamic")
     method: str = choice(INTEGRATORS, "auto", default="central-difference")
     duration: float = real(above=0, unit="s")
-    safety: float | None = real(None, above=0, at_most=1)
-    step_size: float | None = real(None, above=0, unit="s")
-    order: int | None = integer(None, at_least=4, at_most=6)
-    rtol: float | None = real(None, at_least=1e-13, at_most=0.1)
-    atol_position: float | None = real(None, above=0, unit="m")
-    atol_velocity: float | None = real(None, above=0, unit="m/s")
+    safety: float | None = real(default=None, above=0, at_most=1)
+    step_size: float | None = real(default=None, above=0, unit="s")
+    order: int | None = integer(default=None, at_least=4, at_most=6)
+    rtol: float | None = real(default=None, at_least=1e-13, at_most=0.1)
+    atol_position: float | None = real(default=None, above=0, unit="m")
+    atol_velocity: float | None = real(default=None, above=0, unit="m/s")
     family: str | None = choice("bdf", "adams", default=None)
-    max_order: int | None = integer(None, at_least=1, at_most=12)
+    max_order: int | None = integer(default=None, at_least=1, at_most=12)
     linear_solver: str | None = choice("auto", "block", "sparse", "dense", "fixed-point", default=None)
     mass: str = choice("lumped", "consistent", default="lumped")
-    start: str = text("web")
+    start: str = text(default="web")
 
     def check(self):
         """Refuse keys of another method, and fill in the defaults of this one."""
@@ -187,7 +185,7 @@ class Dynamic(Table):
             raise InputError(f"max_order = {self.max_order} must be ≤ 5 for BDF")
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Event(Table):
     """A moment of a dynamic scene that is looked for: the time at which something first happens.
 
@@ -227,11 +225,11 @@ class Event(Table):
 
     name: str = text(most=80)
     kind: str = choice("contact", "taut", "threshold")
-    body: str | None = text(None)
-    line: object = nodes(None, what="line")
-    observe: str | None = text(None)
-    value: float | None = real(None)
-    stop: bool = boolean(False)
+    body: str | None = text(default=None)
+    line: Several = nodes(default=None, what="line")
+    observe: str | None = text(default=None)
+    value: float | None = real(default=None)
+    stop: bool = boolean(default=False)
 
     def check(self):
         """Refuse keys of another kind, and what a kind lacks."""
@@ -244,7 +242,7 @@ class Event(Table):
                 raise InputError(f'{key} = {shown(value)} has no meaning for kind = "{self.kind}": leave it out')
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Output(Table):
     """What a result folder holds.
 
@@ -269,11 +267,11 @@ class Output(Table):
         frames = 10
     """
 
-    interval: float | None = real(None, above=0, unit="s")
-    frames: int | None = integer(None, at_least=1)
+    interval: float | None = real(default=None, above=0, unit="s")
+    frames: int | None = integer(default=None, at_least=1)
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Accuracy(Table):
     """How the errors of results are found.
 
@@ -306,10 +304,10 @@ class Accuracy(Table):
     """
 
     error: str = choice("twin", "none", default="twin")
-    digits: int | None = integer(None, at_least=1, at_most=12)
-    refine: bool = boolean(False)
-    horizon: bool = boolean(False)
-    ensemble: int | None = integer(None, at_least=2, at_most=10_000)
+    digits: int | None = integer(default=None, at_least=1, at_most=12)
+    refine: bool = boolean(default=False)
+    horizon: bool = boolean(default=False)
+    ensemble: int | None = integer(default=None, at_least=2, at_most=10_000)
 
     def check(self):
         """Refuse what needs something else."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .results.solution import SolutionData
 
 
@@ -20,42 +22,42 @@ class Solution(SolutionData):
     """
 
     @property
-    def positions(self):
+    def positions(self) -> np.ndarray:
         """Positions of the nodes in the last state [m], shape (nodes, 3); those of order and subdivision come last."""
         return self.state.position[: self.state.system.net.nodes]
 
     @property
-    def displacement(self):
+    def displacement(self) -> np.ndarray:
         """Displacement of the nodes in the last state [m], shape (nodes, 3)."""
         return self.state.x[: self.state.system.net.nodes]
 
     @property
-    def tension(self):
+    def tension(self) -> np.ndarray:
         """Tension of the lines in the last state [N], shape (lines,)."""
         return self.state.tension
 
     @property
-    def stress(self):
+    def stress(self) -> np.ndarray:
         """Stress of the lines in the last state [Pa], shape (lines,)."""
         return self.state.stress
 
     @property
-    def strain(self):
+    def strain(self) -> np.ndarray:
         """Strain of the lines in the last state [1], shape (lines,)."""
         return self.state.strain
 
     @property
-    def slack(self):
+    def slack(self) -> np.ndarray:
         """Lines that are slack in the last state, bool, shape (lines,)."""
         return self.state.slack
 
     @property
-    def velocities(self):
+    def velocities(self) -> np.ndarray:
         """Velocities of the nodes in the last state [m/s], shape (nodes, 3)."""
         return self.state.v[: self.state.system.net.nodes]
 
     @property
-    def reaction(self):
+    def reaction(self) -> np.ndarray:
         """Force of the supports on the nodes in the last state [N], shape (nodes, 3)."""
         return self.state.reaction[: self.state.system.net.nodes]
 

@@ -1,16 +1,19 @@
 """How a table of a scene becomes a checked value.
 
-A table is a frozen dataclass whose fields say what they accept: ``area: float = real(above=0, unit="m²")``. The same
-class is the Python value, the TOML table and, for effects, the effect itself. Every refusal is an `InputError` of one
-line that names the value, the limit and, for a misspelt name, the nearest valid one.
+A table is a class with `table` above it, whose fields say what they accept: ``area: float = real(above=0, unit="m²")``.
+The same class is the Python value, the TOML table and, for effects, the effect itself. Every refusal is an `InputError`
+of one line that names the value, the limit and, for a misspelt name, the nearest valid one. Editors know the keys as
+well: `table` is a ``dataclass_transform`` (PEP 681), which wants defaults by name, ``real(default=1.0)``.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import numbers
 from dataclasses import MISSING
+from typing import Any, dataclass_transform
 
 from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
@@ -21,6 +24,8 @@ LARGEST = 1e100
 SMALLEST = 1e-100
 """Smallest value of a number that must not be negative, unless it is 0."""
 _WHOLE = 2**63 - 1
+Several = Any
+"""What a field that is read as a tuple may be given, to editors: a list, a tuple or an array."""
 
 
 def _refuse(name, value, limit):
@@ -74,38 +79,38 @@ def _list(name, value, what):
     return value
 
 
-def field(read, default=MISSING, unit="", factory=MISSING):
+def field(read, *, default=MISSING, default_factory=MISSING, unit="") -> Any:
     """A dataclass field whose values pass through ``read(name, value)``; None passes where it is the default."""
-    given = {"default_factory": factory} if factory is not MISSING else {"default": default}
-    return dataclasses.field(metadata={"read": read, "unit": unit}, **given)
+    made = {"default": default} if default_factory is MISSING else {"default_factory": default_factory}
+    return dataclasses.field(metadata={"read": read, "unit": unit}, **made)
 
 
-def checked(name, value, kind):
+def checked(name, value, kind) -> Any:
     """A value as a field reads it: ``checked("seed", 3, integer(at_least=0))``."""
     return kind.metadata["read"](name, value)
 
 
-def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit=""):
+def real(default=MISSING, *, above=None, at_least=None, below=None, at_most=LARGEST, unit="") -> Any:
     """A finite real number within bounds."""
 
     @accepts(limits("number", above, -LARGEST if at_least is None else at_least, below, at_most))
     def read(name, value):
         return _bounded(name, _number(name, value, unit), unit, above, at_least, below, at_most)
 
-    return field(read, default, unit)
+    return field(read, default=default, unit=unit)
 
 
-def integer(default=MISSING, *, at_least=None, at_most=None):
+def integer(default=MISSING, *, at_least=None, at_most=None) -> Any:
     """A whole number within bounds."""
 
     @accepts(limits("integer", at_least=at_least, at_most=at_most))
     def read(name, value):
         return _bounded(name, _whole(name, value), "", None, at_least, None, at_most)
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def choice(*names, default=MISSING):
+def choice(*names, default=MISSING) -> Any:
     """One of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
 
     def valid():
@@ -120,10 +125,10 @@ def choice(*names, default=MISSING):
         hint = f' — did you mean "{close}"?' if close else ""
         _refuse(name, value, ("one of " if len(valid()) > 1 else "") + ", ".join(map(shown, valid())) + hint)
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def boolean(default=MISSING):
+def boolean(default=MISSING) -> Any:
     """True or false."""
 
     @accepts({"type": "boolean"})
@@ -132,10 +137,10 @@ def boolean(default=MISSING):
             _refuse(name, value, "true or false")
         return value
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def text(default=MISSING, *, most=4096):
+def text(default=MISSING, *, most=4096) -> Any:
     """A string that is not empty, stands on one line and has at most ``most`` characters."""
 
     @accepts({"type": "string", "pattern": r"\S", "maxLength": most})
@@ -146,10 +151,10 @@ def text(default=MISSING, *, most=4096):
             _refuse(name, value, f"a text of at most {most} characters, not {len(value)}")
         return value
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def vector(default=MISSING, unit=""):
+def vector(default=MISSING, unit="") -> Any:
     """Three finite numbers."""
 
     @accepts(array(_number.accepts, 3, 3))
@@ -159,10 +164,10 @@ def vector(default=MISSING, unit=""):
             _refuse(name, value, f"a vector of 3 numbers, not {len(value)}" + (f" [{unit}]" if unit else ""))
         return tuple(_number(f"{name}[{i}]", x, unit) for i, x in enumerate(value))
 
-    return field(read, default, unit)
+    return field(read, default=default, unit=unit)
 
 
-def rows(width, default=MISSING, *, unit="", increasing=False, number=_number):
+def rows(width, default=MISSING, *, unit="", increasing=False, number=_number) -> Any:
     """A list of rows of ``width`` numbers; ``increasing`` asks that of the first column (a table over time)."""
 
     @accepts(array(array(number.accepts, width, width), 1))
@@ -182,7 +187,7 @@ def rows(width, default=MISSING, *, unit="", increasing=False, number=_number):
                     _refuse(f"{name}[{i}][0]", result[i][0], f"> {result[i - 1][0]:g}: the first column increases")
         return tuple(result)
 
-    return field(read, default, unit)
+    return field(read, default=default, unit=unit)
 
 
 @accepts({"type": "integer", "minimum": 0})
@@ -191,7 +196,7 @@ def node_number(name, value):
     return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
 
 
-def numbers_list(default=MISSING, *, number=_number, empty=False):
+def numbers_list(default=MISSING, *, number=_number, empty=False) -> Any:
     """A list of numbers; ``number=node_number`` for whole numbers ≥ 0."""
 
     @accepts(array(number.accepts, 1 - empty))
@@ -201,10 +206,10 @@ def numbers_list(default=MISSING, *, number=_number, empty=False):
             _refuse(name, value, "a list with at least one number")
         return tuple(number(f"{name}[{i}]", x) for i, x in enumerate(value))
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def texts(default=MISSING):
+def texts(default=MISSING) -> Any:
     """A list of strings."""
 
     @accepts(array({"type": "string"}))
@@ -215,10 +220,10 @@ def texts(default=MISSING):
                 _refuse(f"{name}[{i}]", x, "a text")
         return tuple(value)
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def nodes(default=MISSING, *, empty=False, what="node"):
+def nodes(default=MISSING, *, empty=False, what="node") -> Any:
     """A number of a node (or a line), a name, or a list of them; `refweb.net.web.Web.find` turns it into numbers."""
 
     either = [node_number.accepts, {"type": "string"}]
@@ -238,10 +243,10 @@ def nodes(default=MISSING, *, empty=False, what="node"):
             return value
         return _bounded(name, _whole(name, value, f"a {what} number or a name"), "", None, 0, None, None)
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def component(default=MISSING):
+def component(default=MISSING) -> Any:
     """An axis: 0, 1, 2 or "x", "y", "z"; read as 0, 1 or 2."""
 
     @accepts({"type": ["integer", "string"], "enum": [0, 1, 2, "x", "y", "z"]})
@@ -252,10 +257,10 @@ def component(default=MISSING):
             _refuse(name, value, 'one of 0, 1, 2, "x", "y", "z"')
         return int(value)
 
-    return field(read, default)
+    return field(read, default=default)
 
 
-def components(default=MISSING):
+def components(default=MISSING) -> Any:
     """A list of axes; read as a sorted tuple of 0, 1, 2."""
 
     @accepts(array(component().metadata["read"].accepts, 1))
@@ -265,14 +270,82 @@ def components(default=MISSING):
             _refuse(name, value, 'a list with at least one of "x", "y", "z"')
         return tuple(sorted({checked(f"{name}[{i}]", x, component()) for i, x in enumerate(value)}))
 
-    return field(read, default)
+    return field(read, default=default)
+
+
+def by_group(kind, where, *, default_factory=dict) -> Any:
+    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
+
+    @accepts(by_name(kind))
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")
+        return {
+            key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
+            for key, group in value.items()
+        }
+
+    return field(read, default_factory=default_factory)
+
+
+def refuse_keys(cls, given):
+    """Refuse what is no key of a class of `table`, with the nearest that is, and a key that is missing."""
+    known = cls.keys(given) if issubclass(cls, Table) else [f.name for f in dataclasses.fields(cls)]
+    for key in given:
+        if key not in known:
+            raise InputError(f"{short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")
+    for f in dataclasses.fields(cls):
+        if f.default is MISSING and f.default_factory is MISSING and f.name not in given:
+            unit = f" [{f.metadata['unit']}]" if f.metadata.get("unit") else ""
+            raise InputError(f"{f.name} is missing: give {f.name} = ...{unit}")
+
+
+@dataclass_transform(
+    kw_only_default=True,
+    frozen_default=True,
+    field_specifiers=(
+        field,
+        real,
+        integer,
+        choice,
+        boolean,
+        text,
+        vector,
+        rows,
+        numbers_list,
+        texts,
+        nodes,
+        component,
+        components,
+        by_group,
+        dataclasses.field,
+    ),
+)
+def table(cls):
+    """Make a frozen dataclass of keywords alone, which names the nearest key where one is misspelt.
+
+    Raises
+    ------
+    InputError
+        From the class, where a key is unknown or missing.
+    """
+    made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    own = made.__init__
+
+    @functools.wraps(own)
+    def __init__(self, **given):
+        refuse_keys(made, given)
+        own(self, **given)
+
+    made.__init__ = __init__
+    return made
 
 
 class Table:
     """Base of all tables: checks its fields when made, and reads itself from a dict.
 
-    Subclasses are ``@dataclass(frozen=True, kw_only=True)`` with fields made by the functions above. ``check`` may
-    refuse combinations of values; ``several`` says whether a scene may have more than one, ``[[load]]``.
+    Subclasses have `table` above them and fields made by the functions above. ``check`` may refuse combinations of
+    values; ``several`` says whether a scene may have more than one, ``[[load]]``.
     """
 
     several = False
@@ -298,14 +371,6 @@ class Table:
         """The table from a dict; ``where`` (such as ``[gravity]``) begins every message."""
         if not isinstance(given, dict):
             raise InputError(f"{where} = {shown(given)} must be a table")
-        known = cls.keys(given)
-        for key in given:
-            if key not in known:
-                raise InputError(f"{where} {short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")
-        for f in dataclasses.fields(cls):
-            if f.default is MISSING and f.default_factory is MISSING and f.name not in given:
-                unit = f" [{f.metadata['unit']}]" if f.metadata["unit"] else ""
-                raise InputError(f"{where} {f.name} is missing: give {f.name} = ...{unit}")
         with refused_at(where):
             return cls(**given)
 
@@ -323,18 +388,3 @@ class Table:
 
         pairs = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
         return {name: plain(value) for name, value in pairs if value is not None}
-
-
-def by_group(kind, where):
-    """Tables of a class by group of lines, in the scene ``[where.groups.NAME]``."""
-
-    @accepts(by_name(kind))
-    def read(name, value):
-        if not isinstance(value, dict):
-            raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")
-        return {
-            key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
-            for key, group in value.items()
-        }
-
-    return field(read, factory=dict)

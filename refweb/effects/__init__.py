@@ -7,15 +7,13 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
 
     '''The magnetic force on lines that carry a current, I dl × B.'''
 
-    from dataclasses import dataclass
-
     import numpy as np
 
     from refweb.effects.base import Family
     from refweb.errors import InputError
     from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
     from refweb.net.net import REFERENCE
-    from refweb.tables import Table, nodes, real, vector
+    from refweb.tables import Several, Table, nodes, real, table, vector
 
 
     @kernel(FORCE)
@@ -46,14 +44,14 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
                 rates[row] += np.abs(data[c, 3:]).sum()
 
 
-    @dataclass(frozen=True, kw_only=True)
+    @table
     class Current(Table):
         '''A current from the first node of lines to their second, in a uniform field.'''
 
         several = True
         lines: object = nodes(what="line")
         current: float = real(unit="A")
-        field: tuple = vector(unit="T")
+        field: Several = vector(unit="T")
 
         def on(self, net):
             if net.order > 1:

@@ -16,13 +16,12 @@ so that tiny deflections keep their digits.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..tables import Table, real
+from ..tables import Table, real, table
 from .base import Family
 from .vectors import cross, dot
 
@@ -156,7 +155,7 @@ def springs(net):
     return rows, np.column_stack([element[first], element[second]])
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Bending(Table):
     """Bending stiffness of lines that continue each other at a node within 30°, and of the elements of each line.
 

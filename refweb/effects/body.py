@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..messages import shown
 from ..net.rigid_body import RigidBody, Shape
 from ..registry import SHAPES, load
-from ..tables import Table, boolean, choice, field, real, text, vector
+from ..tables import Several, Table, boolean, choice, field, real, refuse_keys, text, vector
 
 
 def _keys(shape):
@@ -86,20 +86,19 @@ class Body(Table):
 
     name: str = text(most=80)
     shape: str = choice(SHAPES, default="sphere")
-    form: Shape = field(_given, None)  # the keys of the shape, as its own table
-    mass: float | None = real(None, above=0, unit="kg")
-    position: tuple = vector(unit="m")
-    velocity: tuple = vector((0.0, 0.0, 0.0), unit="m/s")
-    angular_velocity: tuple = vector((0.0, 0.0, 0.0), unit="rad/s")
-    inertia: float | None = real(None, above=0, unit="kg m²")
-    fixed: bool = boolean(False)
+    form: Shape = field(_given, default=None)  # the keys of the shape, as its own table
+    mass: float | None = real(default=None, above=0, unit="kg")
+    position: Several = vector(unit="m")
+    velocity: Several = vector(default=(0.0, 0.0, 0.0), unit="m/s")
+    angular_velocity: Several = vector(default=(0.0, 0.0, 0.0), unit="rad/s")
+    inertia: float | None = real(default=None, above=0, unit="kg m²")
+    fixed: bool = boolean(default=False)
 
     def __init__(self, **given):
         form = given.pop("form", None)  # of the body that this one is a copy of
         own = {f.name: getattr(form, f.name) for f in fields(form)} if form else {}
+        refuse_keys(type(self), {**own, **given})
         for f in fields(self):
-            if f.name not in given and f.name != "form" and f.default is MISSING:
-                raise TypeError(f"Body.__init__() missing required keyword-only argument: {f.name!r}")
             object.__setattr__(self, f.name, given.pop(f.name, f.default))
         object.__setattr__(self, "form", {**own, **given})
         self.__post_init__()
@@ -154,8 +153,6 @@ class Body(Table):
             if f.default is MISSING and f.name not in given:
                 raise InputError(f'{f.name} is missing: shape = "{self.shape}" needs {f.name} = ...')
         for key in given.keys() - _keys(self.shape):
-            if not any(key in _keys(shape) for shape in SHAPES):
-                raise TypeError(f"Body.__init__() got an unexpected keyword argument {key!r}")
             raise InputError(f'{key} = {shown(given[key])} has no meaning for shape = "{self.shape}"')
         return kind(**given)
 

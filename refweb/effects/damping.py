@@ -18,7 +18,6 @@ taut, its force jumps, and central differences are of order 1 across it.
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,7 +25,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
-from ..tables import Table, real
+from ..tables import Table, real, table
 from .base import POWER, TENSION, Family, column
 from .line_kernels import gradient, pull_together, strain
 
@@ -171,7 +170,7 @@ def drag_bound(reach, speed, x, mass, rates, cells, data):
         rates[cells[c, 0]] += data[c, 0]
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Damping(Table):
     """Damping of the web; bodies are not damped, and statics does not feel it.
 
@@ -201,8 +200,8 @@ class Damping(Table):
         rate = 0.1
     """
 
-    time: float = real(0.0, at_least=0, unit="s")
-    rate: float = real(0.0, at_least=0, unit="1/s")
+    time: float = real(default=0.0, at_least=0, unit="s")
+    rate: float = real(default=0.0, at_least=0, unit="1/s")
 
     def check(self):
         """Refuse a damping that damps nothing."""

@@ -11,14 +11,13 @@ and the strain ε = (2 X'·u' + u'·u' + |X'|² − L²)/(L(l + L)), which keeps
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
-from ..tables import Table
+from ..tables import Table, table
 from .base import STRAIN, TENSION, Family
 from .line_kernels import pull_together, strain
 
@@ -132,7 +131,7 @@ def length_force(net):
     return of(net)[5]
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Elasticity(Table):
     """Tension of every line by the law of its cable, see `refweb.net.tension_laws`."""
 

@@ -15,12 +15,11 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..tables import Table, vector
+from ..tables import Several, Table, table, vector
 from .base import Family, column
 
 MASS = 3
@@ -120,7 +119,7 @@ def kernels(nodes):
     return centrifugal, energy, stiffness, coriolis, damping, damping_bound
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Frame(Table):
     """A steadily turning frame; positions, velocities, supports and all other effects are those in its axes.
 
@@ -144,7 +143,7 @@ class Frame(Table):
         angular_velocity = [0.0, 0.0, 6.283]
     """
 
-    angular_velocity: tuple = vector(unit="rad/s")
+    angular_velocity: Several = vector(unit="rad/s")
 
     def on(self, net):
         """Centrifugal and Coriolis force of all rows with mass; where mass is consistent those of the lines as well.

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..kernels import ENERGY, FORCE, IMPULSE, kernel
-from ..tables import Table, vector
+from ..tables import Several, Table, table, vector
 from .base import Family, column
 
 
@@ -32,7 +30,7 @@ def impulse(t, x, cells, data, total):
             total[i] += t * data[c, i]
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Gravity(Table):
     """Weight m g of every row that has mass.
 
@@ -52,7 +50,7 @@ class Gravity(Table):
         acceleration = [0.0, 0.0, -9.81]
     """
 
-    acceleration: tuple = vector(unit="m/s²")
+    acceleration: Several = vector(unit="m/s²")
 
     def on(self, net):
         """The family of all rows with mass; its energy is zero in the web's position."""

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import InputError
 from ..messages import shown
-from ..tables import Table, nodes
+from ..tables import Several, Table, nodes, table
 from .base import Constraint
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Link(Table):
     """Massless bars that do not stretch, from each of some nodes to the next; they pull and push.
 
@@ -35,7 +33,7 @@ class Link(Table):
 
     several = True
 
-    nodes: tuple = nodes()
+    nodes: Several = nodes()
 
     def check(self):
         """Refuse fewer than two nodes."""

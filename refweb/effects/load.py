@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..kernels import ENERGY, FORCE, IMPULSE, kernel
-from ..tables import Table, nodes, rows, vector
+from ..tables import Several, Table, nodes, rows, table, vector
 from .base import column
 from .outer_load import factor_at, factor_until, outer_load
 
@@ -37,7 +35,7 @@ def impulse(t, x, cells, data, total):
             total[i] += times * data[c, i]
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Load(Table):
     """A dead load on each of some nodes.
 
@@ -67,9 +65,9 @@ class Load(Table):
 
     several = True
 
-    node: object = nodes()
-    force: tuple = vector(unit="N")
-    factor: tuple | None = rows(2, None, increasing=True)
+    node: Several = nodes()
+    force: Several = vector(unit="N")
+    factor: Several = rows(2, default=None, increasing=True)
 
     def on(self, net):
         """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""

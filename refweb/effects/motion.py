@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..kernels import FORCE, kernel
-from ..tables import Table, nodes, rows
+from ..tables import Several, Table, nodes, rows, table
 from .base import Drive, column
 from .time_tables import flattened, interpolate
 
@@ -19,7 +17,7 @@ def drive(t, x, v, f, cells, data, out):
             x[cells[c, 0], i], v[cells[c, 0], i] = interpolate(t, data[c], 0, 4, 1 + i)
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Motion(Table):
     """Prescribed displacement of nodes, which become supports.
 
@@ -45,8 +43,8 @@ class Motion(Table):
 
     several = True
 
-    node: object = nodes()
-    displacement: tuple = rows(4, unit="m", increasing=True)
+    node: Several = nodes()
+    displacement: Several = rows(4, unit="m", increasing=True)
 
     def on(self, net):
         """The driven rows."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..tables import Table, nodes, real
+from ..tables import Several, Table, nodes, real, table
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class PointMass(Table):
     """A mass added to each of some nodes; it weighs under gravity.
 
@@ -34,7 +34,7 @@ class PointMass(Table):
 
     several = True
 
-    node: object = nodes()
+    node: Several = nodes()
     mass: float = real(at_least=0, unit="kg")
 
     def extend(self, net):

@@ -13,14 +13,13 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..net.net import REFERENCE
-from ..tables import Table, nodes, real, rows, vector
+from ..tables import Several, Table, nodes, real, rows, table, vector
 from .outer_load import factor_at, outer_load
 
 # Columns of data: p n; dX/dξ; the factor.
@@ -85,7 +84,7 @@ def kernels(nodes, shares, couples):
     return force, stiffness, bound
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Pressure(Table):
     """A force per current length, at right angles to lines and to the normal of a plane.
 
@@ -130,11 +129,11 @@ class Pressure(Table):
 
     several = True
 
-    lines: object = nodes(what="line")
-    normal: tuple = vector()
+    lines: Several = nodes(what="line")
+    normal: Several = vector()
     value: float = real(unit="N/m")
-    away_from: tuple | None = vector(None, unit="m")
-    factor: tuple | None = rows(2, None, increasing=True)
+    away_from: Several = vector(default=None, unit="m")
+    factor: Several = rows(2, default=None, increasing=True)
 
     def check(self):
         """Refuse a normal without direction."""

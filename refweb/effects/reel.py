@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..errors import InputError
-from ..tables import Table, nodes, rows
+from ..tables import Several, Table, nodes, rows, table
 from .length_factor import scaled
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Reel(Table):
     """Lines that are reeled in or paid out; their nodes keep their mass, and the reel does work.
 
@@ -37,8 +35,8 @@ class Reel(Table):
 
     several = True
 
-    lines: object = nodes(what="line")
-    factor: tuple = rows(2, increasing=True)
+    lines: Several = nodes(what="line")
+    factor: Several = rows(2, increasing=True)
 
     def check(self):
         """Refuse a natural length that is not positive."""

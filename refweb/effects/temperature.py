@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
-from ..tables import Table, by_group, checked, field, real, rows
+from ..tables import Table, by_group, checked, field, real, rows, table
 from .length_factor import scaled
 
 
@@ -20,7 +18,7 @@ def _change(name, value):
     return checked(name, value, rows(2, increasing=True) if table else real(unit="K"))
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class GroupTemperature(Table):
     """What may differ on the lines of one group; None keeps the value of `Temperature`.
 
@@ -31,11 +29,11 @@ class GroupTemperature(Table):
         change = 40.0
     """
 
-    expansion: float | None = real(None, unit="1/K")
-    change: object = field(_change, None)
+    expansion: float | None = real(default=None, unit="1/K")
+    change: object = field(_change, default=None)
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Temperature(Table):
     """Thermal strain of the lines; mass, section and modulus stay.
 
@@ -64,7 +62,7 @@ class Temperature(Table):
 
     expansion: float = real(unit="1/K")
     change: object = field(_change, unit="K")
-    groups: dict = by_group(GroupTemperature, "temperature")
+    groups: dict = by_group(GroupTemperature, "temperature", default_factory=dict)
 
     def check(self):
         """Refuse a natural length that is not positive."""

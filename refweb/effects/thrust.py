@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import shown
 from ..net.net import REFERENCE
-from ..tables import Table, nodes, real, rows
+from ..tables import Several, Table, nodes, real, rows, table
 from .outer_load import factor_at, outer_load
 
 SHORTER = 0.5
@@ -83,7 +82,7 @@ def kernels(nodes):
     return force, stiffness, bound
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Thrust(Table):
     """A force on a node at the end of a line, along the line's current direction there.
 
@@ -115,10 +114,10 @@ class Thrust(Table):
 
     several = True
 
-    node: object = nodes()
-    line: object = nodes(what="line")
+    node: Several = nodes()
+    line: Several = nodes(what="line")
     force: float = real(unit="N")
-    factor: tuple | None = rows(2, None, increasing=True)
+    factor: Several = rows(2, default=None, increasing=True)
 
     def on(self, net):
         """The family of one element; ``out`` is the power [W]."""

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ..errors import InputError
-from ..tables import Table, nodes, vector
+from ..tables import Several, Table, nodes, table, vector
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Velocity(Table):
     """Initial velocity of each of some nodes; "all" are all nodes that are free.
 
@@ -34,8 +32,8 @@ class Velocity(Table):
 
     several = True
 
-    node: object = nodes()
-    value: tuple = vector(unit="m/s")
+    node: Several = nodes()
+    value: Several = vector(unit="m/s")
 
     def start(self, net, supported, v):
         """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from ..errors import InputError
-from ..tables import LARGEST, Table, by_group, choice, integer, real
+from ..tables import LARGEST, Table, by_group, choice, integer, real, table
 from .groups import givers
 from .tension_laws import NAMES, Law
 
 _DENSE = dict(at_least=0, unit="kg/m³")
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Group(Table):
     """What may differ from `Cable` on the lines of one group; None keeps the cable's value.
 
@@ -45,16 +45,16 @@ class Group(Table):
         prestrain = 1e-3
     """
 
-    modulus: float | None = real(None, above=0, unit="Pa")
-    area: float | None = real(None, above=0, unit="m²")
-    density: float | None = real(None, **_DENSE)
-    slackness: float | None = real(None, at_least=0, unit="1")
-    smoothing: float | None = real(None, at_least=0, unit="1")
-    prestrain: float | None = real(None, above=-1, unit="1")
-    strength: float | None = real(None, above=0, unit="Pa")
+    modulus: float | None = real(default=None, above=0, unit="Pa")
+    area: float | None = real(default=None, above=0, unit="m²")
+    density: float | None = real(default=None, **_DENSE)
+    slackness: float | None = real(default=None, at_least=0, unit="1")
+    smoothing: float | None = real(default=None, at_least=0, unit="1")
+    prestrain: float | None = real(default=None, above=-1, unit="1")
+    strength: float | None = real(default=None, above=0, unit="Pa")
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Cable(Table):
     """Material and section of the lines.
 
@@ -102,13 +102,13 @@ class Cable(Table):
     modulus: float = real(above=0, unit="Pa")
     area: float = real(above=0, unit="m²")
     density: float = real(**_DENSE)
-    slackness: float | None = real(None, at_least=0, unit="1")
-    smoothing: float | None = real(None, at_least=0, unit="1")
-    prestrain: float = real(0.0, above=-1, unit="1")
-    strength: float | None = real(None, above=0, unit="Pa")
+    slackness: float | None = real(default=None, at_least=0, unit="1")
+    smoothing: float | None = real(default=None, at_least=0, unit="1")
+    prestrain: float = real(default=0.0, above=-1, unit="1")
+    strength: float | None = real(default=None, above=0, unit="Pa")
     order: int = choice(1, 2, 3, default=1)
-    subdivide: int = integer(1, at_least=1, at_most=1000)
-    groups: dict = by_group(Group, "cable")
+    subdivide: int = integer(default=1, at_least=1, at_most=1000)
+    groups: dict = by_group(Group, "cable", default_factory=dict)
 
     def check(self):
         """Fill in the smooth law's parameters; refuse them for other laws."""

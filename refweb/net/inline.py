@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError
 from ..messages import shown
-from ..tables import Table, checked, choice, field, node_number, numbers_list, real, rows, texts
+from ..tables import Several, Table, checked, choice, field, node_number, numbers_list, real, rows, table, texts
 from .web import Web, in_range
 
 LENGTH = real(above=0, unit="m")
@@ -46,7 +44,7 @@ def _groups(name, value):
     return {key: checked(f"{name}.{key}", lines, numbers_list(number=node_number)) for key, lines in value.items()}
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Inline(Table):
     """A web given node by node and line by line.
 
@@ -82,12 +80,12 @@ class Inline(Table):
     """
 
     kind: str = choice("inline", default="inline")
-    points: tuple = rows(3, unit="m")
-    lines: tuple = rows(2, number=node_number)
-    natural_length: tuple | float | str = field(_lengths, "distance", "m")
-    supports: tuple = numbers_list((), number=node_number, empty=True)
-    names: dict = field(_names, factory=dict)
-    groups: tuple | dict | None = field(_groups, None)
+    points: Several = rows(3, unit="m")
+    lines: Several = rows(2, number=node_number)
+    natural_length: Several = field(_lengths, default="distance", unit="m")
+    supports: Several = numbers_list(default=(), number=node_number, empty=True)
+    names: dict = field(_names, default_factory=dict)
+    groups: Several = field(_groups, default=None)
 
     def check(self):
         """Refuse supports that are none of the nodes."""

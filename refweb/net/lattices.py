@@ -24,14 +24,13 @@ a corner of a triangle, both of its nodes are on that as well, and ``ring-N`` is
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
-from ..tables import Table, choice, integer, real
+from ..tables import Table, choice, integer, real, table
 from .web import Web
 
 MESHES = ("triangle", "square", "hexagon")
@@ -157,7 +156,7 @@ def _window(mesh, rows, columns, side, kind):
     return Web(points, lines, rim=rim, kind=kind, cells=len(polygons), groups=_directions(points, lines))
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Paper(Table):
     """One of the three webs of the paper's section 3.2, exactly.
 
@@ -202,7 +201,7 @@ class Paper(Table):
         return _window(self.mesh, rows, columns, self.cable_length / lines, "paper")
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Window(Table):
     """A web by the rule of `Paper`, at any size: closed inner web, every outermost node linked to a fixed end.
 
@@ -255,7 +254,7 @@ class Window(Table):
         return _window(self.mesh, self.rows, self.columns, self.side, "window")
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Layers(Table):
     """A web of concentric layers with its frame, fixed at every node of the frame (section 3.1, Figure 9).
 

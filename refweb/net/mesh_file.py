@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,14 +9,14 @@ import numpy as np
 from .. import memory
 from ..errors import InputError
 from ..messages import shown
-from ..tables import Table, choice, text
+from ..tables import Table, choice, table, text
 from .web import Web
 
 FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".msh": "gmsh"}
 """Formats of meshes by the end of their name, as meshio calls them."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class File(Table):
     """A web from a VTK (.vtu, .vtk) or Gmsh (.msh) file that has line cells and no others.
 

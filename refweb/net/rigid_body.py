@@ -4,22 +4,20 @@ How to write a body shape
 -------------------------
 A shape is a file with a class, whose fields are its keys in ``[[body]]``. This one is all that lies behind a plane::
 
-    from dataclasses import dataclass
-
     import numpy as np
 
     from refweb.kernels import kernel
     from refweb.net.rigid_body import Grown, Shape, axes_about
-    from refweb.tables import real, vector
+    from refweb.tables import Several, real, table, vector
 
     @kernel()
     def depth(p, grown):  # at a point along the axes [m]; its gradient; its Hessian [1/m], 00 01 02 11 12 22
         return -p[2], (0.0, 0.0, -1.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-    @dataclass(frozen=True, kw_only=True)
+    @table
     class Wall(Shape):
-        normal: tuple = vector()  # a key that it needs
-        drawn: float = real(2.0, above=0, unit="m")  # one with a default: edge of the square that is drawn
+        normal: Several = vector()  # a key that it needs
+        drawn: float = real(default=2.0, above=0, unit="m")  # one with a default: edge of the square that is drawn
         def check(self):  # raises `refweb.errors.InputError` for what cannot be, here a normal that is zero
             self.frame()
         def frame(self):  # unit vectors of the axes; x, y and z where it is left out

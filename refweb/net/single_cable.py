@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import InputError
-from ..tables import Table, choice, integer, real, vector
+from ..tables import Several, Table, choice, integer, real, table, vector
 from .web import Web
 
 _PARALLEL = 1e-9
 """Sine of the angle below which two directions are parallel."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class SingleCable(Table):
     """One cable with both ends fixed, of lines of equal natural length.
 
@@ -49,11 +47,11 @@ class SingleCable(Table):
     """
 
     kind: str = choice("cable", default="cable")
-    start: tuple = vector(unit="m")
-    end: tuple = vector(unit="m")
+    start: Several = vector(unit="m")
+    end: Several = vector(unit="m")
     elements: int = integer(at_least=1, at_most=1_000_000)
-    length: float | None = real(None, above=0, unit="m")
-    sag: tuple | None = vector(None)
+    length: float | None = real(default=None, above=0, unit="m")
+    sag: Several = vector(default=None)
 
     def check(self):
         """Refuse ends at one place, a direction that is none, and one line that is longer than the distance."""

@@ -112,12 +112,12 @@ class SolutionData:
     bodies: dict = field(default_factory=dict)
 
     @property
-    def results(self):
+    def results(self) -> dict[str, Result]:
         """Results by name, each a `refweb.results.solution.Result`; of the last load step."""
         return Names(self.steps[-1]["results"] if self.steps else self.reduced)
 
     @property
-    def history(self):
+    def history(self) -> dict[str, np.ndarray]:
         """Columns of the history by name, a dict of arrays with one entry per row.
 
         First ``time`` [s], in statics ``step``, then every observable and the energies [J], in dynamics the momentum of

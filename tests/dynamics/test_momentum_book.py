@@ -1,6 +1,6 @@
 """The book of momentum: it closes where runs are right, and refuses those whose impulses are not what was given."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import nets
 import numpy as np
@@ -18,6 +18,7 @@ from refweb.errors import OpenBook
 from refweb.kernels import FORCE, kernel
 from refweb.registry import EFFECTS
 from refweb.system.system import System
+from refweb.tables import table
 
 ROUNDING = 1e-12
 """Share of the largest momentum that rounding may leave: some 1e4 roundings in 1e3 steps."""
@@ -218,7 +219,7 @@ def couple(t, x, v, f, cells, data, out):
         out[c, 0] = data[c, 0] * (v[cells[c, 0], 2] - v[cells[c, 1], 2])
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Couple(refweb.Velocity):
     """Forces on two nodes across their distance, which call themselves internal."""
 

@@ -4,7 +4,6 @@ import inspect
 import re
 import sys
 import textwrap
-from dataclasses import dataclass
 from math import sqrt
 
 import meshio
@@ -16,7 +15,7 @@ from refweb.kernels import kernel
 from refweb.net import rigid_body
 from refweb.net.rigid_body import Grown, Shape
 from refweb.registry import EFFECTS, SHAPES, load
-from refweb.tables import real
+from refweb.tables import real, table
 
 PAGE = inspect.getdoc(rigid_body)
 EXAMPLE, LINE = (textwrap.dedent(block) for block in re.findall(r"::\n\n((?:    .*\n?|\n)+)", PAGE))
@@ -44,13 +43,13 @@ def depth_in_top(p, grown):
     return radius - d, g, (*bend, (g[1] * g[1] - 1.0) / d, g[1] * g[2] / d, (g[2] * g[2] - 1.0) / d)
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Top(Shape):
     """The hull of a large ball below and a small one above."""
 
     lower: float = real(above=0, unit="m")
     upper: float = real(above=0, unit="m")
-    between: float = real(0.4, above=0, unit="m")
+    between: float = real(default=0.4, above=0, unit="m")
 
     def check(self):
         if not self.upper < self.lower < self.upper + self.between:

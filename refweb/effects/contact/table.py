@@ -8,14 +8,14 @@ whose kernels are the same make one family.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest, shown
-from ...tables import Table, field, real
+from ...tables import Table, field, real, table
 from ..base import Family
 from .pair import AWAY, pair_data
 
@@ -27,7 +27,7 @@ def _exponent(name, value):
     return float(value)
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class BodyContact(Table):
     """What differs for one body; the keys are those of `Contact`.
 
@@ -38,11 +38,11 @@ class BodyContact(Table):
         friction = 0.5
     """
 
-    stiffness: float | None = real(None, above=0, unit="N/m")
-    exponent: float | None = field(_exponent, None)
-    damping: float | None = real(None, at_least=0, unit="s/m")
-    friction: float | None = real(None, at_least=0)
-    slip_velocity: float | None = real(None, above=0, unit="m/s")
+    stiffness: float | None = real(default=None, above=0, unit="N/m")
+    exponent: float | None = field(_exponent, default=None)
+    damping: float | None = real(default=None, at_least=0, unit="s/m")
+    friction: float | None = real(default=None, at_least=0)
+    slip_velocity: float | None = real(default=None, above=0, unit="m/s")
 
 
 @accepts(by_name(BodyContact))
@@ -52,7 +52,7 @@ def _bodies(name, value):
     return {k: b if isinstance(b, BodyContact) else BodyContact.read(f"{name}.{k}", b) for k, b in value.items()}
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Contact(Table):
     """Contact of the web with all bodies.
 
@@ -91,12 +91,12 @@ class Contact(Table):
         friction = 0.2
     """
 
-    stiffness: float | None = real(None, above=0, unit="N/m")
-    exponent: float = field(_exponent, 1.0)
-    damping: float = real(0.0, at_least=0, unit="s/m")
-    friction: float = real(0.0, at_least=0)
-    slip_velocity: float = real(1e-2, above=0, unit="m/s")
-    bodies: dict = field(_bodies, factory=dict)
+    stiffness: float | None = real(default=None, above=0, unit="N/m")
+    exponent: float = field(_exponent, default=1.0)
+    damping: float = real(default=0.0, at_least=0, unit="s/m")
+    friction: float = real(default=0.0, at_least=0)
+    slip_velocity: float = real(default=1e-2, above=0, unit="m/s")
+    bodies: dict = field(_bodies, default_factory=dict)
 
     def _of(self, body, key):
         own = getattr(self.bodies.get(body.name), key, None)

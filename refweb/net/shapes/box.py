@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ...errors import InputError
 from ...messages import shown
-from ...tables import real, rows, vector
+from ...tables import Several, real, rows, table, vector
 from ..rigid_body import Grown, Shape, unit
 from .rounding import check_rounding, edge_radius, shrunk
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Box(Shape):
     """A box.
 
@@ -37,9 +35,9 @@ class Box(Shape):
         fixed = true
     """
 
-    size: tuple = vector(unit="m")
-    axes: tuple | None = rows(3, None)
-    rounding: float | None = real(None, above=0, unit="m")
+    size: Several = vector(unit="m")
+    axes: Several = rows(3, default=None)
+    rounding: float | None = real(default=None, above=0, unit="m")
 
     def check(self):
         """Refuse sizes that are not > 0, axes that are not two at right angles and a rounding that is too large."""

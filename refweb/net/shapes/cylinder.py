@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ...tables import real, vector
+from ...tables import Several, real, table, vector
 from ..rigid_body import Grown, Shape, axes_about
 from .rounding import check_rounding, edge_radius, shrunk
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Cylinder(Shape):
     """A cylinder; its axis stands third.
 
@@ -41,8 +39,8 @@ class Cylinder(Shape):
 
     radius: float = real(above=0, unit="m")
     length: float = real(above=0, unit="m")
-    axis: tuple = vector()
-    rounding: float | None = real(None, above=0, unit="m")
+    axis: Several = vector()
+    rounding: float | None = real(default=None, above=0, unit="m")
 
     def check(self):
         """Refuse an axis that is zero and a rounding that is too large."""

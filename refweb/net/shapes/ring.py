@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import InputError
-from ...tables import real, vector
+from ...tables import Several, real, table, vector
 from ..rigid_body import Grown, Shape, axes_about
 
 TUBE = 0.04
 """Thickness of the tube that a ring is drawn as, over its radius."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Ring(Shape):
     """A ring as its web sees it along its normal: no end to it along that axis, which stands third.
 
@@ -41,7 +40,7 @@ class Ring(Shape):
     planar = True
 
     radius: float = real(above=0, unit="m")
-    normal: tuple = vector()
+    normal: Several = vector()
 
     def check(self):
         """Refuse a normal that is zero."""

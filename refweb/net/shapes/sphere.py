@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from ...tables import real
+from ...tables import real, table
 from ..rigid_body import Grown, Shape
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Sphere(Shape):
     """A sphere.
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from ...accepted import accepts
 from ...errors import InputError
 from ...messages import nearest, shown
 from ...registry import OBSERVABLES, load
-from ...tables import Table, choice, component, field, nodes, real, text
+from ...tables import Several, Table, choice, component, field, nodes, real, table, text
 
 SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 """Sign of the peaks that a probe follows, by ``reduce``."""
@@ -21,7 +19,7 @@ def _quantity(name, value):
     return value
 
 
-@dataclass(frozen=True, kw_only=True)
+@table
 class Observe(Table):
     """A named number, followed over time.
 
@@ -72,12 +70,12 @@ class Observe(Table):
 
     name: str = text(most=80)
     quantity: str = field(_quantity)
-    node: object = nodes(None)
-    body: str | None = text(None)
-    line: object = nodes(None, what="line")
-    component: int | None = component(None)
+    node: Several = nodes(default=None)
+    body: str | None = text(default=None)
+    line: Several = nodes(default=None, what="line")
+    component: int | None = component(default=None)
     reduce: str = choice("max", "min", "final", default="final")
-    average: float | None = real(None, above=0.0, unit="s")
+    average: float | None = real(default=None, above=0.0, unit="s")
 
     def check(self):
         """Refuse a node, line or component that the quantity does not have."""
