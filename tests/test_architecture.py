@@ -75,7 +75,18 @@ def name_of(path):
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {name_of(path): ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))}
+def parsed(path):
+    """What runs of a file: without what stands there for type checkers alone."""
+
+    class Running(ast.NodeTransformer):
+        def visit_If(self, node):
+            self.generic_visit(node)
+            return node.orelse if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING" else node
+
+    return Running().visit(ast.parse(path.read_text(encoding="utf-8")))
+
+
+MODULES = {name_of(path): parsed(path) for path in sorted(ROOT.rglob("*.py"))}
 PACKAGES = {name_of(path) for path in ROOT.rglob("__init__.py")}
 
 
