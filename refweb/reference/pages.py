@@ -22,8 +22,8 @@ FIRST = ("web", "cable", "supports", "support")
 LARGE = 1e18
 """Bounds of this size and above are those of all numbers, and not told with each."""
 SUMMARIES = {
-    "web": "Nodes, lines and natural lengths: one of these kinds.",
-    "solve": "What is solved, and how.",
+    "web": f"Nodes, lines and natural lengths, of one kind: {', '.join(WEBS)}.",
+    "solve": f"What is solved, and how: {', '.join(SOLVES)}.",
     "supports": "Supports in place of the web's own.",
     "support": "Supports in addition to others.",
 }
@@ -94,11 +94,13 @@ def pages_of(name):
     InputError
         For a name that is none, with the nearest that is.
     """
-    table = name.strip().strip("[]").strip()
+    table, known = name.strip().strip("[]").strip(), names()
+    table = "scene" if table in (f.name for f in dataclasses.fields(Head)) else table
     head = table.partition(".")[0]
-    known = names()
     if head not in known:
-        raise InputError(f"help {name}: there is no such table, {nearest(head, known)}")
+        owners = [page.name for one in known for page in pages_of(one) if head in (key.name for key in page.keys)]
+        hint = f"it is a key of {', '.join(owners)}" if owners else nearest(head, known)
+        raise InputError(f"help {name}: there is no such table, {hint}")
     found = list(_PAGES.get(head, _part)(head))
     if table == head:
         return found

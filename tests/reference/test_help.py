@@ -141,6 +141,8 @@ def test_overview_has_a_line_for_each_table(capsys):
         ("web.cabel", 'did you mean "web.cable"?'),
         ("solve.dinamic", 'did you mean "solve.dynamic"?'),
         ("gravity.x", 'did you mean "gravity"?'),
+        ("modulus", "it is a key of cable, cable.groups"),
+        ("mesh", "it is a key of web.paper, web.window, web.layers"),
         ("", "known: scene, web, cable"),
     ],
 )
@@ -152,6 +154,7 @@ def test_a_misspelt_table_gets_the_nearest(table, hint, capsys):
 
 def test_a_table_is_found_by_its_header():
     assert as_text("[[load]]") == as_text("load") and as_text("[gravity]") == as_text("gravity")
+    assert as_text("title") == as_text("seed") == as_text("scene")
     assert as_text("web").count("\n[web] kind") + 1 == len(WEBS)
 
 
