@@ -62,7 +62,8 @@ def print_scene(scene, system):
     present = [name_of(EFFECTS, effect) for effect in scene.effects]
     count = {name: present.count(name) for name in present}
     counted = [f"{name} × {times}" if times > 1 else name for name, times in count.items()]
-    groups = f", groups {', '.join(cable.groups)}" if cable.groups else ""
+    named = (f"{name} ({group.law})" if group.law else name for name, group in cable.groups.items())
+    groups = f", groups {', '.join(named)}" if cable.groups else ""
     how = f"{solve.kind}, {solve.method}, "
     if solve.method == "auto":
         from .dynamics.method_choice import decided

@@ -409,7 +409,7 @@ WRONG = [
     ("tite", "x", 'tite = "x": unknown table or key, did you mean "title"?'),
     ("quux", {"a": 1}, "[quux]: unknown table or key, known: schema, title, seed, web"),
     ("links", [{"nodes": [0, 1]}], "[[links]]: unknown table or key"),
-    ("cable.groups", {"end": {"order": 2}}, "[cable] groups.end order = 2: unknown key, known: modulus"),
+    ("cable.groups", {"end": {"order": 2}}, "[cable] groups.end order = 2: unknown key, known: law, modulus"),
     ("solve.start", "equilibrium", '[solve] start = "equilibrium": unknown key, known: kind, method, load_steps, mass'),
     ("solve.duration", 0.25, "[solve] duration = 0.25: unknown key"),
     ("solve.rtol", 1e-6, "[solve] rtol = 1e-06: unknown key, known: kind, method, load_steps"),
@@ -417,7 +417,7 @@ WRONG = [
     ("output", {"frame": 2}, '[output] frame = 2: unknown key, did you mean "frames"?'),
     ("web.suports", [0], '[web] suports = [0]: unknown key, did you mean "supports"?'),
     ("cable.modulos", 1.0, '[cable] modulos = 1.0: unknown key, did you mean "modulus"?'),
-    ("cable.groups", {"end": {"law": "linear"}}, '[cable] groups.end law = "linear": unknown key, known: modulus'),
+    ("cable.groups", {"end": {"law": "linar"}}, '[cable] groups.end law = "linar" must be', 'did you mean "linear"?'),
     # misspelt and missing
     ("web.kind", "inlin", '[web] kind = "inlin": unknown kind, did you mean "inline"?'),
     ("web", {**WINDOW, "mesh": "hexagonn"}, '[web] mesh = "hexagonn" must be one of', 'did you mean "hexagon"?'),

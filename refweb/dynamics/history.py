@@ -30,7 +30,7 @@ def _probes_of_warnings(system, followed):
     largest strain, strains need no look of their own.
     """
     net, scales = system.net, {}
-    if net.law.number == SMOOTH:
+    if (net.laws == SMOOTH).any():
         scales["stress"] = 0, 1.0 / net.area
     if np.isfinite(net.strength).any():
         scales["utilisation"] = 0, 1.0 / (net.area * net.strength)
@@ -57,7 +57,7 @@ def _of_tension(probe):
 def _tells_strain(system, scale):
     """Whether the largest tension times a scale is that of the most strained element, whatever that is."""
     net, lines = system.net, [family for family in system.families if family.lines]
-    if len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping does not tell of strain
+    if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
     numbers = np.column_stack([scale * net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, SLACKNESS : SMOOTHING + 1]])
     return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))

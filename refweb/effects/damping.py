@@ -27,7 +27,7 @@ from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
 from .base import POWER, TENSION, Family, column
-from .line_kernels import gradient, pull_together, strain
+from .line_kernels import gradient, law_of, pull_together, strain
 
 
 @kernel()
@@ -53,7 +53,7 @@ def kernels(law, tau, gradients, weights):
     Parameters
     ----------
     law : int
-        Number of the law.
+        Number of the law, `refweb.net.tension_laws.MIXED` for that of each line.
     tau : int
         Column of τ in the numbers of the lines.
     gradients : tuple of tuple of float
@@ -73,8 +73,9 @@ def kernels(law, tau, gradients, weights):
                 v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
                 rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / data[c, LENGTH]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                pull = viscous(law, e, rate, data[c, tau], axial, slack, smooth)
-                tension = pull + prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
+                own = law_of(law, data, c)
+                pull = viscous(own, e, rate, data[c, tau], axial, slack, smooth)
+                tension = pull + prepared_stress(own, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if q == 0 or tension > largest:
                     largest = tension
                 power -= weights[q] * data[c, LENGTH] * pull * rate
@@ -89,13 +90,14 @@ def kernels(law, tau, gradients, weights):
             return
         for c in range(cells.shape[0]):
             axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
+            own = law_of(law, data, c)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p, speed = (p0 * inverse, p1 * inverse, p2 * inverse), (p0 * w[0] + p1 * w[1] + p2 * w[2]) * inverse
                 rate, share = speed / data[c, LENGTH], weights[q] / data[c, LENGTH]
-                by_strain, by_rate = slopes(law, e, rate, time, axial, slack, smooth)
-                across = weights[q] * viscous(law, e, rate, time, axial, slack, smooth) * inverse
+                by_strain, by_rate = slopes(own, e, rate, time, axial, slack, smooth)
+                across = weights[q] * viscous(own, e, rate, time, axial, slack, smooth) * inverse
                 along, turn = share * by_strain - across, share * by_rate * inverse
                 for i in range(3):
                     for j in range(3):
@@ -111,12 +113,13 @@ def kernels(law, tau, gradients, weights):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
             axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
+            own = law_of(law, data, c)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / data[c, LENGTH]
-                along = weights[q] / data[c, LENGTH] * slopes(law, e, rate, time, axial, slack, smooth)[1]
+                along = weights[q] / data[c, LENGTH] * slopes(own, e, rate, time, axial, slack, smooth)[1]
                 for a in range(nodes):
                     for b in range(nodes):
                         d = along * flat[q * nodes + a] * flat[q * nodes + b]
@@ -217,7 +220,7 @@ class Damping(Table):
         families = []
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-            force, stiffness, damping, bound = kernels(net.law.number, net.column("damping_time"), *element)
+            force, stiffness, damping, bound = kernels(net.law_number, net.column("damping_time"), *element)
             families.append(
                 Family(
                     name="damping",

@@ -19,19 +19,19 @@ from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table, table
 from .base import STRAIN, TENSION, Family
-from .line_kernels import pull_together, strain
+from .line_kernels import law_of, pull_together, strain
 
 
 @functools.cache
 def kernels(law, gradients, weights):
-    """Force, energy, stiffness, bound, strain and length kernels of one law and reference element.
+    """Force, energy, stiffness, bound, strain and length kernels of a law and reference element.
 
     The length kernel writes ∂E/∂L of each element [N].
 
     Parameters
     ----------
     law : int
-        Number of the law.
+        Number of the law, `refweb.net.tension_laws.MIXED` for that of each line.
     gradients : tuple of tuple of float
         dN/dξ by quadrature point and node.
     weights : tuple of float
@@ -47,7 +47,8 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                tension = prepared_stress(law, e, axial, slack, smooth, data[c, G0], data[c, R0])
+                own = law_of(law, data, c)
+                tension = prepared_stress(own, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if q == 0 or tension > largest:
                     largest, stretched = tension, e
                 pull_together(f, cells, c, q, nodes, flat, weights[q] * tension * inverse, p0, p1, p2)
@@ -61,7 +62,8 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                total += weights[q] * energy_density(law, e, axial, slack, smooth)
+                own = law_of(law, data, c)
+                total += weights[q] * energy_density(own, e, axial, slack, smooth)
             out[c] = total * data[c, LENGTH]
 
     @kernel(STIFFNESS)
@@ -71,8 +73,9 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                along = weights[q] * tangent(law, e, axial, slack, smooth) / data[c, LENGTH]
-                tension = stress(law, e, axial, slack, smooth)
+                own = law_of(law, data, c)
+                along = weights[q] * tangent(own, e, axial, slack, smooth) / data[c, LENGTH]
+                tension = stress(own, e, axial, slack, smooth)
                 across = 0.0 if definite and tension < 0.0 else weights[q] * tension * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for a in range(nodes):
@@ -107,16 +110,17 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                pulled = (1.0 + e) * stress(law, e, axial, slack, smooth)
-                total += weights[q] * (energy_density(law, e, axial, slack, smooth) - pulled)
+                own = law_of(law, data, c)
+                pulled = (1.0 + e) * stress(own, e, axial, slack, smooth)
+                total += weights[q] * (energy_density(own, e, axial, slack, smooth) - pulled)
             out[c] = total
 
     return force, energy, stiffness, bound, every_strain, length_force
 
 
 def of(net):
-    """The kernels of a net's law and element."""
-    return kernels(net.law.number, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
+    """The kernels of a net's laws and element."""
+    return kernels(net.law_number, tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist()))
 
 
 def strains(net, x):

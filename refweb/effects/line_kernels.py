@@ -10,7 +10,8 @@ import math
 import numpy as np
 
 from ..kernels import kernel
-from ..net.net import LENGTH, REFERENCE
+from ..net.net import LAW, LENGTH, REFERENCE
+from ..net.tension_laws import MIXED
 
 
 @kernel()
@@ -23,6 +24,12 @@ def gradient(v, cells, c, q, nodes, gradients):
         v1 += d * v[row, 1]
         v2 += d * v[row, 2]
     return v0, v1, v2
+
+
+@kernel()
+def law_of(law, data, c):
+    """Number of the law of cell c, where ``law`` is that of all cells or `MIXED`."""
+    return np.int64(data[c, LAW]) if law == MIXED else law
 
 
 @kernel()

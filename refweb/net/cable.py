@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 
 from ..errors import InputError
+from ..messages import shown
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
 from .groups import givers
-from .tension_laws import NAMES, Law
+from .tension_laws import NAMES, SMOOTH
 
+SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
+"""Parameters of the smooth law where none are given."""
 _DENSE = dict(at_least=0, unit="kg/m³")
 
 
@@ -20,6 +23,8 @@ class Group(Table):
 
     Parameters
     ----------
+    law : {"smooth", "tension-only", "linear"}, optional
+        Tension law; of the smooth one ε0 = 0 and η = 1e-5 where the cable has another and the group none of its own.
     modulus : float, optional
         Asymptotic modulus E [Pa], > 0.
     area : float, optional
@@ -45,6 +50,7 @@ class Group(Table):
         prestrain = 1e-3
     """
 
+    law: str | None = choice(*NAMES, default=None)
     modulus: float | None = real(default=None, above=0, unit="Pa")
     area: float | None = real(default=None, above=0, unit="m²")
     density: float | None = real(default=None, **_DENSE)
@@ -52,6 +58,10 @@ class Group(Table):
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     prestrain: float | None = real(default=None, above=-1, unit="1")
     strength: float | None = real(default=None, above=0, unit="Pa")
+
+    def filled(self):
+        """The group with the smooth law's parameters where it has none."""
+        return replace(self, **{k: v for k, v in SMOOTH_LAW.items() if getattr(self, k) is None})
 
 
 @table
@@ -61,7 +71,8 @@ class Cable(Table):
     Parameters
     ----------
     law : {"smooth", "tension-only", "linear"}
-        Tension law, see `refweb.net.tension_laws`.
+        Tension law, see `refweb.net.tension_laws`. Groups may have others: struts beside cables. Lines that can push
+        end the proven bound that statics has where all lines are tension-only.
     modulus : float
         Asymptotic modulus E [Pa], > 0.
     area : float
@@ -85,9 +96,9 @@ class Cable(Table):
     ------
     InputError
         For an unknown law or order, a number out of these bounds, and slackness or smoothing, of a group as well, with
-        another law than the smooth one; from ``properties``, for a group that no line has, two groups that give one key
-        to the same line, prestrain of a web whose natural lengths are given, and a line whose stiffness or mass is
-        above `refweb.tables.LARGEST`.
+        another law than the smooth one; from ``properties``, the same of a line in several groups, for a group that no
+        line has, two groups that give one key to the same line, prestrain of a web whose natural lengths are given, and
+        a line whose stiffness or mass is above `refweb.tables.LARGEST`.
 
     Examples
     --------
@@ -112,15 +123,18 @@ class Cable(Table):
 
     def check(self):
         """Fill in the smooth law's parameters; refuse them for other laws."""
-        for key, default in (("slackness", 0.0), ("smoothing", 1e-5)):
-            if self.law == "smooth":
+        for owner in (self, *self.groups.values()):
+            for key in SMOOTH_LAW:
+                law, value = owner.law or self.law, getattr(owner, key)
+                if law != "smooth" and value is not None:
+                    raise InputError(f'{key} = {value:g} has no meaning with law = "{law}": leave it out')
+        if self.law == "smooth":
+            for key, default in SMOOTH_LAW.items():
                 if getattr(self, key) is None:
                     object.__setattr__(self, key, default)
-                continue
-            owners = [self, *self.groups.values()]
-            given = [getattr(owner, key) for owner in owners if getattr(owner, key) is not None]
-            if given:
-                raise InputError(f'{key} = {given[0]:g} has no meaning with law = "{self.law}": leave it out')
+            return
+        groups = {name: group.filled() if group.law == "smooth" else group for name, group in self.groups.items()}
+        object.__setattr__(self, "groups", groups)
 
     def properties(self, web):
         """Values for each line of a web.
@@ -128,8 +142,8 @@ class Cable(Table):
         Returns
         -------
         dict of str to ndarray
-            ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength`` (infinite where none is
-            given) and ``natural_length``, each of shape (lines,).
+            ``law`` (its number), ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength``
+            (infinite where none is given) and ``natural_length``, each of shape (lines,).
 
         Raises
         ------
@@ -137,16 +151,7 @@ class Cable(Table):
             For a group that no line has, two groups that give the same key to one line, or prestrain beside given
             natural lengths.
         """
-        given = givers(web.groups, self.groups, len(web.lines), "[cable.groups]")
-        values = {}
-        for f in fields(Group):
-            own = getattr(self, f.name)
-            missing = np.inf if f.name == "strength" else 0.0
-            values[f.name] = np.full(len(web.lines), missing if own is None else own)
-        for key, by in given.items():
-            for number, group in enumerate(self.groups.values()):
-                if getattr(group, key) is not None:
-                    values[key][by == number] = getattr(group, key)
+        values = self._values(web)
         prestrain = values.pop("prestrain")
         if web.length_given and prestrain.any():
             worst = prestrain[np.argmax(np.abs(prestrain))]
@@ -161,7 +166,28 @@ class Cable(Table):
                 raise InputError(f"[cable] line {bad[0]}: {name} = {value[bad[0]]:g} must be ≤ {LARGEST:g} [{unit}]")
         return values
 
-    @property
-    def tension_law(self):
-        """The `refweb.net.tension_laws.Law`."""
-        return Law(self.law)
+    def _values(self, web):
+        """What the cable and its groups give to each line, by key."""
+        given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
+        missing = {"strength": np.inf, "slackness": 0.0, "smoothing": 0.0}
+        for key in (f.name for f in fields(Group)):
+            values[key] = np.full(len(web.lines), _number(self, key, missing))
+            for number, group in enumerate(self.groups.values()):
+                if key in given and getattr(group, key) is not None:
+                    values[key][given[key] == number] = _number(group, key, missing)
+        plain = values["law"] != SMOOTH
+        for key in SMOOTH_LAW:
+            for line in np.flatnonzero(plain & (given.get(key, np.full(len(plain), -1)) >= 0))[:1]:
+                group, law = list(self.groups)[given[key][line]], list(NAMES)[values["law"][line]]
+                raise InputError(
+                    f"[cable.groups] {shown(group)} gives {key} to line {line}, where it has no meaning with law = "
+                    f'"{law}"'
+                )
+            values[key][plain] = 0.0
+        return values
+
+
+def _number(table, key, missing):
+    """A value of a cable or a group as a number, that of ``missing`` where it has none."""
+    value = getattr(table, key)
+    return NAMES[value] if key == "law" else missing[key] if value is None else value

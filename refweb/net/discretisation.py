@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .net import Net
+from .tension_laws import NAMES, Law
 
 
 def basis(points, lines, natural_length, element=None):
@@ -183,14 +184,15 @@ def build(web, cable, quasi_static=False, consistent=False):
     from .elements import line_element
 
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
+    laws = np.unique(given["law"])
     own = {name: np.repeat(value, pieces) for name, value in given.items()}
     length = own["natural_length"] / pieces
     cut = _elements(web, element, pieces, length)
     share = own["density"] * own["area"] * length
     mass, apart = _masses(element, cut.cells, share, len(cut.points), consistent)
-    return Net(
+    net = Net(
         web=web,
-        law=cable.tension_law,
+        law=Law(list(NAMES)[laws[0]]) if len(laws) == 1 else None,
         points=cut.points,
         mass=mass,
         cells=cut.cells,
@@ -207,3 +209,4 @@ def build(web, cable, quasi_static=False, consistent=False):
         cable_mass=float(mass.sum()),
         consistent_minus_lumped=apart,
     )
+    return net if net.law else net.with_column("law", own["law"])

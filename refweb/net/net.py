@@ -11,11 +11,15 @@ from functools import cached_property
 
 import numpy as np
 
+from .tension_laws import MIXED
+
 LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0, R0, REFERENCE = range(7)
 """Columns of `Net.line_data`, what a kernel over lines finds in ``data``; ``data[:, REFERENCE : REFERENCE + 4]`` is
 dX/dξ, constant because lines of a web are straight, and its magnitude. Effects add others by `Net.with_column`."""
 COLUMNS = ("length", "axial_stiffness", "slackness", "smoothing", "g0", "r0", "x", "y", "z", "distance")
 """Names of these columns."""
+LAW = len(COLUMNS)
+"""Column of the number of each element's law, where these differ: the first that is added to a net."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +30,8 @@ class Net:
     ----------
     web : refweb.net.web.Web
         Nodes and lines as the user numbered them.
-    law : refweb.net.tension_laws.Law
-        Tension law of all lines.
+    law : refweb.net.tension_laws.Law or None
+        Tension law of all lines; None where they have several, whose numbers are then in the column `LAW`.
     points : ndarray, shape (rows, 3)
         Reference positions [m]: the web's nodes, those that order and subdivision add, line by line and along each
         line, then bodies.
@@ -87,6 +91,16 @@ class Net:
     bodies: tuple = ()
     spins: int = 0
     columns: tuple = COLUMNS
+
+    @property
+    def law_number(self):
+        """Number of the law in compiled kernels, `refweb.net.tension_laws.MIXED` where there are several."""
+        return MIXED if self.law is None else self.law.number
+
+    @cached_property
+    def laws(self):
+        """Number of the law of each element, shape (cells,)."""
+        return np.full(len(self.cells), self.law.number) if self.law else self.line_data[:, LAW].astype(np.int64)
 
     @property
     def heavy(self):

@@ -23,6 +23,8 @@ from ..messages import nearest
 
 SMOOTH, TENSION_ONLY, LINEAR = 0, 1, 2
 NAMES = {"smooth": SMOOTH, "tension-only": TENSION_ONLY, "linear": LINEAR}
+MIXED = 3
+"""Number of no law, for kernels over lines of several: that of each line stands among its own numbers."""
 
 
 @kernel(inline="always")

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..net.tension_laws import LINEAR, SMOOTH
+from ..net.tension_laws import LINEAR, SMOOTH, Law
 
 
 class State:
@@ -94,8 +94,7 @@ class State:
         net = self.system.net
         held = self.system.supported.all(axis=1)
         held[net.web.bare] = True  # by a link
-        holds = np.ones(len(net.cells), dtype=bool) if net.law.number == LINEAR else ~self.element_slack
-        held[net.cells[holds].ravel()] = True
+        held[net.cells[(net.laws == LINEAR) | ~self.element_slack].ravel()] = True
         return np.flatnonzero(~held[: net.nodes])
 
     @cached_property
@@ -153,8 +152,8 @@ def strain_remark(strain):
 
 def floor_remark(net, stress):
     """A warning where the smooth law's floor exceeds 1 % of the largest stress [Pa]."""
-    if net.law.number == SMOOTH:
-        floor = float((net.law.floor(*net.line_data[:, 1:4].T) / net.area).max())
+    if (smooth := net.laws == SMOOTH).any():
+        floor = float((Law("smooth").floor(*net.line_data[smooth, 1:4].T) / net.area[smooth]).max())
         if floor > 0.01 * stress:
             yield (
                 f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "

@@ -1,8 +1,8 @@
 """Equilibria at load steps, each from the one before, by Newton's method and by ways around where it finds none.
 
 Where all loads are dead the interior point of `refweb.statics.interior_point` leads near an equilibrium. Where Newton's
-method does not end from there either, a series of softer nets does for the tension-only law, and many small steps for
-the smooth one.
+method does not end from there either, a series of softer nets does for the tension-only law, and many small steps where
+lines push. Among bars, which push without limit, Newton's method is alone.
 """
 
 from __future__ import annotations
@@ -60,9 +60,10 @@ def solve(system, load_steps, progress=None):
 
 def _equilibrium(newton, t, x, warm):
     """Equilibrium from the last state, or by a way around."""
-    law, spent = newton.system.net.law.number, dict(nsteps=0, nfev=0, njev=0, nlu=0)
-    path = law != LINEAR and newton.system.dead
-    convex = law == TENSION_ONLY and not newton.turns
+    laws, spent = newton.system.net.laws, dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    path = newton.system.dead and not (laws == LINEAR).any()
+    pulling = bool((laws == TENSION_ONLY).all())
+    convex = pulling and not newton.turns
     try:
         state = newton.solve(t, x, warm=warm, most=WITH_A_WAY_AROUND if path else MOST)
     except NotFound as error:
@@ -79,7 +80,7 @@ def _equilibrium(newton, t, x, warm):
                 state = _by_stiffening(newton, t, x, spent)
             else:  # slack lines that push fold up, one after another
                 state = _by_patience(newton, t, x)
-    if law != TENSION_ONLY and newton.system.dead:
+    if newton.system.dead and not pulling:
         from .lowest import lowest
 
         state = lowest(newton, state)

@@ -20,7 +20,7 @@ import numpy as np
 from ..effects.elasticity import strains
 from ..errors import SolverError
 from ..net.net import AXIAL_STIFFNESS, G0, R0, SLACKNESS, SMOOTHING
-from ..net.tension_laws import SMOOTH
+from ..net.tension_laws import LINEAR, Law
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 
 NOTHING = 1e-9
@@ -48,7 +48,7 @@ def lowest(newton, state):
     system = newton.system
     pushes = bool((state.tension < 0.0).any())
     state.stats["above_lowest"] = None if pushes else 0.0
-    if not pushes or system.net.law.number != SMOOTH:
+    if not pushes or (system.net.laws == LINEAR).any():
         return state
     try:
         plain = _without_smoothing(newton, state)
@@ -104,12 +104,13 @@ def _above(system, state, forces):
     """How far a state may lie above the lowest one [J], by forces that balance the loads."""
     net = system.at(state.step).net
     axial, slackness, smoothing, g0 = map(net.per_bar, (AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0))
+    law = Law("smooth")  # which without smoothing is that of lines that only pull
     size = np.linalg.norm(forces, axis=1)
     g = size / axial + g0  # = (s + √(s² + 4η²))/2 at s = ε − ε0, so that s = g − η²/g
     there = np.where(size > 0.0, slackness + g - smoothing**2 / np.where(g > 0.0, g, 1.0), 0.0)
     stored = axial * (
-        net.law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
-        - net.law.energy_density(there, 1.0, slackness, smoothing)
+        law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
+        - law.energy_density(there, 1.0, slackness, smoothing)
     )
     along = (forces * net.bar_vectors(state.x)).sum(axis=1)
     above = float((net.bar_lengths * (stored + size * (1.0 + there)) - along).sum())

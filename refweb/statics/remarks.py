@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.tension_laws import LINEAR, TENSION_ONLY
+from ..net.tension_laws import LINEAR, NAMES, TENSION_ONLY
 from ..results.state import floor_remark, strain_remark, strength_remark
 
 
@@ -52,7 +52,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
     for text in floor_remark(net, float(state.stress.max())):
         yield "floor", text
     if stats["smallest_pivot"] == -1:
-        law = "bars" if net.law.number == LINEAR else "slack lines under the law's floor"
+        law = "bars" if _bars_push(state) else "slack lines under the law's floor"
         reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
         reason += 'law = "tension-only" has no such states'
         if state.system.rotating:
@@ -60,8 +60,15 @@ def remarks_on(state, stats, utilisation, equilibrium):
         yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
-    if state.system.dead and net.law.number != TENSION_ONLY and stats["smallest_pivot"] != -1:
-        pushing = "bars" if net.law.number == LINEAR else "slack lines"
+    if state.system.dead and (others := np.flatnonzero(net.laws != TENSION_ONLY)).size < len(net.laws) and others.size:
+        law = list(NAMES)[net.laws[others[0]]]
+        yield (
+            "bound",
+            f'line {net.line[others[0]]} can push (law = "{law}"): the proven bound of law = "tension-only" ends with '
+            "it, and ± are estimates",
+        )
+    if state.system.dead and (net.laws != TENSION_ONLY).any() and stats["smallest_pivot"] != -1:
+        pushing = "bars" if _bars_push(state) else "slack lines"
         if equilibrium.stats.get("above_lowest", 0.0) is None:
             yield "others", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
         elif equilibrium.stats.get("unsure"):
@@ -83,6 +90,12 @@ def remarks_on(state, stats, utilisation, equilibrium):
         yield "collapse", text
 
 
+def _bars_push(state):
+    """Whether a line of the linear law pushes, or all lines have it."""
+    bars = state.system.net.laws == LINEAR
+    return bool((bars & (state.element_tension < 0.0)).any() or bars.all())
+
+
 def collapse_remark(state):
     """A warning where lines that do not push have let a net collapse.
 
@@ -91,7 +104,7 @@ def collapse_remark(state):
     no shape that it was given.
     """
     system, net = state.system, state.system.net
-    if net.law.number == LINEAR:
+    if (net.laws == LINEAR).all():
         return
     moved, points = np.linalg.norm(state.x[: net.nodes], axis=1), net.points[: net.nodes]
     driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)

@@ -74,7 +74,8 @@ class Simulation:
     def _smoothing(self):
         """What finds the error of smoothing, None where there is none to be found."""
         scene = self.scene
-        if self.system.net.law.number != SMOOTH or scene.solve.method != "newton" or scene.accuracy.error == "none":
+        smooth = (self.system.net.laws == SMOOTH).any()
+        if not smooth or scene.solve.method != "newton" or scene.accuracy.error == "none":
             return None
         from .smoothing_error import Smoothing
 

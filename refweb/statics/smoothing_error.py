@@ -21,12 +21,9 @@ class Smoothing:
 
     def __init__(self, scene):
         cable = scene.cable
-        groups = {
-            name: replace(group, smoothing=SHARE * group.smoothing) if group.smoothing is not None else group
-            for name, group in cable.groups.items()
-        }
+        groups = {name: _less_smooth(group) for name, group in cable.groups.items()}
         self._observables = scene.observables
-        self._system = scene.replace(cable=replace(cable, smoothing=SHARE * cable.smoothing, groups=groups)).build()
+        self._system = scene.replace(cable=replace(_less_smooth(cable), groups=groups)).build()
         self._newton = Newton(self._system.at_rest())
 
     def errors(self, equilibrium, values):
@@ -38,3 +35,8 @@ class Smoothing:
         state = State(self._system, found.step, found.x)
         there = [o.value(state).value for o in self._observables]
         return [abs(here - other) / (1.0 - SHARE) for here, other in zip(values, there, strict=True)]
+
+
+def _less_smooth(table):
+    """A cable or a group of it with `SHARE` of its smoothing, where it has one."""
+    return table if table.smoothing is None else replace(table, smoothing=SHARE * table.smoothing)

@@ -24,7 +24,7 @@ def remarks_on(here, state, equilibrium):
         yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
-    kinked = (net.law.number != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
+    kinked = (net.laws != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
     if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
         yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
     for text in floor_remark(net, float(state.stress.max())):

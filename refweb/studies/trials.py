@@ -164,7 +164,8 @@ def trials_of(scene):
     }
     if scene.solve.kind == "static":
         cable = scene.cable
-        if cable.law == "linear" or any(group.smoothing is not None for group in cable.groups.values()):
+        own = [group.smoothing is not None or group.law is not None for group in cable.groups.values()]
+        if cable.law == "linear" or any(own):
             del found["newton-smooth"]
         elif cable.law == "smooth":
             found["newton-smooth"] = [t for t in found["newton-smooth"] if t.value != cable.smoothing]

@@ -317,7 +317,7 @@ class System:
     @property
     def convex(self):
         """Whether the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
-        return self.net.law.number == TENSION_ONLY and self.dead
+        return bool((self.net.laws == TENSION_ONLY).all()) and self.dead
 
     @property
     def contact(self):
