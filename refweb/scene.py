@@ -203,7 +203,8 @@ class Scene:
             raise InputError("[web] is a Web made in Python: a scene file cannot hold it; use refweb.Inline")
         web = self.web.to_dict()
         if "path" in web:
-            web["path"] = str((self.folder or pathlib.Path()).joinpath(web["path"]).resolve())
+            for key in ("path", "lines") if "lines" in web else ("path",):
+                web[key] = str((self.folder or pathlib.Path()).joinpath(web[key]).resolve())
         given = {"schema": 1, "title": self.title, "seed": self.seed, "web": web, "cable": self.cable.to_dict()}
         if self.supports is not None:
             given["supports"] = _axes(self.supports.to_dict())

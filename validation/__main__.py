@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import pathlib
 import sys
 import time
@@ -15,6 +16,8 @@ from refweb.messages import nearest
 from .harness import page as report
 from .harness.case import Case, names, run, text
 
+EXTRAS = ("pytest", "mpmath", "clarabel")
+"""What cases import that refweb does not need."""
 FOLDER = pathlib.Path(__file__).parent / "report"
 
 
@@ -26,6 +29,9 @@ def main(arguments=None):
     parser.add_argument("--list", action="store_true", help="print the names of the cases and stop")
     parser.add_argument("--out", type=pathlib.Path, default=FOLDER, help="folder of the report")
     given = parser.parse_args(arguments)
+    missing = [name for name in EXTRAS if importlib.util.find_spec(name) is None]
+    if missing and not given.list:
+        parser.exit(2, f"{parser.prog}: needs {', '.join(missing)}: python -m pip install -e '.[test]'\n")
     if given.list:
         for name in names():
             print(f"{name:28s} {text(name)[0]}")

@@ -1,4 +1,4 @@
-"""Webs from files of meshes, as meshio reads them."""
+"""Webs from files: meshes of VTK and Gmsh, result frames, and CSV of points and lines."""
 
 from __future__ import annotations
 
@@ -6,27 +6,42 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import memory
 from ..errors import InputError
 from ..messages import shown
 from ..tables import Table, choice, table, text
+from .groups import members
 from .web import Web
 
-FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".msh": "gmsh"}
-"""Formats of meshes by the end of their name, as meshio calls them."""
+INNER = {"line": 0, "line3": 1, "line4": 2}
+"""Nodes between the ends of cells that are lines, of which a web takes the ends."""
+HARMLESS = ("vertex", "poly_vertex")
+"""Cells that a web leaves alone."""
 
 
 @table
 class File(Table):
-    """A web from a VTK (.vtu, .vtk) or Gmsh (.msh) file that has line cells and no others.
+    """A web from a VTK file (.vtu, .vtp, .vtk of any version), a Gmsh file (.msh 2.2 or 4.1) or two CSV files.
 
-    Cell data ``natural_length`` [m] and ``group`` (numbers or texts) and point data ``support`` (not 0: fixed) are
-    taken where present; other data is left alone.
+    VTK: cells are lines or polylines; of curved lines the ends count, and vertices do no harm. Taken where present:
+    cell data ``natural_length`` [m], which a polyline shares out by distance, and ``group`` (numbers or texts), and
+    point data ``support`` (not 0: held in all components). A frame of a result folder is the web that it shows, as it
+    was before any displacement, with its natural lengths of that time; what is held in all components is a support.
+
+    Gmsh: physical curves are groups of lines, physical points names of nodes, by their tag where they have no name;
+    points named ``support`` are supports. An element in several curves is one line of several groups. Nodes that no
+    line uses and no point names are left out.
+
+    CSV: ``path`` has the points, with columns x, y, z [m] and, if wanted, name and support (not 0); ``lines`` has the
+    columns i, j, node numbers from 0, and, if wanted, natural_length [m] and group.
+
+    Groups by the web's supports, ``rim``, ``anchors`` and ``inner``, come with every web, see `refweb.net.groups`.
 
     Parameters
     ----------
     path : str
         The file, relative to the scene's folder.
+    lines : str, optional
+        With CSV the file of the lines.
 
     Raises
     ------
@@ -35,8 +50,8 @@ class File(Table):
 
     Notes
     -----
-    meshio reads the file. Of other formats that it knows some refer to files of their own, and it does not come to an
-    end on some that are cut off; it converts them: ``meshio convert net.inp net.vtu``.
+    meshio reads the file, and VTK, in a process of its own, what meshio does not know. Other formats are converted:
+    ``meshio convert net.inp net.vtu``.
 
     Examples
     --------
@@ -47,56 +62,121 @@ class File(Table):
 
     kind: str = choice("file", default="file")
     path: str = text()
+    lines: str | None = text(default=None)
 
     def web(self, base=None):
         """The `Web`; ``base`` is the folder that a relative path starts from."""
+        folder, csv = Path(base or "."), Path(self.path).suffix.lower() == ".csv"
+        if csv != (self.lines is not None):
+            has = f"lines = {shown(self.lines)} has no meaning with" if self.lines else "lines is missing beside"
+            raise InputError(f"{has} path = {shown(self.path)}: CSV has points and lines in two files")
         try:
-            return _web_of(_read(Path(base or ".") / self.path))
+            if csv:
+                from .csv_files import web_of
+
+                return web_of(folder / self.path, folder / self.lines)
+            from .mesh_readers import read
+
+            return _web_of(read(folder / self.path))
         except InputError as error:
             raise InputError(f"path = {shown(self.path)}: {error}") from None
 
 
-def _read(path):
-    """The mesh meshio reads; it reports some failures by printing and leaving the program."""
-    import contextlib
-    import io
-    import warnings
-
-    import meshio
-
-    if not path.is_file():
-        raise InputError(f"there is no file {path}")
-    if path.suffix.lower() not in FORMATS:
-        raise InputError(f"format {shown(path.suffix)} must be one of {', '.join(FORMATS)}: use meshio convert")
-    memory.check(memory.READING * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
-    said = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return meshio.read(path, file_format=FORMATS[path.suffix.lower()])
-    except (Exception, SystemExit) as error:
-        reason = f"{type(error).__name__} {error}" if isinstance(error, Exception) else said.getvalue()
-        reason = " ".join(reason.replace("Error: Couldn't read file", "").replace(str(path), "").split())[:200]
-        raise InputError(f"meshio cannot read {path}; is it whole, and its data numeric? ({reason})") from None
-
-
 def _web_of(mesh):
-    kinds = [block.type for block in mesh.cells]
-    other = sorted(set(kinds) - {"line"})
-    if other or not kinds:
-        raise InputError(f"{', '.join(other) or 'no'} cells: a web has line cells and no others")
+    """The web of a `refweb.net.mesh_readers.Mesh`."""
+    _check_cells(mesh)
     points = np.asarray(mesh.points)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(f"points of shape {points.shape} must have the shape (nodes, 3)")
     points = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
-    lines = np.concatenate([block.data for block in mesh.cells]).astype(np.int64)
-    length, group = (
-        np.concatenate(mesh.cell_data[key]) if key in mesh.cell_data else None for key in ("natural_length", "group")
-    )
-    length = _numbers("natural_length", length, len(lines))
+    count = sum(len(block.cells) for block in mesh.lines)
+    length, group = _joined("natural_length", mesh.lines), _joined("group", mesh.lines)
+    length = _numbers("natural_length", length, count)
+    groups = _group_names(group, count)
     support = _numbers("support", mesh.point_data.get("support"), len(points))
-    rim = () if support is None else np.flatnonzero(support)
-    return Web(points, lines, length, rim=rim, kind="file", groups=_group_names(group, len(lines)))
+    moved = mesh.point_data.get("displacement")
+    if moved is not None and length is not None and support is not None and np.shape(moved) == points.shape:
+        points = points - moved  # a frame, whose points are current positions
+    lines, of, share = _segments(mesh.lines, points)
+    if length is not None:
+        length = length[of] * share
+    groups = None if groups is None else [groups[i] for i in of]
+    if mesh.groups is not None:
+        own = {} if groups is None else members(groups, len(lines))
+        once, place = _merged(lines, mesh)
+        lines, length = lines[once], None if length is None else length[once]
+        groups = {name: np.unique(place[list(cells)]) for name, cells in {**own, **mesh.groups}.items()}
+    rim = mesh.supports if support is None else np.flatnonzero(support)
+    own = dict(kind="file", groups=groups)
+    keep = _kept(mesh, lines, rim, len(points))
+    if keep is None:
+        return Web(points, lines, length, rim=rim, names=mesh.names, **own)
+    new = np.cumsum(keep) - 1
+    names = {name: new[list(nodes)].tolist() for name, nodes in mesh.names.items()}
+    return Web(points[keep], new[lines], length, rim=new[rim], names=names, **own)
+
+
+def _kept(mesh, lines, rim, count):
+    """Which nodes are those of the web, bool of shape (nodes,), None for all.
+
+    Nodes within curved lines are not, and of Gmsh those that no line uses and no physical point names.
+    """
+    keep = np.full(count, mesh.groups is None)
+    curved = [block.cells[:, 2:] for block in mesh.lines if INNER.get(block.kind)]
+    if (keep.all() and not curved) or lines.min() < 0 or lines.max() >= count:  # the web refuses such lines
+        return None
+    for inner in curved:
+        keep[inner] = False
+    keep[lines] = keep[rim] = True
+    for nodes in mesh.names.values():
+        keep[nodes] = True
+    return None if keep.all() else keep
+
+
+def _check_cells(mesh):
+    """Refuse what is no line, and say what there is."""
+    held = {}
+    for block in mesh.blocks:
+        held[block.kind] = held.get(block.kind, 0) + len(block.cells)
+    other = sorted(set(held) - set(INNER) - {"polyline", *HARMLESS})
+    if other or not mesh.lines:
+        text = ", ".join(f"{count} {kind}" for kind, count in sorted(held.items())) or "no"
+        raise InputError(f"it holds {text} cells: a web has lines and no others; {mesh.remedy}")
+
+
+def _segments(blocks, points):
+    """Lines (n, 2) of all blocks, the cell of each, and its share of the cell by distance."""
+    lines, of, share, first = [], [], [], 0
+    for block in blocks:
+        cells = block.cells if block.kind == "polyline" else block.cells[:, :2]
+        pieces = cells.shape[1] - 1
+        own = np.stack([cells[:, :-1], cells[:, 1:]], axis=2).reshape(-1, 2).astype(np.int64)
+        lines.append(own)
+        of.append(first + np.repeat(np.arange(len(cells)), pieces))
+        first += len(cells)
+        if pieces == 1:
+            share.append(np.ones(len(own)))
+            continue
+        size = np.linalg.norm(np.diff(points[own % len(points)], axis=1)[:, 0], axis=1).reshape(-1, pieces)
+        whole = size.sum(axis=1, keepdims=True)
+        share.append((size / np.where(whole > 0.0, whole, 1.0)).ravel())
+    return np.concatenate(lines), np.concatenate(of), np.concatenate(share)
+
+
+def _merged(lines, mesh):
+    """Elements of Gmsh, each once, and the place there of all: one in two groups may be listed twice."""
+    entity = np.concatenate([block.data.get("entity", np.arange(len(block.cells))) for block in mesh.lines])
+    key = np.column_stack([np.sort(lines, axis=1), entity])
+    _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.argsort(order)[number.ravel()]
+    return first[order], place
+
+
+def _joined(key, blocks):
+    """A datum of all cells, None where a block has it not."""
+    values = [block.data.get(key) for block in blocks]
+    return None if any(value is None for value in values) else np.concatenate(values)
 
 
 def _numbers(name, values, count):

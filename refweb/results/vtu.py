@@ -6,7 +6,8 @@ import numpy as np
 
 from .files import write_atomically
 
-POINT_DATA = ("displacement", "velocity", "reaction", "mass")
+POINT_DATA = ("displacement", "velocity", "reaction", "mass", "support")
+"""Names of what is known of nodes; ``support`` is 1 where all components are held, else 0."""
 SHAPE_SIZE = 0.05
 """Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
 CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
@@ -73,6 +74,7 @@ def frame_data(state, shape=None):
     fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
     points, *point_data = (values[: net.nodes].copy() for values in fields)
     curved = [points, *point_data[:2]]
+    point_data.append(state.system.supported[: net.nodes].all(axis=1).astype(float))
     if shape is not None:
         large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
         for values in curved[:2]:

@@ -74,7 +74,7 @@ def test_spoilt_web_files(tmp_path, capsys, suffix, seed):
 
 FOUR = np.array([[0, 0, 0], [1, 0, 0], [2, 0.1, 0], [2, 1, 1 / 3]])
 WRONG_WEBS = {
-    "wrong cells": (net(cells=[("triangle", [[0, 1, 2]])]), "triangle cells: a web has line cells and no others"),
+    "wrong cells": (net(cells=[("triangle", [[0, 1, 2]])]), "it holds 1 triangle cells: a web has lines and no others"),
     "not a number": (net(FOUR * [1, np.nan, 1]), "points[0] = [0.0, nan, 0.0] must be finite"),
     "endless": (net(FOUR + [np.inf, 0, 0]), "points[0] = [inf, 0.0, 0.0] must be finite"),
     "coinciding": (net(FOUR[[0, 0, 2, 3]]), "lines[0] = [0, 1] has no length: its nodes coincide"),
@@ -95,7 +95,11 @@ def test_formats_that_refer_to_others_or_do_not_end(tmp_path, capsys):
     for suffix in (".dat", ".mdpa", ".xdmf", ".inp", ""):
         (tmp_path / f"net{suffix}").write_text("x")
         write(tmp_path, FILE.format(suffix))
-        refused(tmp_path, capsys, f'[web] path = "net{suffix}": format "{suffix}" must be one of .vtu, .vtk, .msh')
+        refused(
+            tmp_path,
+            capsys,
+            f'[web] path = "net{suffix}": format "{suffix}" must be one of .vtu, .vtk, .vtp, .msh, .csv',
+        )
 
 
 def test_entities_are_not_read(tmp_path, capsys):

@@ -166,7 +166,8 @@ def test_frames_open(written, web, solution, read):
             nodal, cell = ({name: np.asarray(d[name]) for name in d} for d in (mesh.point_data, mesh.cell_data))
         assert kind == "line"
         np.testing.assert_array_equal(lines, web.lines)
-        assert set(nodal) == {"displacement", "velocity", "reaction", "mass"}
+        assert set(nodal) == {"displacement", "velocity", "reaction", "mass", "support"}
+        np.testing.assert_array_equal(np.flatnonzero(nodal["support"]), web.rim)
         assert set(cell) == {"tension", "stress", "strain", "natural_length", "slack"}
         for array in (points, *nodal.values(), *cell.values()):
             assert array.dtype == np.float64

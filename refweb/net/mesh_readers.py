@@ -1,0 +1,219 @@
+"""What meshes a file holds: meshio reads it, and VTK what meshio does not know.
+
+meshio leaves out polylines of .vtu files without a word, and knows neither polygonal data nor texts; such files are
+read by VTK. It does so in a process of its own, as it may end the one that it is in on a file that is damaged.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import memory
+from ..errors import InputError
+from ..messages import shown
+
+FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".vtp": None, ".msh": "gmsh"}
+"""Formats of meshes by the end of their name, as meshio calls them; None for what VTK alone reads."""
+LINES = ("line", "line3", "line4", "polyline")
+REMEDIES = {
+    ".msh": "in Gmsh give the curves physical groups and save these alone, Mesh.SaveAll = 0, or mesh by `gmsh -1`",
+    "": "extract the edges of surfaces, in ParaView by Extract Edges, in pyvista by mesh.extract_all_edges()",
+}
+"""What to do with a file that has other cells."""
+BY_VTK = """
+import sys
+import numpy as np
+import pyvista
+mesh = pyvista.read(sys.argv[1])
+mesh = mesh.combine() if isinstance(mesh, pyvista.MultiBlock) else mesh
+mesh = mesh.cast_to_unstructured_grid()
+found = {"points": mesh.points, "types": mesh.celltypes, "cells": mesh.cell_connectivity, "offsets": mesh.offset}
+for kind, data in (("cell", mesh.cell_data), ("point", mesh.point_data)):
+    for name in {"natural_length", "group", "support", "displacement"} & set(data):
+        found[f"{kind} {name}"] = np.asarray(data[name])
+np.savez(sys.argv[2], **found)
+"""
+"""What reads a file by VTK, its path and that of an archive of arrays given."""
+
+
+class Block(NamedTuple):
+    """Cells of one kind with as many nodes: their nodes, shape (cells, nodes), and what is known of each by name."""
+
+    kind: str
+    cells: np.ndarray
+    data: dict
+
+
+class Mesh(NamedTuple):
+    """What a file holds.
+
+    Attributes
+    ----------
+    points : ndarray, shape (nodes, 2 or 3)
+        Positions [m].
+    blocks : list of Block
+        All cells, in the order of the file.
+    point_data : dict of str to ndarray
+        What is known of nodes.
+    remedy : str
+        What to do where there are cells that a web does not have.
+    groups : dict of str to list of int, optional
+        Cells of Gmsh that are lines, by physical group; None for other files.
+    names : dict of str to list of int
+        Nodes by physical point.
+    supports : list of int
+        Nodes of the points named ``support``.
+    """
+
+    points: np.ndarray
+    blocks: list
+    point_data: dict
+    remedy: str
+    groups: dict | None = None
+    names: dict = {}
+    supports: list = []
+
+    @property
+    def lines(self):
+        """Blocks of lines that have any."""
+        return [block for block in self.blocks if block.kind in LINES and len(block.cells)]
+
+
+def read(path):
+    """The `Mesh` in a file."""
+    if not path.is_file():
+        raise InputError(f"there is no file {path}")
+    suffix = path.suffix.lower()
+    if suffix not in FORMATS:
+        known = ", ".join([*FORMATS, ".csv"])
+        raise InputError(f"format {shown(path.suffix)} must be one of {known}: use meshio convert")
+    memory.check(memory.READING * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
+    if FORMATS[suffix] is None or _asks_for_vtk(path, suffix):
+        return _by_vtk(path)
+    try:
+        mesh = _by_meshio(path, FORMATS[suffix])
+    except KeyError as error:  # a type of VTK that meshio has no name for
+        if suffix == ".vtk":
+            return _by_vtk(path)
+        raise _unread(path, f"KeyError {error}") from None
+    if suffix == ".msh":
+        return _of_gmsh(mesh)
+    blocks = [
+        Block(block.type, block.data, {name: data[i] for name, data in mesh.cell_data.items()})
+        for i, block in enumerate(mesh.cells)
+    ]
+    return Mesh(mesh.points, blocks, mesh.point_data, REMEDIES[""])
+
+
+def _asks_for_vtk(path, suffix):
+    """Whether a VTK file has polygonal data, polylines or texts."""
+    if suffix == ".vtk":
+        with path.open("rb") as file:
+            return re.search(rb"^\s*DATASET\s+POLYDATA", file.read(2000), re.MULTILINE | re.IGNORECASE) is not None
+    if suffix != ".vtu":
+        return False
+    whole = path.read_bytes()
+    if b"<!DOCTYPE" in whole or b"<!ENTITY" in whole:
+        return False
+    return b'type="String"' in whole or _has_polylines(path, whole)
+
+
+def _has_polylines(path, whole):
+    """Whether meshio leaves cells of a .vtu file out."""
+    said = sum(map(int, re.findall(rb'NumberOfCells="(\d{1,12})"', whole)))
+    try:
+        return said != sum(len(block.data) for block in _by_meshio(path, "vtu").cells)
+    except (InputError, KeyError):
+        return False
+
+
+def _unread(path, reason, reader="meshio"):
+    reason = " ".join(reason.replace("Error: Couldn't read file", "").replace(str(path), "").split())[:200]
+    if "gmsh:physical" in reason:
+        reason = "some curves or points have a physical group and others none: save with Mesh.SaveAll = 0"
+    return InputError(f"{reader} cannot read {path}; is it whole, and its data numeric? ({reason})")
+
+
+def _by_meshio(path, kind):
+    """The mesh that meshio reads; it reports some failures by printing and leaving the program."""
+    import contextlib
+    import io
+    import warnings
+
+    import meshio
+
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return meshio.read(path, file_format=kind)
+    except KeyError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise _unread(
+            path, f"{type(error).__name__} {error}" if isinstance(error, Exception) else said.getvalue()
+        ) from None
+
+
+def _by_vtk(path):
+    """The `Mesh` that VTK reads in a process of its own."""
+    import subprocess
+    import sys
+    import tempfile
+    from pathlib import Path
+
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / "mesh.npz"
+        ended = subprocess.run([sys.executable, "-c", BY_VTK, str(path), str(target)], capture_output=True, text=True)
+        if ended.returncode or not target.is_file():
+            said = [line for line in ended.stderr.splitlines() if line.strip()]
+            raise _unread(path, said[-1] if said else f"status {ended.returncode}", "VTK")
+        with np.load(target, allow_pickle=False) as archive:
+            found = dict(archive)
+    from meshio import _vtk_common
+
+    names = _vtk_common.vtk_to_meshio_type
+    sizes, types = np.diff(found["offsets"]), found["types"]
+    starts = np.flatnonzero(np.append(True, (np.diff(types) != 0) | (np.diff(sizes) != 0))) if len(types) else []
+    blocks = []
+    for first, last in itertools.pairwise([*starts, len(types)]):
+        cells = found["cells"][found["offsets"][first] : found["offsets"][last]].reshape(last - first, sizes[first])
+        data = {key[5:]: values[first:last] for key, values in found.items() if key.startswith("cell ")}
+        kind = "polyline" if types[first] == 4 else names.get(int(types[first]), f"type {types[first]}")
+        blocks.append(Block(kind, cells, data))
+    point_data = {key[6:]: values for key, values in found.items() if key.startswith("point ")}
+    return Mesh(found["points"], blocks, point_data, REMEDIES[""])
+
+
+def _of_gmsh(mesh):
+    """The `Mesh` of a Gmsh file, with its physical groups."""
+    named = {(int(dim), int(tag)): name for name, (tag, dim) in mesh.field_data.items()}
+    blocks, groups, names, first = [], {}, {}, 0
+    for i, block in enumerate(mesh.cells):
+        own = {key: mesh.cell_data[key][i] for key in ("gmsh:physical", "gmsh:geometrical") if key in mesh.cell_data}
+        data = {key: mesh.cell_data[key][i] for key in ("natural_length", "group") if key in mesh.cell_data}
+        data |= {"entity": own["gmsh:geometrical"]} if "gmsh:geometrical" in own else {}
+        blocks.append(Block(block.type, block.data, data))
+        dim = 0 if block.type == "vertex" else 1
+        if block.type != "vertex" and block.type not in LINES:
+            continue
+        members = {}
+        for tag in np.unique(own.get("gmsh:physical", [])):
+            if tag:
+                name = named.get((dim, int(tag)), str(tag))
+                members.setdefault(name, set()).update(np.flatnonzero(own["gmsh:physical"] == tag).tolist())
+        for name, sets in mesh.cell_sets.items():
+            if not name.startswith("gmsh:") and sets[i] is not None and len(sets[i]):
+                members.setdefault(name, set()).update(np.asarray(sets[i]).tolist())
+        for name, cells in members.items():
+            if dim:
+                groups.setdefault(name, []).extend(first + c for c in sorted(cells))
+            else:
+                names.setdefault(name, []).extend(block.data[sorted(cells), 0].tolist())
+        first += len(block.data) if dim else 0
+    supports = names.pop("support", [])
+    return Mesh(mesh.points, blocks, mesh.point_data, REMEDIES[".msh"], groups, names, supports)
