@@ -45,6 +45,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .settings import Static as Static
     from .settings import Supports as Supports
     from .solution import Solution as Solution
+    from .solution import load as load
     from .studies.cost import Cost as Cost
     from .studies.modes import Modes as Modes
     from .studies.modes import modes as modes

@@ -1,10 +1,9 @@
-"""What a person at a terminal sees: one box before a run, a progress bar, one box after."""
+"""What a person at a terminal sees: one box before a run and one after."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
-import threading
 
 from rich.console import Console
 from rich.panel import Panel
@@ -15,29 +14,7 @@ from .errors import InputError
 from .messages import shown
 from .registry import EFFECTS, INTEGRATORS, name_of
 from .results.provenance import web_of
-from .results.units import prefixed
-
-_SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
-
-
-def readable(value, error, unit):
-    """A value with its error in a readable unit: ``31.4848 mm``, ``2.997291 ± 0.0000017 N``."""
-    factor, prefix = 1.0, ""
-    if unit in _SCALED and value:
-        factor, prefix = prefixed(abs(value))
-    name = "" if unit == "1" else f" {prefix}{unit}"
-    value = value / factor
-    if not error:
-        return f"{value:.6g}{name}"
-    error = error / factor
-    digits = min(max(0, 1 - _exponent(error)), 15)
-    if digits > 9 or error >= 1e4 or abs(value) >= 1e7:
-        return f"{value:.10g} ± {error:.1e}{name}"
-    return f"{value:.{digits}f} ± {error:.{digits}f}{name}"
-
-
-def _exponent(value):
-    return int(f"{value:.1e}".split("e")[1])
+from .results.units import place, readable, scale_of, with_error
 
 
 def _console():
@@ -118,28 +95,40 @@ def _stiffness(scene, system):
             yield "contact", text + readable(allowed(body), None, "m")
 
 
+def _place(result):
+    return place(result["where"], result.get("at", "at"))
+
+
 def _results_of_steps(steps):
-    names = list(steps[-1]["results"])
+    """A row for each load step, of results in columns of one unit each, and last where they stand."""
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    if len(steps) > 1:
-        grid.add_column("step", justify="right")
-    for name in names:
-        grid.add_column(Text(name), justify="right")
-    for step in steps:
-        row = [f"{step['step']:g}"] if len(steps) > 1 else []
-        for name in names:
-            result = step["results"][name]
-            row.append(Text(readable(result["value"], result["error"], result["unit"])))
+    grid.add_column("step", justify="right")
+    loads = "load" in steps[-1]
+    if loads:
+        grid.add_column("load [N]", justify="right")
+    columns = {name: [step["results"][name] for step in steps] for name in steps[-1]["results"]}
+    factors = {}
+    for name, column in columns.items():
+        factors[name], unit = scale_of(max(abs(result["value"]) for result in column), column[-1]["unit"])
+        grid.add_column(Text(f"{name} [{unit}]" if unit else name), justify="right")
+    for n, step in enumerate(steps):
+        row = [f"{step['step']:g}", *([f"{step['load']:.6g}"] if loads else [])]
+        for name, column in columns.items():
+            value, error = column[n]["value"], column[n]["error"]
+            row.append(with_error(value / factors[name], error and error / factors[name]))
         grid.add_row(*row)
+    last = [_place(column[-1]) for column in columns.values()]
+    if any(last):
+        grid.add_row("", *[""] * loads, *(Text(f"at {text}" if text else "") for text in last))
     return grid
 
 
-def _results_over_time(results):
+def _results(results, dynamic):
     grid = Grid.grid(padding=(0, 2))
     for name, result in results.items():
-        where = "" if result["where"] is None else f"at {result['where']}"
         value = readable(result["value"], result["error"], result["unit"])
-        grid.add_row(Text(name), Text(value), Text(f"t = {result['time']:.6g} s"), Text(where))
+        time = [Text(f"t = {result['time']:.6g} s")] if dynamic else []
+        grid.add_row(Text(name), Text(value), *time, Text(f"at {where}" if (where := _place(result)) else ""))
     return grid
 
 
@@ -165,10 +154,10 @@ def _horizon(horizon):
 def print_run(summary, more=()):
     """Print the box of a finished run from the content of its ``run.json``, with ``more`` rows (name, text)."""
     solver, cost, rows = summary["solver"], summary["cost"], []
-    if summary["steps"]:
+    if len(summary["steps"]) > 1:
         rows.append(("results", _results_of_steps(summary["steps"])))
     elif summary["results"]:
-        rows.append(("results", _results_over_time(summary["results"])))
+        rows.append(("results", _results(summary["results"], dynamic=not summary["steps"])))
     if summary["results"]:
         if any(r["error"] is None for r in summary["results"].values()):
             rows.append(("", "a value without ± has no known error"))
@@ -191,6 +180,9 @@ def print_run(summary, more=()):
         text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
         text += f" at line {body['line']}" if body["line"] is not None else ""
         rows.append(("contact", f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]))
+    if worst := summary.get("utilisation"):
+        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
+        rows.append(("strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"))
     rows += more
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
@@ -206,7 +198,7 @@ def print_run(summary, more=()):
         if integrated := solver.get("integrated_impulses"):
             text += f" with {', '.join(integrated)} as integrated"
         rows.append(("solver", text))
-    rows.append(("cost", f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"))
+    rows.append(("cost", _cost(cost)))
     rows += [("warning", text) for text in summary["warnings"]]
     if summary["status"] != "solved":
         resumed = "refweb resume goes on from its last checkpoint" if solver["energy_drift"] is not None else ""
@@ -214,14 +206,16 @@ def print_run(summary, more=()):
     _box(f"{summary['scene']}: {summary['status']}", rows)
 
 
+def _cost(cost):
+    """What a run cost, in words; compiling, which happens once, apart."""
+    text = f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"
+    compiling = cost.get("compile_s") or 0.0
+    return text + (f", of which compiling {compiling:.1f} s, once" if compiling >= 0.1 else "")
+
+
 def print_solution(solution, folder):
     """Print results with their errors, and what they cost."""
-    worst, more = solution.utilisation, []
-    if worst is not None:
-        used, line = worst
-        digits = ".2f" if 0.01 <= used < 100.0 else ".2g"
-        more.append(("strength", f"utilisation {used:{digits}} at line {line}"))
-    print_run(solution.summary(), more)
+    print_run(solution.summary())
     print(f"results in {folder}")
 
 
@@ -278,7 +272,7 @@ def print_cost(summary):
         which = "" if status == "refused" else f", {settings[0]}" + (" and finer" if len(settings) > 1 else "")
         rows.append(({"budget": "left out"}.get(status, status), f"{method}{which}: {message or 'there was no time'}"))
     rows.append(("price", summary["sentence"]))
-    rows.append(("cost", f"{summary['cost']['cpu_s']:.2f} s CPU, {summary['cost']['wall_s']:.2f} s wall"))
+    rows.append(("cost", _cost(summary["cost"])))
     _box(f"{summary['scene']}: what digits cost", rows)
 
 
@@ -321,36 +315,3 @@ def _compared(value):
     if value["interval"] is not None:
         return Text(_between(*value["interval"], value["unit"]))
     return Text(readable(value["value"], value["error"], value["unit"]))
-
-
-@contextlib.contextmanager
-def progress(text="loading and, the first time, compiling kernels", delay=2.0):
-    """A progress bar for whatever lasts over ``delay`` seconds; silent where nobody looks.
-
-    Yields
-    ------
-    callable
-        To be called with a line of text and the share that is done.
-    """
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    bar = Progress(
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    task = bar.add_task(text, total=1.0)
-    timer = threading.Timer(delay, bar.start)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield lambda text, share: bar.update(task, description=text, completed=share)
-    finally:
-        timer.cancel()
-        bar.stop()

@@ -138,6 +138,7 @@ COMMANDS = {
 EXPORTS = (
     "refweb.runner:run",
     "refweb.runner:resume",
+    "refweb.solution:load",
     "refweb.studies.modes:modes",
     "refweb.studies.modes:Modes",
     "refweb.studies.work_precision:cost",

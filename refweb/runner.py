@@ -10,12 +10,13 @@ import numpy as np
 
 from .errors import InputError, TooSoft, in_file
 from .messages import short
-from .results.folder import Folder, check_folder, read_summary
+from .results.folder import Folder, check_folder, is_alive
+from .results.progress import followed
 from .results.provenance import versions, web_of
 from .results.run_status import Clock, recorded
 from .results.solution import as_history
 from .scene import Scene
-from .solution import Solution
+from .solution import Solution, scene_of, summary_of
 
 STIFFENINGS = 8
 """Largest number of times that a run is repeated with a stiffer contact."""
@@ -23,7 +24,7 @@ MOST_TIMES = 200
 """Largest number of times at which it is looked whether what acts from outside moves anything."""
 
 
-def run(scene, out=None, force=False, progress=None, announce=None):
+def run(scene, out=None, force=False, progress=True, announce=None) -> Solution:
     """Solve a scene.
 
     Parameters
@@ -34,8 +35,9 @@ def run(scene, out=None, force=False, progress=None, announce=None):
         Result folder, written while the run goes; without it nothing touches the disk.
     force : bool
         Replace the results of an earlier run in ``out``.
-    progress : callable, optional
-        Called with a line of text and the share that is done, 0 to 1.
+    progress : bool or callable
+        Whether a terminal or a notebook shows how far it is, or what is called with a line of text and the share that
+        is done, 0 to 1.
     announce : callable, optional
         Called with the scene and its system when the input has been accepted.
 
@@ -56,7 +58,7 @@ def run(scene, out=None, force=False, progress=None, announce=None):
     return _solve(scene, out, progress, announce)
 
 
-def resume(folder, progress=None, announce=None):
+def resume(folder, progress=True, announce=None) -> Solution:
     """Go on with a dynamic run that was killed or interrupted or failed, from its last checkpoint.
 
     Central differences come to what the undisturbed run comes to, bit for bit; CVODE and IDA begin anew there, and come
@@ -84,15 +86,12 @@ def resume(folder, progress=None, announce=None):
 
     folder = pathlib.Path(folder)
     name = f"result folder {short(str(folder))}:"
-    if not folder.is_dir():
-        raise InputError(f"{name} is no folder")
-    summary = read_summary(folder)
-    if summary is None or not (folder / "scene.toml").is_file():
-        raise InputError(f"{name} holds no run.json and scene.toml of a run: use refweb run")
+    summary = summary_of(folder)
     if summary.get("status") == "solved":
-        raise InputError(f"{name} holds a solved run: there is nothing to go on with")
-    chosen = tuple(name for name, body in summary.get("bodies", {}).items() if body["chosen"])
-    scene = Scene.load(folder / "scene.toml").replace(chosen=chosen)
+        raise InputError(f"{name} holds a solved run: there is nothing to continue")
+    if is_alive(folder):
+        raise InputError(f"{name} is being written by a run that is alive: wait for its end, or stop it")
+    scene = scene_of(folder, summary)
     if "kind" in summary or scene.solve.kind == "static":
         raise InputError(f"{name} holds no dynamic run, and nothing else has checkpoints: use refweb run --force")
     check_folder(folder, force=True)
@@ -107,7 +106,8 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
     clock, scene, told = Clock(), scene.settled(), []
     while True:
         try:
-            return _attempt(scene, out, progress, announce, clock, told, kept, summary)
+            with followed(progress) as tell:
+                return _attempt(scene, out, tell, announce, clock, told, kept, summary)
         except TooSoft as soft:
             told.append(str(soft))
             scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
@@ -115,7 +115,7 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
                 scene = scene.replace(chosen=())
 
 
-def _attempt(scene, out, progress, announce, clock, told, kept=None, summary=None):
+def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
     """Solve a scene as it stands.
 
     ``told`` are warnings to begin with; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on.
@@ -132,7 +132,6 @@ def _attempt(scene, out, progress, announce, clock, told, kept=None, summary=Non
     solution.columns = simulation.columns
     row = None if kept is None else int(kept["row"])
     folder = Folder(out, scene, solution.columns, solution.summary(), row=row) if out is not None else None
-    tell = progress or (lambda text, share: None)
     try:
         with recorded(solution, clock, lambda: simulation.done):
             simulation.follow(folder, tell)
@@ -163,7 +162,9 @@ def _refine(scene, solution):
     def results(solution):
         return [step["results"] for step in solution.steps] or [solution.reduced]
 
-    found = discretisation_errors(scene.replace(chosen=()), results(solution), lambda finer: results(run(finer)))
+    found = discretisation_errors(
+        scene.replace(chosen=()), results(solution), lambda finer: results(run(finer, progress=False))
+    )
     if not solution.steps:
         solution.reduced = found[0]
     for step, with_errors in zip(solution.steps, found, strict=False):

@@ -205,7 +205,11 @@ class Scene:
         if "path" in web:
             for key in ("path", "lines") if "lines" in web else ("path",):
                 web[key] = str((self.folder or pathlib.Path()).joinpath(web[key]).resolve())
-        given = {"schema": 1, "title": self.title, "seed": self.seed, "web": web, "cable": self.cable.to_dict()}
+        return {"schema": 1, "title": self.title, "seed": self.seed, "web": web, **self._tables()}
+
+    def _tables(self):
+        """Its tables but the web."""
+        given = {"cable": self.cable.to_dict()}
         if self.supports is not None:
             given["supports"] = _axes(self.supports.to_dict())
         if self.support:
@@ -226,6 +230,14 @@ class Scene:
         if self.event:
             given["event"] = [event.to_dict() for event in self.event]
         return given
+
+    def _repr_html_(self):
+        from .results.notebook import of_scene
+
+        sizes = (
+            {"nodes": len(self.web.points), "lines": len(self.web.lines)} if type(self.web).__name__ == "Web" else {}
+        )
+        return of_scene({"web": sizes or self.web.to_dict(), **self._tables()}, self.title)
 
     @property
     def observables(self):

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import pathlib
+
 import numpy as np
 
-from .results.solution import SolutionData
+from .errors import InputError
+from .messages import nearest, short
+from .results.folder import read_summary
+from .results.solution import Result, SolutionData
+from .scene import Scene
 
 
 class Solution(SolutionData):
@@ -65,6 +71,84 @@ class Solution(SolutionData):
         found = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
         return f'<Solution of "{self.scene.title}": {self.status}; {found}>'
 
+    def _repr_html_(self):
+        from .results.notebook import of_solution
+
+        return of_solution(self)
+
+    def to_pyvista(self, frame=-1):
+        """A frame as meshes of pyvista.
+
+        Parameters
+        ----------
+        frame : int
+            Number of the frame, as the files of a result folder and ``refweb picture --frame`` have it; −1 is the last.
+
+        Returns
+        -------
+        pyvista.MultiBlock
+            The block ``web``, and a surface for each body, with the point and cell data of a result folder's frames;
+            the time [s] is the field data ``TimeValue``, in statics the load step.
+
+        Raises
+        ------
+        InputError
+            Where there is no such frame; names the nearest.
+        """
+        import pyvista
+
+        from .results.vtu import meshes
+
+        if self.frames:
+            found = dict(self.frames)
+            state = found[_number(frame, list(found))]
+            time, blocks = state.time, {name: pyvista.from_meshio(mesh) for name, mesh in meshes(state).items()}
+        else:
+            from .pictures.frames import listed
+
+            found = listed(self.path)
+            time, paths = found[_number(frame, list(found))]
+            blocks = {name: pyvista.read(path) for name, path in paths.items()}
+        result = pyvista.MultiBlock(blocks)
+        result.add_field_data([time], "TimeValue")
+        return result
+
+    def to_pandas(self, what="history"):
+        """Results or history as a table of pandas, which is to be installed.
+
+        Parameters
+        ----------
+        what : {"history", "results"}
+            The history by time or load step, a column for each quantity; or the results by name, with the columns
+            ``value``, ``error``, ``unit``, ``time``, ``at`` and ``where``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Of the history ``attrs["units"]`` has the unit of each column and of the index by name, and
+            ``attrs["title"]`` the title of the scene.
+
+        Raises
+        ------
+        InputError
+            Where pandas is not installed, and for another ``what``.
+        """
+        if what not in ("history", "results"):
+            raise InputError(f'what = "{what}" must be "history" or "results", {nearest(what, ["history", "results"])}')
+        try:
+            import pandas
+        except ImportError:
+            raise InputError("to_pandas needs pandas: pip install pandas") from None
+        if what == "results":
+            keys = ("value", "error", "unit", "time", "at", "where")
+            rows = {name: [getattr(result, key) for key in keys] for name, result in self.results.items()}
+            found = pandas.DataFrame.from_dict(rows, orient="index", columns=list(keys))
+            return found.astype({"where": "Int64"})
+        table = pandas.DataFrame(dict(self.history))
+        table = table.set_index(table.columns[0])
+        table.attrs = {"title": self.scene.title, "units": dict(map(_named, self.columns))}
+        return table
+
     def save(self, folder, force=False):
         """Write the result folder.
 
@@ -93,3 +177,110 @@ class Solution(SolutionData):
             out.frame(number, state)
         out.close()
         out.summary(self.summary())
+
+
+def load(folder) -> Solution:
+    """The solution in a result folder, as `refweb.run` returned it.
+
+    Its last state is that of the folder's last frame. The history is read when it is asked for, and a frame when it is
+    drawn. What it cost, its warnings and its status are those of the run: one that was killed has the status "running".
+
+    Parameters
+    ----------
+    folder : path-like
+        Result folder of a run.
+
+    Raises
+    ------
+    InputError
+        Where the folder holds no run, or its scene leads to another web.
+    """
+    folder = pathlib.Path(folder).absolute()
+    summary = summary_of(folder)
+    if "kind" in summary:
+        raise InputError(f"result folder {short(str(folder))}: holds {summary['kind']}, not a run")
+    scene = scene_of(folder, summary)
+    try:
+        found = Solution(scene, path=folder)
+        for key in ("status", "message", "web", "events", "solver", "cost", "versions", "warnings"):
+            setattr(found, key, summary[key])
+        found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
+        if used := summary.get("utilisation"):
+            found.utilisation = used["value"], used["line"]
+        found.steps = [{**step, "results": _results(step["results"])} for step in summary["steps"]]
+        found.reduced = {} if found.steps else _results(summary["results"])
+    except (KeyError, TypeError, AttributeError):
+        raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
+    found.columns, found.state = _columns(folder), _last_state(folder, scene)
+    return found
+
+
+def summary_of(folder):
+    """The content of ``run.json`` in a result folder of refweb, a dict; `InputError` where there is none."""
+    folder = pathlib.Path(folder)
+    name = f"result folder {short(str(folder))}:"
+    if not folder.is_dir():
+        raise InputError(f"{name} is no folder")
+    summary = read_summary(folder)
+    if summary is None or not (folder / "scene.toml").is_file():
+        raise InputError(f"{name} holds no run.json and scene.toml of a run: use refweb run")
+    return summary
+
+
+def scene_of(folder, summary):
+    """The scene in a result folder, with the stiffness of contact that refweb has chosen still its own to choose."""
+    chosen = tuple(name for name, body in summary.get("bodies", {}).items() if body["chosen"])
+    return Scene.load(pathlib.Path(folder) / "scene.toml").replace(chosen=chosen)
+
+
+def _results(given):
+    """Results by name of what ``run.json`` says of them."""
+    found = {name: Result(**one) for name, one in given.items()}
+    for name, one in found.items():
+        if one.interval is not None:
+            ends = (-np.inf if one.interval[0] is None else one.interval[0], one.interval[1])
+            found[name] = one._replace(interval=(ends[0], np.inf if ends[1] is None else ends[1]))
+    return found
+
+
+def _columns(folder):
+    """Names of the columns of the history, with units."""
+    try:
+        with open(folder / "history.csv", encoding="utf-8") as lines:
+            return lines.readline().rstrip("\n").split(",")
+    except (OSError, ValueError) as error:
+        raise InputError(f"{short(str(folder))}/history.csv: cannot be read: {error}") from None
+
+
+def _last_state(folder, scene):
+    """The state of the last frame, None where there is none."""
+    from .results.state import State
+
+    path = folder / "checkpoint.npz"
+    if not path.exists():
+        return None
+    system = scene.build()
+    try:
+        with np.load(path) as kept:
+            time, x, v = float(kept["time"]), kept["displacements"], kept["velocities"]
+    except Exception as error:  # whatever a spoilt file makes of it
+        raise InputError(f"{short(str(path))}: cannot be read: {error}") from None
+    if x.shape != (system.rows, 3):
+        raise InputError(f"{short(str(path))}: is not that of a run that scene.toml leads to")
+    return State(system, time, x, v)
+
+
+def _number(frame, known):
+    """Number of a frame, counted from the end where it is negative."""
+    if -len(known) <= frame < 0:
+        return known[frame]
+    if frame not in known:
+        close = min(known, key=lambda number: abs(number - frame))
+        raise InputError(f"frame = {frame}: there is no such frame, the nearest is {close}, the last {known[-1]}")
+    return frame
+
+
+def _named(column):
+    """(name, unit) of a column with its unit."""
+    name, unit = column.rsplit(" [", 1)
+    return name, unit.removesuffix("]")

@@ -53,7 +53,10 @@ EVERY |= {
     "system.system",
     "system.forces",
 }
-EVERY |= {f"results.{name}" for name in ("state", "solution", "folder", "files", "vtu", "provenance", "run_status")}
+EVERY |= {
+    f"results.{name}"
+    for name in ("state", "solution", "folder", "files", "vtu", "provenance", "progress", "run_status")
+}
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
 TANGENT = {"system.sparsity", "system.factorization"}

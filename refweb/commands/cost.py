@@ -17,12 +17,13 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print what is solved, compare the methods, print what they cost."""
-    from ..console import print_scene, progress
+    from ..console import print_scene
+    from ..results.progress import followed
     from ..studies.work_precision import cost
 
     scene, out = scene_of(arguments), arguments.out
     options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
-    with progress() as tell:
+    with followed(True) as tell:
         found = cost(scene, progress=tell, announce=print_scene, **options)
     show(found.summary())
     if out is not None:

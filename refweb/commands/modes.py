@@ -16,13 +16,14 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print what vibrates, find its modes, print them."""
-    from ..console import print_scene, progress
+    from ..console import print_scene
+    from ..results.progress import followed
     from ..scene import slug
     from ..studies.modes import modes
 
     scene = scene_of(arguments)
     out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
-    with progress() as tell:
+    with followed(True) as tell:
         found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=print_scene)
     show(found.summary())
     print(f"modes in {out}")

@@ -14,15 +14,15 @@ def add_arguments(parser):
 
 def run(arguments):
     """Draw, and print where the picture is."""
-    from ..console import progress
     from ..pictures.pictures import animate, picture
+    from ..results.progress import followed
 
     if arguments.animate:
         if arguments.frame is not None:
             raise InputError(f"--frame {arguments.frame} and --animate exclude each other: leave one out")
-        with progress("drawing") as tell:
+        with followed(True, "drawing") as tell:
             path = animate(arguments.folder, field=arguments.field, out=arguments.out, progress=tell)
     else:
-        with progress("drawing"):
+        with followed(True, "drawing"):
             path = picture(arguments.folder, frame=arguments.frame, field=arguments.field, out=arguments.out)
     print(path)

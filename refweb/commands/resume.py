@@ -9,8 +9,9 @@ def add_arguments(parser):
 def run(arguments):
     """Go on from the last checkpoint, print the results."""
     from .. import runner
-    from ..console import print_scene, print_solution, progress
+    from ..console import print_scene, print_solution
+    from ..results.progress import followed
 
-    with progress() as tell:
+    with followed(True) as tell:
         solution = runner.resume(arguments.folder, progress=tell, announce=print_scene)
     print_solution(solution, arguments.folder)

@@ -20,7 +20,8 @@ def run(arguments):
     from dataclasses import replace
 
     from .. import runner
-    from ..console import print_scene, print_solution, progress
+    from ..console import print_scene, print_solution
+    from ..results.progress import followed
     from ..scene import slug
 
     scene = scene_of(arguments)
@@ -29,7 +30,7 @@ def run(arguments):
             raise InputError(f"--horizon has no meaning for {arguments.scene}: it is static, leave it out")
         scene = scene.replace(accuracy=replace(scene.accuracy, horizon=True))
     out = pathlib.Path(arguments.out if arguments.out is not None else slug(scene.title))
-    with progress() as tell:
+    with followed(True) as tell:
         solution = runner.run(scene, out=out, force=arguments.force, progress=tell, announce=print_scene)
     print_solution(solution, out)
 

@@ -170,7 +170,7 @@ class Watch:
             if o in self._probed and o.average is None:
                 final = o.reduce == "final"
                 where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[at]))
-            results[o.name] = Result(value, None, o.unit, when, where)
+            results[o.name] = Result(value, None, o.unit, when, where, at=None if where is None else o.observable.at)
         return results
 
     def unfilled(self, course):

@@ -28,6 +28,9 @@ RESULT_FILES = re.compile(
 )
 """Files that a run writes, and that ``--force`` removes."""
 
+TABLES = ("history.csv", "modes.csv")
+"""Names of the table that a run writes."""
+
 
 def read_summary(folder):
     """The content of ``run.json`` in a folder, None where there is none that a run of refweb wrote."""
@@ -37,6 +40,43 @@ def read_summary(folder):
         return None
     own = isinstance(run, dict) and isinstance(run.get("versions"), dict) and "refweb" in run["versions"]
     return run if own else None
+
+
+def is_alive(folder):
+    """Whether the run that writes a folder is alive, None where that cannot be told.
+
+    A run holds a lock on its history, which ends with its process, however that ends; not on Windows.
+    """
+    try:
+        import fcntl
+    except ImportError:
+        return None
+    try:
+        with open(next(folder / name for name in TABLES if (folder / name).exists()), "rb") as table:
+            fcntl.flock(table, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except (OSError, StopIteration):
+        return None
+    return False
+
+
+def reached(folder):
+    """How far a run came by the last row of its history, in words; None where there is none."""
+    try:
+        with open(folder / "history.csv", encoding="utf-8") as lines:
+            name, *rows = (line.split(",")[0] for line in lines)
+            return f"{name.split(' [')[0].replace('time', 't')} = {float(rows[-1]):.6g}{' s' * name.startswith('time')}"
+    except (OSError, ValueError, IndexError):
+        return None
+
+
+def _lock(table):
+    """Hold the lock on a history that is open, where there are locks."""
+    with contextlib.suppress(ImportError, OSError):
+        import fcntl
+
+        fcntl.flock(table, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def check_folder(folder, force=False):
@@ -62,6 +102,8 @@ def check_folder(folder, force=False):
         if isinstance(error, InputError):
             raise
         raise InputError(f"{name}: cannot be used: {getattr(error, 'strerror', None) or error}") from None
+    if full and is_alive(folder):
+        raise InputError(f"{name}: is being written by a run that is alive: choose another folder, or stop that run")
     if full and not force:
         raise InputError(f"{name}: is not empty: choose another folder, or force (--force) to replace its results")
     if full and read_summary(folder) is None:
@@ -147,6 +189,7 @@ class Folder:
     def _start(self):
         with self._written():
             self._history = open(self.path / self._table, "wb", buffering=0)
+            _lock(self._history)
         self.row(self._columns)
         self._listed = []
         self._list_frames()
@@ -164,6 +207,7 @@ class Folder:
             raise InputError(f"{self.path / self._table}: is not the history that checkpoint.npz goes with")
         with self._written():
             self._history = open(self.path / self._table, "r+b", buffering=0)
+            _lock(self._history)
             kept = sum(kept)
             self._history.truncate(kept)
             self._history.seek(kept)
@@ -224,13 +268,14 @@ class Folder:
         """Add frames, each a row number and its time, to ``web.pvd``."""
         for row, time in frames:
             names = ["web", *(body.name for body in bodies)]
-            self._listed += [(time, part, f"frames/{name}_{row:06d}.vtu") for part, name in enumerate(names)]
+            self._listed += [(time, part, name, f"frames/{name}_{row:06d}.vtu") for part, name in enumerate(names)]
         self._list_frames()
 
     def _list_frames(self):
         rows = "".join(
-            f'    <DataSet timestep="{number(time)}" group="" part="{part}" file={quoteattr(name)}/>\n'
-            for time, part, name in self._listed
+            f'    <DataSet timestep="{number(time)}" group="" part="{part}" name={quoteattr(name)} '
+            f"file={quoteattr(path)}/>\n"
+            for time, part, name, path in self._listed
         )
         with self._written():
             write_text(

@@ -3,20 +3,48 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import time
 
 from ..errors import SolverError
 
 
+@functools.cache
+def _compiling():
+    """What tells how long numba has compiled so far in this process [s]."""
+    from numba.core import event
+
+    class Compiling(event.Listener):
+        seconds, depth, began = 0.0, 0, 0.0
+
+        def on_start(self, event):
+            if self.depth == 0:
+                self.began = time.perf_counter()
+            self.depth += 1
+
+        def on_end(self, event):
+            self.depth -= 1
+            if self.depth == 0:
+                self.seconds += time.perf_counter() - self.began
+
+    listener = Compiling()
+    event.register("numba:compile", listener)
+    return listener
+
+
 class Clock:
-    """CPU and wall time since it was made."""
+    """CPU and wall time since it was made, and what of it kernels took to compile."""
 
     def __init__(self):
-        self._cpu, self._wall = time.process_time(), time.perf_counter()
+        self._cpu, self._wall, self._compiled = time.process_time(), time.perf_counter(), _compiling().seconds
 
     def spent(self):
-        """What has passed since, ``cpu_s`` and ``wall_s`` [s]."""
-        return {"cpu_s": time.process_time() - self._cpu, "wall_s": time.perf_counter() - self._wall}
+        """What has passed since, ``cpu_s``, ``wall_s`` and ``compile_s`` [s]."""
+        return {
+            "cpu_s": time.process_time() - self._cpu,
+            "wall_s": time.perf_counter() - self._wall,
+            "compile_s": _compiling().seconds - self._compiled,
+        }
 
 
 @contextlib.contextmanager

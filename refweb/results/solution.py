@@ -29,7 +29,8 @@ class Result(NamedTuple):
     ``error`` is that of the solution of the scene as it stands. In statics ``smoothing`` is how far a smooth law's η
     moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
     elements; None where it was not looked for. ``interval`` are the least and the largest value in all equilibria,
-    where parts of the web float; an end that nothing holds is infinite.
+    where parts of the web float; an end that nothing holds is infinite. ``at`` says what ``where`` is the number of,
+    "node" or "line".
     """
 
     value: float
@@ -40,10 +41,13 @@ class Result(NamedTuple):
     smoothing: float | None = None
     discretisation: float | None = None
     interval: tuple[float, float] | None = None
+    at: str | None = None
 
     def plain(self):
         """As a dict, without the errors that were not looked for; an end of an interval that is infinite is None."""
         extra = {key: value for key in ("smoothing", "discretisation") if (value := getattr(self, key)) is not None}
+        if self.where is not None:
+            extra["at"] = self.at
         if self.interval is not None:
             extra["interval"] = [end if np.isfinite(end) else None for end in self.interval]
         return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
@@ -98,7 +102,7 @@ class SolutionData:
     columns: list = field(default_factory=list)
     steps: list = field(default_factory=list)
     solver: dict = field(default_factory=SOLVER.copy)
-    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "by_effect": {}})
+    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0, "by_effect": {}})
     web: dict = field(default_factory=dict)
     versions: dict = field(default_factory=dict)
     status: str = "running"
@@ -148,6 +152,7 @@ class SolutionData:
             "versions": self.versions,
             "seed": self.scene.seed,
             "warnings": self.warnings,
+            **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
             **({"horizon": self.horizon} if self.horizon else {}),
         }

@@ -1,8 +1,51 @@
-"""Prefixes of units, for numbers that people read."""
+"""Numbers that people read: values with their ± in readable units, in one notation."""
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+_SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
+"""Units that take prefixes."""
+FIXED = 1e-4
+"""± below which it is written with a power of ten."""
+MOST_DIGITS = 10
+"""Largest number of significant digits of a value that has a ±; others have 6."""
 
 
 def prefixed(size):
     """(factor, prefix) of the largest factor that is not above a size; nano for what is smaller."""
     return next((pair for pair in PREFIXES if size >= pair[0]), PREFIXES[-1])
+
+
+def scale_of(size, unit):
+    """(factor, name) of the readable unit of a size: ``(1e-3, "mm")``; the name is empty of what has none."""
+    factor, prefix = prefixed(abs(size)) if unit in _SCALED and size else (1.0, "")
+    return factor, "" if unit == "1" else f"{prefix}{unit}"
+
+
+def with_error(value, error):
+    """A number with its ±: ``100.66 ± 0.55``, ``2.9972910 ± 1.7e-06``; without one ``31.4848``.
+
+    ± has two digits, and the value as many as that leaves.
+    """
+    if not error:
+        return f"{value:.6g}"
+    if error >= 1e4 or abs(value) >= 1e7:
+        return f"{value:.{MOST_DIGITS}g} ± {error:.1e}"
+    left = max(0, 1 - _exponent(error))
+    whole = max(1, _exponent(value) + 1) if value else 1
+    text = f"{error:.{left}f}" if error >= FIXED else f"{error:.1e}"
+    return f"{value:.{min(left, MOST_DIGITS - whole)}f} ± {text}"
+
+
+def readable(value, error, unit):
+    """A value with its error in a readable unit: ``31.4848 mm``, ``100.66 ± 0.55 mm``."""
+    factor, name = scale_of(value, unit)
+    text = with_error(value / factor, error and error / factor)
+    return f"{text} {name}".rstrip()
+
+
+def place(where, at):
+    """Where a result stands, in words: ``node 1757``; empty where it stands nowhere."""
+    return "" if where is None else f"{at} {where}"
+
+
+def _exponent(value):
+    return int(f"{value:.1e}".split("e")[1])

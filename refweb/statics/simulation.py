@@ -99,7 +99,8 @@ class Simulation:
             "slack_nodes": len(open_rows(state, found)),
         }
         self._totals = {key: total + stats[key] for key, total in self._totals.items()}
-        solution.steps.append({"step": found.step, "results": results, "solver": stats})
+        load = {"load": load} if (load := _load(self.system, found)) is not None else {}
+        solution.steps.append({"step": found.step, **load, "results": results, "solver": stats})
         solution.solver = {**stats, **self._totals}
         solution.state = state
         if (used := state.utilisation) is not None:
@@ -116,7 +117,11 @@ class Simulation:
         if smoothing is not None:
             smoothed = smoothing.errors(found, [value.value for value in values])
         return {
-            o.name: Result(value.value, error, o.unit, found.step, value.where, moved, None, o.interval(state, found))
+            o.name: Result(
+                *(value.value, error, o.unit, found.step, value.where, moved),
+                interval=o.interval(state, found),
+                at=None if value.where is None else o.observable.at,
+            )
             for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)
         }
 
@@ -124,6 +129,12 @@ class Simulation:
         self.solution.frames.append((len(self.rows) - 1, self.solution.state))
         if folder is not None:
             folder.frame(*self.solution.frames[-1])
+
+
+def _load(system, found):
+    """Sum of the sizes of the forces of ``[[load]]`` at an equilibrium [N], None without any."""
+    forces = [system.force_of(f, found.step, found.x) for f in system.families if f.name == "load"]
+    return float(np.linalg.norm(sum(forces), axis=1).sum()) if forces else None
 
 
 def _passage_of(scene, system):

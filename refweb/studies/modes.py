@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError, in_file
 from ..registry import STATICS, load
 from ..results.folder import Folder, check_folder
+from ..results.progress import followed
 from ..results.provenance import versions, web_of
 from ..results.run_status import Clock, recorded
 from ..results.solution import SOLVER, Result, as_history
@@ -90,7 +91,7 @@ class Modes(Solution):
         out.summary(self.summary())
 
 
-def modes(scene, number=10, out=None, force=False, progress=None, announce=None):
+def modes(scene, number=10, out=None, force=False, progress=True, announce=None) -> Modes:
     """The lowest natural frequencies and mode shapes about an equilibrium, without damping.
 
     Of a static scene the equilibrium is that of each load step; of a dynamic one that at t = 0 under gravity, loads,
@@ -106,8 +107,9 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
         Result folder; without it nothing touches the disk.
     force : bool
         Replace the results of an earlier run in ``out``.
-    progress : callable, optional
-        Called with a line of text and the share that is done, 0 to 1.
+    progress : bool or callable
+        Whether a terminal or a notebook shows how far it is, or what is called with a line of text and the share that
+        is done, 0 to 1.
     announce : callable, optional
         Called with the scene and its system when the input has been accepted.
 
@@ -134,9 +136,8 @@ def modes(scene, number=10, out=None, force=False, progress=None, announce=None)
     if announce is not None:
         announce(scene, system)
     found = Modes(scene, web=web_of(system), versions=versions(), columns=COLUMNS)
-    tell = progress or (lambda text, share: None)
     try:
-        with recorded(found, clock, lambda: f"{len(found.spectra)} load steps"):
+        with recorded(found, clock, lambda: f"{len(found.spectra)} load steps"), followed(progress) as tell:
             _follow(found, rest, number, tell)
     finally:
         found.table = as_history(COLUMNS, [row for here in found.spectra for row in _rows(here)])

@@ -12,6 +12,7 @@ from ..messages import nearest, shown
 from ..registry import OBSERVABLES, load
 from ..results.folder import check_folder
 from ..results.observables.observe import default
+from ..results.progress import followed
 from ..results.provenance import web_of
 from ..results.run_status import Clock, recorded
 from ..scene import Scene
@@ -22,7 +23,7 @@ from .cost import Cost
 from .references import compare
 
 
-def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None, announce=None):
+def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=True, announce=None) -> Cost:
     """Run a scene by every method that takes it, from coarse to fine, and compare errors and CPU times.
 
     Parameters
@@ -70,10 +71,10 @@ def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=None
     ladders = trials.trials_of(scene)
     found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
     try:
-        with recorded(found, clock):
+        with recorded(found, clock), followed(progress) as tell:
             compile_all(ladders, runner)
             deadline = max(began + 0.9 * budget, trials.clock() + 0.5 * budget)  # the rest is for the diagram
-            climb(ladders, runner, deadline, budget, progress or (lambda text, share: None))
+            climb(ladders, runner, deadline, budget, tell)
             if not any(t.status == "solved" for t in found.trials):
                 found.status = "failed"
     finally:

@@ -75,7 +75,9 @@ def is_number(value):
 
 def check_results(results):
     for name, result in results.items():
-        assert isinstance(name, str) and list(result) == ["value", "error", "unit", "time", "where"]
+        place = ["at"] if result["where"] is not None else []
+        assert isinstance(name, str) and list(result) == ["value", "error", "unit", "time", "where", *place]
+        assert result.get("at") in (None, "node", "line")
         assert isinstance(result["value"], float) and isinstance(result["time"], float) and is_number(result["error"])
         assert result["error"] is None or result["error"] > 0.0
         assert result["unit"] in ("m", "N") and isinstance(result["where"], int | None)
@@ -109,12 +111,12 @@ def test_run_json(written, web):
     check_results(run["results"])
     assert [step["step"] for step in run["steps"]] == list(STEPS) and run["results"] == run["steps"][-1]["results"]
     for step in run["steps"]:
-        assert list(step) == ["step", "results", "solver"]
+        assert list(step) == ["step", "load", "results", "solver"]
         check_results(step["results"])
         check_solver(step["solver"])
     check_solver(run["solver"])
     assert run["solver"]["nlu"] == sum(step["solver"]["nlu"] for step in run["steps"])
-    assert list(run["cost"]) == ["cpu_s", "wall_s", "by_effect"]
+    assert list(run["cost"]) == ["cpu_s", "wall_s", "compile_s", "by_effect"]
     assert set(run["cost"]["by_effect"]) == {"elasticity", "gravity", "load"}
     assert all(isinstance(text, str) for text in [*run["versions"].values(), *run["warnings"]])
     assert {"refweb", "python", "numpy", "scipy"} <= set(run["versions"])

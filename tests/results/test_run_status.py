@@ -32,7 +32,7 @@ def test_ends(error, status, message):
     except BaseException as raised:
         assert raised is error
     assert (found.status, found.message) == (status, message)
-    assert found.cost.keys() == {"cpu_s", "wall_s", "by_effect"}
+    assert found.cost.keys() == {"cpu_s", "wall_s", "compile_s", "by_effect"}
     assert 0.01 <= found.cost["wall_s"] <= clock.spent()["wall_s"]
     assert 0.0 <= found.cost["cpu_s"] <= clock.spent()["cpu_s"]
 

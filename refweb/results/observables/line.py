@@ -15,7 +15,7 @@ class Line(Observable):
     element is multiplied, and ``bound(tension, net)``, the error of each element that a proven one of tensions makes.
     """
 
-    keys = ("line",)
+    keys, at = ("line",), "line"
     column = 0
 
     def on(self, system):

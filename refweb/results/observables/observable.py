@@ -35,6 +35,8 @@ class Observable:
         Which of ``node``, ``body``, ``component`` and ``line`` have a meaning; a quantity of the whole net has none.
     dynamic : bool
         Whether it has no meaning in statics.
+    at : str
+        What ``where`` of its value is the number of.
     booked : bool
         Whether dynamics finds it in the energy book, as `refweb.results.observables.book.Booked`, and not by a probe.
     """
@@ -42,6 +44,7 @@ class Observable:
     unit = "1"
     keys: tuple = ()
     dynamic = False
+    at = "node"
     booked = False
 
     def __init__(self, observe):

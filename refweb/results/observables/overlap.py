@@ -15,7 +15,7 @@ class Overlap(Observable):
     With ``reduce = "max"`` it is the deepest of all steps and between them.
     """
 
-    unit, keys = "m", ("body",)
+    unit, keys, at = "m", ("body",), "line"
 
     def on(self, system):
         """Refuse a scene without contact, a body that is none, and none where there are several."""

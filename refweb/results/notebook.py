@@ -1,0 +1,51 @@
+"""What a notebook shows of a scene and of a solution, as HTML."""
+
+from __future__ import annotations
+
+from html import escape
+
+from .units import place, readable
+
+
+def of_solution(solution):
+    """Title, status, results with their ±, warnings, and what it cost."""
+    dynamic = not solution.steps
+    head = ["result", "value", *(["time"] if dynamic else []), "at"]
+    rows = []
+    for name, one in solution.results.items():
+        time = [f"{one.time:.6g} s"] if dynamic else []
+        rows.append([name, readable(one.value, one.error, one.unit), *time, place(one.where, one.at)])
+    said = [solution.message, *(f"warning: {text}" for text in solution.warnings)]
+    cost = f"{solution.solver.get('method')}, {solution.cost['cpu_s']:.2f} s CPU"
+    if len(solution.steps) > 1:
+        said.insert(0, f"at load step {solution.steps[-1]['step']:g}, the last of {len(solution.steps)}")
+    return _part(f"{solution.scene.title}: {solution.status}", _table(head, rows), [*filter(None, said), cost])
+
+
+def of_scene(given, title):
+    """The tables of a scene as its file has them."""
+    rows = []
+    for name, value in given.items():
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, dict):
+                keys = ", ".join(f"{key} = {_short(content)}" for key, content in one.items())
+                rows.append([f"[[{name}]]" if isinstance(value, list) else f"[{name}]", keys])
+    return _part(title, _table(["table", "keys"], rows), [])
+
+
+def _short(value, most=60):
+    text = str(value)
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
+def _table(head, rows):
+    cells = "".join(f"<th style='text-align:left'>{escape(name)}</th>" for name in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td style='text-align:left'>{escape(str(cell))}</td>" for cell in row) + "</tr>"
+        for row in rows
+    )
+    return f"<table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _part(title, table, said):
+    return f"<div><b>{escape(title)}</b>{table}{''.join(f'<div>{escape(text)}</div>' for text in said)}</div>"

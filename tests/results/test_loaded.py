@@ -1,0 +1,253 @@
+"""A solution read back from its folder, as meshes, as tables, in a notebook; and what is said of it."""
+
+import json
+import signal
+import subprocess
+import sys
+import textwrap
+import xml.etree.ElementTree as ElementTree
+
+import numba
+import numpy as np
+import pytest
+
+import refweb
+from refweb.__main__ import main
+from refweb.results.folder import is_alive
+from refweb.results.progress import followed
+from refweb.results.run_status import Clock
+from refweb.results.units import readable, with_error
+
+CABLE = refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0, strength=2e8)
+BALL = refweb.Body(name="ball", radius=0.05, mass=0.2, position=(0, 0, -0.06), velocity=(0, 0, 1))
+
+
+def pressed(**parts):
+    web = refweb.Window(mesh="square", rows=4, columns=4, side=0.1)
+    effects = [refweb.Load(node="centre", force=(0, 0, 1)), refweb.Load(node="centre", force=(2, 0, 0))]
+    solve = refweb.Static(load_steps=[1, 2])
+    return refweb.Scene(**dict(web=web, cable=CABLE, effects=effects, solve=solve, title="pressed") | parts)
+
+
+def hit(**parts):
+    solve = refweb.Dynamic(duration=0.02)
+    return pressed(effects=[BALL, refweb.Contact(stiffness=1e4)], solve=solve, title="hit", **parts)
+
+
+@pytest.fixture(scope="module", params=[pressed, hit])
+def both(request, tmp_path_factory):
+    """(solution as it was run, as it was read back)."""
+    folder = tmp_path_factory.mktemp("loaded") / "run"
+    scene = request.param(output=refweb.Output(frames=1))
+    run = refweb.run(scene, out=folder)
+    return run, refweb.load(folder)
+
+
+def test_what_is_read_back_is_what_was_run(both):
+    run, read = both
+    assert read.results == run.results and read.scene.to_dict() == run.scene.to_dict() and read.warnings == run.warnings
+    for key in ("status", "solver", "cost", "web", "versions", "utilisation", "bodies", "events", "columns"):
+        assert getattr(read, key) == getattr(run, key), key
+    assert [step["results"] for step in read.steps] == [step["results"] for step in run.steps]
+    for key in ("positions", "velocities", "tension", "slack", "reaction"):
+        assert np.array_equal(getattr(read, key), getattr(run, key)), key
+    for name, column in run.history.items():
+        assert np.array_equal(read.history[name], column), name
+
+
+def test_saved_again(both, tmp_path):
+    _, read = both
+    read.save(tmp_path / "copy")
+    assert refweb.load(tmp_path / "copy").results == read.results
+
+
+def test_meshes_of_pyvista(both):
+    run, read = both
+    for solution in both:
+        last, first = solution.to_pyvista(), solution.to_pyvista(0)
+        net = solution.state.system.net
+        assert last.keys() == ["web", *(body.name for body in net.bodies)]
+        assert np.array_equal(last["web"].points, solution.positions)
+        assert np.array_equal(last["web"].cell_data["tension"], solution.tension)
+        assert last["web"].n_cells == len(net.web.lines)
+        assert last.field_data["TimeValue"][0] == solution.state.time > first.field_data["TimeValue"][0]
+        with pytest.raises(refweb.InputError, match="frame = 99: there is no such frame, the nearest is"):
+            solution.to_pyvista(99)
+    assert np.array_equal(run.to_pyvista(0)["web"].points, read.to_pyvista(0)["web"].points)
+
+
+def test_tables_of_pandas(both):
+    pytest.importorskip("pandas", reason="an extra of the user's")
+    run, _ = both
+    table = run.to_pandas()
+    assert table.index.name == next(iter(run.history)) and len(table) == len(run.history["deflection"])
+    assert np.array_equal(table["deflection"], run.history["deflection"])
+    assert table.attrs["units"]["deflection"] == "m" and set(table.attrs["units"]) == set(run.history)
+    results = run.to_pandas("results")
+    assert results.loc["max_tension", "value"] == run.results["max_tension"].value
+    assert results.loc["max_tension", "at"] == "line" and results.loc["deflection", "unit"] == "m"
+
+
+def test_without_pandas(both, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(refweb.InputError, match="^to_pandas needs pandas: pip install pandas$"):
+        both[0].to_pandas()
+    with pytest.raises(refweb.InputError, match='what = "result" must be .*did you mean "results"'):
+        both[0].to_pandas("result")
+
+
+def test_in_a_notebook(both):
+    """Well-formed, with every result, its ± and where it stands; what is a name is no markup."""
+    run, _ = both
+    shown = ElementTree.fromstring(run._repr_html_())
+    cells = [cell.text for cell in shown.iter("td")]
+    for name, one in run.results.items():
+        assert name in cells and readable(one.value, one.error, one.unit) in cells
+    assert f"line {run.results['max_tension'].where}" in cells
+    titled = run.scene.replace(title="<b> & co")
+    page = ElementTree.fromstring(titled._repr_html_())
+    assert page.find("b").text == "<b> & co" and "[solve]" in [cell.text for cell in page.iter("td")]
+    points = np.array([[0.0, 0, 0], [1, 0, 0]])
+    own = refweb.Web(points=points, lines=np.array([[0, 1]]), natural_length=np.ones(1), rim=np.array([0]))
+    assert "nodes = 2" in "".join(ElementTree.fromstring(titled.replace(web=own)._repr_html_()).itertext())
+
+
+def test_where_results_stand(both, capsys):
+    run, read = both
+    assert run.results["deflection"].at == "node" and run.results["max_stress"].at == "line"
+    main(["info", str(read.path)])
+    shown = capsys.readouterr().out
+    for one in run.results.values():
+        assert f"at {one.at} {one.where}" in shown
+    assert f"utilisation {run.utilisation[0]:.2g} at line {run.utilisation[1]}" in shown
+
+
+def test_load_steps_in_columns_of_one_unit(tmp_path, capsys):
+    """The force of ``[[load]]``, the sum of its sizes: 1 N and 2 N on one node are √5 N together."""
+    refweb.run(pressed(), out=tmp_path / "run")
+    main(["info", str(tmp_path / "run")])
+    head, *rows = (line.strip("│ ").split() for line in capsys.readouterr().out.splitlines()[1:4])
+    assert head[:6] == ["results", "step", "load", "[N]", "deflection", "[mm]"]
+    assert [float(row[1]) for row in rows] == pytest.approx([5**0.5, 2 * 5**0.5], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "value, error, text",
+    [
+        (31.4848, None, "31.4848"),
+        (100.6612, 0.553, "100.66 ± 0.55"),
+        (94.2, 32.1, "94 ± 32"),
+        (2.997291, 1.7e-6, "2.9972910 ± 1.7e-06"),
+        (31.48481312345, 2.4e-13, "31.48481312 ± 2.4e-13"),
+        (0.0, 1e-3, "0.0000 ± 0.0010"),
+        (1.5e8, 2e6, "150000000 ± 2.0e+06"),
+    ],
+)
+def test_one_notation(value, error, text):
+    """± has two digits, and the value no more than it leaves."""
+    assert with_error(value, error) == text
+
+
+def test_names_of_blocks(both):
+    """ParaView's reader of collections takes the name of a block from the attribute ``name``."""
+    _, read = both
+    sets = ElementTree.parse(read.path / "web.pvd").iter("DataSet")
+    assert {(one.get("name"), one.get("file").split("/")[1].rsplit("_", 1)[0]) for one in sets} == {
+        (name, name) for name in ("web", *(body.name for body in read.state.system.net.bodies))
+    }
+
+
+def test_what_is_no_run_is_refused(tmp_path):
+    with pytest.raises(refweb.InputError, match="is no folder"):
+        refweb.load(tmp_path / "none")
+    with pytest.raises(refweb.InputError, match=r"holds no run\.json"):
+        refweb.load(tmp_path)
+    refweb.modes(pressed(), 2, out=tmp_path / "modes")
+    with pytest.raises(refweb.InputError, match="holds modes, not a run"):
+        refweb.load(tmp_path / "modes")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no locks that end with a process")
+def test_a_killed_run_says_that_it_is_dead_and_how_far_it_came(tmp_path, capsys):
+    """It says that it is alive before, and nobody may write into its folder then."""
+    scene = tmp_path / "slow.toml"
+    scene.write_text(
+        textwrap.dedent("""
+        [web]
+        kind = "inline"
+        points = [[0, 0, 0], [1, 0, 0]]
+        lines = [[0, 1]]
+        supports = [0]
+        [cable]
+        modulus = 7e7
+        area = 1e-4
+        density = 200.0
+        [solve]
+        kind = "dynamic"
+        duration = 1e4
+        [output]
+        interval = 1e-2
+        frames = 100
+        """)
+    )
+    run = [sys.executable, "-m", "refweb", "run", str(scene), "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path)
+    try:
+        history = tmp_path / "run" / "history.csv"
+        while process.poll() is None and not (history.exists() and history.read_text().count("\n") > 200):
+            pass
+        assert process.poll() is None and is_alive(tmp_path / "run")
+        assert main(["info", str(tmp_path / "run")]) == 0
+        assert "its process is alive" in " ".join(capsys.readouterr().out.split())
+        assert main(["resume", str(tmp_path / "run")]) == 2
+        assert main(["run", str(scene), "--out", str(tmp_path / "run"), "--force"]) == 2
+        assert capsys.readouterr().err.count("a run that is alive") == 2
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    assert is_alive(tmp_path / "run") is False
+    assert main(["info", str(tmp_path / "run"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    last = float(history.read_text().rsplit("\n", 2)[-2].split(",")[0])
+    assert told["status"] == "killed"
+    assert f"its process is dead; it has reached t = {last:.6g} s; refweb resume" in told["message"]
+
+
+def test_a_folder_does_not_hide_a_shipped_scene(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "square-load").mkdir()
+    assert main(["info", "square-load"]) == 0 and "Square web under load" in capsys.readouterr().out
+    assert main(["check", "square-load"]) == 0
+    (tmp_path / "mine").mkdir()
+    assert main(["info", "mine"]) == 2 and "holds no run.json" in capsys.readouterr().err
+
+
+def test_progress_where_somebody_looks(monkeypatch, capsys):
+    """A bar in a terminal, a line in a notebook, nothing in a pipe; what is given is called itself."""
+    told = []
+    with followed(lambda text, share: told.append((text, share))) as tell:
+        tell("so far", 0.5)
+    assert told == [("so far", 0.5)]
+    for progress in (True, False, None):
+        with followed(progress) as tell:
+            tell("so far", 0.5)
+    assert capsys.readouterr().err == ""
+    notebook = type("IPython", (), {"get_ipython": staticmethod(lambda: type("Shell", (), {"kernel": None})())})
+    monkeypatch.setitem(sys.modules, "IPython", notebook)
+    monkeypatch.setattr("refweb.results.progress.DELAY", 0.0)
+    monkeypatch.setattr("refweb.results.progress.APART", -1.0)
+    with followed(True) as tell:
+        tell("so far", 0.5)
+    assert capsys.readouterr().err.startswith("\r 50 %  so far")
+
+
+def test_compiling_is_told_apart():
+    """What is compiled while a clock runs, and no more than the wall has passed; what is compiled already is none."""
+    function = numba.njit(lambda x: x + 1.0)
+    clock = Clock()
+    assert clock.spent()["compile_s"] == 0.0
+    function(1.0)
+    spent = clock.spent()
+    assert 0.0 < spent["compile_s"] <= spent["wall_s"]
+    function(2.0)
+    assert clock.spent()["compile_s"] == spent["compile_s"] and Clock().spent()["compile_s"] == 0.0
