@@ -40,8 +40,8 @@ def _help(verb):
 def main(arguments=None):
     """Run the command line; return the exit status."""
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="replace")
+        if (reconfigure := getattr(stream, "reconfigure", None)) is not None:
+            reconfigure(errors="replace")
     top = parser()
     arguments = top.parse_args(arguments)
     if arguments.version:

@@ -41,17 +41,20 @@ import hashlib
 import os
 import pathlib
 import warnings
+from typing import Any
 
 import numba
 import numba.typed
 from numba import types
+from numba.core import config
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
-from numba.core.typing import Signature
+from numba.core.typing.templates import Signature
 
 # Kernels in typed lists are numba's first-class functions, which it calls experimental at every compilation.
 warnings.filterwarnings("ignore", message="First-class function type feature is experimental")
 
+_config: Any = config  # numba makes its entries at run time, from variables of the environment
 _f, _i = types.float64, types.int32
 
 
@@ -84,8 +87,8 @@ def _cache_folder():
         if b"kernel(" in content or b"ufunc(" in content:
             state.update(content)
     name = f"refweb-{state.hexdigest()[:16]}"
-    if numba.config.CACHE_DIR:
-        return str(pathlib.Path(numba.config.CACHE_DIR) / name)
+    if _config.CACHE_DIR:
+        return str(pathlib.Path(_config.CACHE_DIR) / name)
     if os.access(package, os.W_OK):
         return str(package / "__pycache__" / name)
     return ""  # numba's own choice, a folder of the user's
@@ -119,7 +122,7 @@ def _with_signature(function, signature, options):
 
 
 def _with_entry(function, options):
-    dispatcher = numba.njit(**options)(function)
+    dispatcher: Any = numba.njit(**options)(function)
     captured = [cell.cell_contents for cell in function.__closure__ or ()]
     if any(isinstance(value, Dispatcher) for value in captured):
         dispatcher._cache = _CacheByName(function)
@@ -129,7 +132,8 @@ def _with_entry(function, options):
 
 
 def _body(function, options):
-    dispatcher = numba.njit(**options, no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    bare = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    dispatcher: Any = numba.njit(**bare)(function)
     dispatcher._cache = _CacheOfBodies(function)
     return dispatcher
 
@@ -148,12 +152,12 @@ def _with_body(function, options):
 
 
 def _compile(decorator, function):
-    default = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _folder or default
+    default = _config.CACHE_DIR
+    _config.CACHE_DIR = _folder or default
     try:
         return decorator(function)
     finally:
-        numba.config.CACHE_DIR = default
+        _config.CACHE_DIR = default
 
 
 @functools.cache

@@ -8,7 +8,7 @@ told.
 from __future__ import annotations
 
 import importlib
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 WEBS = {
     "paper": "refweb.net.lattices:Paper",
@@ -167,7 +167,7 @@ def exports():
     return {reference.split(":")[1]: reference for reference in (*EXPORTS, *WEBS.values(), *EFFECTS.values())}
 
 
-def load(reference):
+def load(reference) -> Any:
     """What a ``"module:name"`` or a ``"module"`` stands for."""
     module, _, name = reference.partition(":")
     found = importlib.import_module(module)

@@ -108,10 +108,10 @@ def stored(system, folder):
             f"{name} holds {nodes} nodes, must be those of this scene, {net.nodes}: same web, order and subdivide"
         )
     start = _start_at(system, positions, displacements, velocities, bodies)
-    twin = [given.get(f"twin_{one}") for one in ("displacements", "velocities")]
-    if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in twin):
+    x, v = (given.get(f"twin_{one}") for one in ("displacements", "velocities"))
+    if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
-    return start, _start_at(system, positions - displacements + twin[0], *twin, bodies)
+    return start, _start_at(system, positions - displacements + x, x, v, bodies)
 
 
 def _start_at(system, positions, displacements, velocities, bodies):

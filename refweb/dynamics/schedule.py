@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from .integrators.integrator import History
 
 BLOCK = 0.1
 """Time that a block of rows is meant to take [s]: between two of them a run can be interrupted, and tells where it is.
@@ -77,8 +80,8 @@ class Block(NamedTuple):
     """
 
     first: int
-    history: object
-    compared: object
+    history: History
+    compared: History
 
 
 def _block(integrator, course, schedule, first, count):

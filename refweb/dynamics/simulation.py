@@ -86,7 +86,7 @@ class Simulation:
                 self.begin_of_twin = Start(kept["twin_begin_x"], kept["twin_begin_v"])
         elif scene.start_folder is not None:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
-            if self.begin_of_twin is None and self.begin.v.any():
+            if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
         if kept is None and len(system.corners) > FEW_CORNERS:
             from .corners import remarks_on_corners
@@ -134,7 +134,7 @@ class Simulation:
             except NoEnd as error:
                 if self._ways is None:
                     raise
-                self._fall_back(error, folder)
+                self._fall_back(self._ways, error, folder)
             else:
                 break
 
@@ -143,10 +143,10 @@ class Simulation:
         solve = self.scene.solve
         self.standing = Standing.of(getattr(solve, INTEGRATORS[solve.method].knob), kept)
 
-    def _fall_back(self, error, folder):
+    def _fall_back(self, ways, error, folder):
         """Forget what was computed, and begin with another method; `SolverError` where there is none."""
-        self.solution.warnings.append(self._ways.give_over(error))
-        self.scene, self.solution.reduced, self.solution.solver = self._ways.scene, {}, dict(SOLVER)
+        self.solution.warnings.append(ways.give_over(error))
+        self.scene, self.solution.reduced, self.solution.solver = ways.scene, {}, dict(SOLVER)
         self._stand()
         self.again(folder)
 

@@ -100,7 +100,7 @@ class Twin:
             self._thread.join()
         else:
             self._run(self._simulation.integrator.refined)
-        if self._course is None:
+        if self._course is None or self._rows is None:
             return None
         return TwinRun(self._simulation.watch.results(self._course, self._last), self._course, self._rows)
 

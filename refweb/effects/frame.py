@@ -170,11 +170,21 @@ class Frame(Table):
 
     def _families(self, pulled, turned):
         force, energy, stiffness, coriolis, damping, damping_bound = kernels(pulled[0].shape[1])
-        own = dict(name="frame", book="frame_energy", angular_velocity=self.angular_velocity)
         return [
-            Family(**own, cells=pulled[0], data=pulled[1], force=force, energy=energy, stiffness=stiffness),
             Family(
-                **own,
+                name="frame",
+                book="frame_energy",
+                angular_velocity=self.angular_velocity,
+                cells=pulled[0],
+                data=pulled[1],
+                force=force,
+                energy=energy,
+                stiffness=stiffness,
+            ),
+            Family(
+                name="frame",
+                book="frame_energy",
+                angular_velocity=self.angular_velocity,
                 cells=turned[0],
                 data=turned[1],
                 force=coriolis,

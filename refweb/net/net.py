@@ -8,10 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .tension_laws import MIXED
+
+if TYPE_CHECKING:
+    from .tension_laws import Law
+    from .web import Web
 
 LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0, R0, REFERENCE = range(7)
 """Columns of `Net.line_data`, what a kernel over lines finds in ``data``; ``data[:, REFERENCE : REFERENCE + 4]`` is
@@ -71,8 +76,8 @@ class Net:
         moment of inertia [kg m²] in place of mass.
     """
 
-    web: object
-    law: object
+    web: Web
+    law: Law | None
     points: np.ndarray
     mass: np.ndarray
     cells: np.ndarray

@@ -92,7 +92,7 @@ def listed(folder):
         match = re.fullmatch(r"(.*)_(\d+)\.vtu", Path(item.get("file", "")).name)
         if match:
             frame = found.setdefault(int(match[2]), Listed(float(item.get("timestep", 0)), {}))
-            frame.paths[match[1]] = Path(folder) / item.get("file")
+            frame.paths[match[1]] = Path(folder) / item.get("file", "")
     found = {number: found[number] for number in sorted(found) if "web" in found[number].paths}
     if not found:
         raise InputError(f'"{folder}" has no frames: web.pvd lists no file such as frames/web_000000.vtu')

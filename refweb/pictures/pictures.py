@@ -192,7 +192,7 @@ def _pages(frames, field, supports, heading, size):
         figure = Figure(figsize=(16, 10), dpi=size[0] / 16)
         for image, view, rect, (_, height) in zip(images, stage.views, stage.rectangles, pixels, strict=True):
             axes = figure.add_axes(rect)
-            if drawn:
+            if image is not None:
                 axes.imshow(image, extent=view.extent, aspect="auto", interpolation="none", zorder=0)
             else:
                 render.polygons(axes, models[i], view, height)

@@ -128,11 +128,11 @@ def _image(model, view, size):
     import pyvista
 
     plotter = pyvista.Plotter(off_screen=True, window_size=[SUPERSAMPLING * s for s in size])
-    plotter.background_color = "white"
+    plotter.background_color = pyvista.Color("white")
     for part in model:
         _add(plotter, part)
     _aim(plotter, view)
-    image = plotter.screenshot(return_img=True)[..., :3]
+    image = np.asarray(plotter.screenshot(return_img=True))[..., :3]
     plotter.close()
     if model and np.ptp(image) == 0:
         raise SystemExit("the window stays blank")
@@ -187,9 +187,14 @@ def polygons(axes, model, view, pixels):
     parts = [_flat(part, view, pixel) for part in model]
     corners, colours, depth = (np.concatenate(x) for x in zip(*parts, strict=True))
     order = np.argsort(depth, kind="stable")
-    axes.add_collection(
-        PolyCollection(corners[order], facecolors=colours[order], edgecolors=colours[order], linewidths=0.15)
+    corners, colours = corners[order], colours[order]
+    drawn = PolyCollection(
+        corners,  # pyright: ignore[reportArgumentType]  # it takes an array as well, and makes paths of it at once
+        facecolors=colours,
+        edgecolors=colours,
+        linewidths=0.15,
     )
+    axes.add_collection(drawn)
 
 
 def _flat(part, view, pixel):

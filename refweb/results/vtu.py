@@ -6,11 +6,11 @@ import numpy as np
 
 from .files import write_atomically
 
-POINT_DATA = ("displacement", "velocity", "reaction", "mass", "support")
+POINT_DATA: tuple[str, ...] = ("displacement", "velocity", "reaction", "mass", "support")
 """Names of what is known of nodes; ``support`` is 1 where all components are held, else 0."""
 SHAPE_SIZE = 0.05
 """Largest displacement of a drawn mode over the diagonal of the net's bounding box."""
-CELL_DATA = ("tension", "stress", "strain", "natural_length", "slack")
+CELL_DATA: tuple[str, ...] = ("tension", "stress", "strain", "natural_length", "slack")
 
 
 def meshes(state, shape=None):
@@ -54,7 +54,7 @@ def body_mesh(body, state):
 
     points, triangles = body.surface(state.position[body.row])
     data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
-    point_data = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
+    point_data: dict = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
     return meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
 
 

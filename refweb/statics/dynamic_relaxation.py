@@ -123,7 +123,7 @@ class Relaxation:
             done += LOOK
             self.progress(f"step {t:g}, residual {error:.0e}")
         self.scale = scale
-        stats = dict(nsteps=done, nfev=done, njev=0, nlu=0, residual=float(error))
+        stats: dict = dict(nsteps=done, nfev=done, njev=0, nlu=0, residual=float(error))
         if system.dead and not system.convex:
             stats["above_lowest"] = None if (per_cell.tension < 0.0).any() else 0.0
         state = Equilibrium(t, x, per_cell.tension.copy(), f, stats)

@@ -193,7 +193,7 @@ class NullSpace:
                 move.ravel()[system.free] = found / np.abs(found).max()
         for held in system.unsupported_parts:  # which the tangent's anchors hold
             moves[:, held.rows, held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (SAMPLES, 1))
-        free = (np.abs(moves) > OPEN).any(axis=0)
+        free = np.any(np.abs(moves) > OPEN, axis=0)
         # What may move at no cost turns as well, where it goes on: its other components change to second order.
         free |= free.any(axis=1)[:, None] & ~system.supported
         return Floating(free, moves) if free.any() else None

@@ -102,7 +102,7 @@ class Newton:
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
-        stats = dict(nsteps=0, nfev=0, njev=0, nlu=0)
+        stats: dict = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         here, search = self._evaluated(t, x, stats), self._search(t, x)
         scale, best = self._scale(t, here), np.inf
         shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2) * (1e-4 if warm else 1.0)

@@ -7,6 +7,7 @@ import math
 import pathlib
 from dataclasses import dataclass, field
 from itertools import takewhile
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,10 @@ from ..results.files import as_toml, write_atomically, write_text
 from ..results.folder import check_folder, clear
 from ..results.provenance import versions
 from . import dop853
+
+if TYPE_CHECKING:
+    from ..results.observables.observe import Observe
+    from ..scene import Scene
 
 COLUMNS = "method setting error_observable error_state cpu_s nfev njev nlu nsteps status".split()
 """Columns of ``cost.csv``."""
@@ -57,8 +62,8 @@ class Cost:
         ``cpu_s`` and ``wall_s`` of all of it [s].
     """
 
-    scene: object
-    observable: object
+    scene: Scene
+    observable: Observe
     trials: list
     web: dict
     references: tuple = ()

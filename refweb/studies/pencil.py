@@ -8,6 +8,8 @@ the others.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
@@ -56,7 +58,8 @@ class Pencil:
         pattern, net = system.pattern, system.net
         self._stiffness, self._mass = system.stiffness(t, x), system.mass.values
         self.K, self.M = pattern.matrix(self._stiffness), pattern.matrix(self._mass)
-        self._factor, self._inner = Factor(pattern), None
+        self._factor = Factor(pattern)
+        self._inner: Any = None  # LU of the stiffness of what has no mass, where there is any
         own = self.M.diagonal()
         self.massive, self.massless = np.flatnonzero(own > 0.0), np.flatnonzero(own == 0.0)
         if not len(self.massive):
@@ -122,7 +125,7 @@ class Pencil:
             squared, parts = shift + 1.0 / inverse[: -size - 1 : -1], parts[:, : -size - 1 : -1]
         else:
             start = np.random.default_rng(self.seed + attempt).standard_normal(unknowns)
-            operator = LinearOperator(mass.shape, matvec=self._flexible, dtype=float)
+            operator = LinearOperator(mass.shape, matvec=self._flexible, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
             try:
                 squared, parts = eigsh(mass, size, mass, shift, which="LA", v0=start, OPinv=operator)
             except ArpackError as error:

@@ -221,8 +221,8 @@ class Dynamics:
         """Evaluations of forces of a trial, None where only a run can tell."""
         if trial not in self._ahead:
             integrator = None if trial.make is None else self._integrator(trial)
-            known = hasattr(integrator, "evaluations")
-            self._ahead[trial] = integrator.evaluations(self.times[-1]) if known else None
+            known = getattr(integrator, "evaluations", None)
+            self._ahead[trial] = None if known is None else known(self.times[-1])
         return self._ahead[trial]
 
     def run(self, trial, deadline):

@@ -234,7 +234,10 @@ def _some(gyroscopic, wanted, solve, attempt):
         return np.concatenate([first, weigh.solve(u[size:].real) + 1j * weigh.solve(u[size:].imag)])
 
     shape = (2 * size, 2 * size)
-    B, A, inverse = (LinearOperator(shape, matvec=by, dtype=complex) for by in (times, heavy, light))
+    B, A, inverse = (
+        LinearOperator(shape, matvec=by, dtype=complex)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
+        for by in (times, heavy, light)
+    )
     start = np.random.default_rng(pencil.seed + attempt).standard_normal(2 * size).astype(complex)
     try:
         found, vectors = eigsh(B, wanted, A, which="LA", v0=start, Minv=inverse)
@@ -256,27 +259,27 @@ def _general(gyroscopic, number, least):
     size = len(K)
     found, parts = np.linalg.eig(np.block([[np.zeros_like(K), np.eye(size)], [-K, -G]]))
     none = SMALL * np.sqrt(abs(K).sum(axis=0).max())
-    least_growth = np.maximum(none, 1e-6 * abs(found))
-    grows = (found.real > least_growth) & (found.imag > -none)
-    turns = (abs(found.real) <= least_growth) & (found.imag > none)
+    least_growth, growth, turn = np.maximum(none, 1e-6 * abs(found)), np.real(found), np.imag(found)
+    grows = (growth > least_growth) & (turn > -none)
+    turns = (abs(growth) <= least_growth) & (turn > none)
     if not (grows.any() or turns.any()):
         raise SolverError(f"no mode at step {gyroscopic.pencil.t:g}: nothing that has mass has stiffness or is turned")
     kept = np.flatnonzero(grows | turns)
-    kept = kept[np.argsort(np.where(grows, -found.real, found.imag)[kept])][:number]
+    kept = kept[np.argsort(np.where(grows, -growth, turn)[kept])][:number]
     rates, grown = found[kept], grows[kept]
     vectors = gyroscopic.whole(scipy.linalg.solve_triangular(root.T, parts[:size, kept]))
     stiff, turned = gyroscopic.forms(vectors)
     split = np.sqrt(abs(turned**2 + 4.0 * stiff))
     split = np.where(split**2 < 64.0 * np.finfo(float).eps * (turned**2 + 4.0 * abs(stiff)), 0.0, split)
     roots = np.array([0.5 * (turned + split), 0.5 * (turned - split)])
-    omega = roots[abs(roots - rates.imag).argmin(axis=0), np.arange(len(kept))]
+    omega = roots[abs(roots - np.imag(rates)).argmin(axis=0), np.arange(len(kept))]
     rates = np.where(grown, rates, 1j * omega)
     rest = gyroscopic.weighed(gyroscopic.rest(rates, vectors))
     rounding = 8.0 * np.finfo(float).eps * (abs(stiff) + abs(rates * turned) + abs(rates) ** 2)
     off = rest + rounding + least(vectors)
     off = 2.0 * off / (split + np.sqrt(split**2 + 4.0 * off))
-    value = np.where(grown, rates.real, omega)
+    value = np.where(grown, np.real(rates), omega)
     squared = np.where(grown, -1.0, 1.0) * value**2
-    flutter = grows & (abs(found.imag) > none)  # four rates each, the others two
+    flutter = grows & (abs(turn) > none)  # four rates each, the others two
     zero = size - int(turns.sum()) - int(grows.sum()) - int(flutter.sum())
     return Pairs(squared, 2.0 * abs(value) * off + off**2, rest, vectors, int(grows.sum()), zero)

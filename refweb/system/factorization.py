@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 
@@ -10,8 +12,8 @@ class Factor:
 
     def __init__(self, pattern):
         self.pattern = pattern
-        self._solver = None
-        self._matrix = None
+        self._solver: Any = None
+        self._matrix: Any = None
 
     def update(self, values):
         """Factorize the symmetric matrix of these values."""
@@ -56,7 +58,7 @@ class Factor:
 
 
 class Lu:
-    """LU of matrices of one `refweb.system.sparsity.Pattern`, with `update` and `solve` of a `Factor`."""
+    """LU of matrices of one `refweb.system.sparsity.Pattern`, with what a `Factor` has."""
 
     def __init__(self, pattern):
         self.pattern = pattern
@@ -77,6 +79,10 @@ class Lu:
             return None
         y = self._solver.solve(b)
         return y if np.isfinite(y).all() else None
+
+    def negative_pivots(self) -> int:
+        """No signs of pivots tell of what is not symmetric."""
+        raise NotImplementedError
 
 
 def weak_pivot(solver):

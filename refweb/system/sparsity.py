@@ -51,7 +51,7 @@ class Pattern:
         self.size = n = len(free)
         number = np.full(3 * rows, -1, dtype=np.int64)
         number[free] = np.arange(n)
-        keys = [np.arange(n) * (n + 1)]
+        keys: list[np.ndarray] = [np.arange(n) * (n + 1)]
         for family in cells:
             unknowns = number[(3 * family[:, :, None] + np.arange(3)).reshape(len(family), -1)]
             i, j = unknowns[:, :, None], unknowns[:, None, :]

@@ -31,7 +31,7 @@ from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
-SHARED = CLOCK.names[:-4]
+SHARED = tuple(CLOCK.names or ())[:-4]
 """Numbers that a course and the loop's clock have in common."""
 
 
@@ -53,7 +53,7 @@ class ExplicitCourse(Course):
 
     force: np.ndarray
     power: np.ndarray
-    before: np.ndarray | None = field(default=None, metadata={"saved": False})
+    before: np.ndarray = field(init=False, metadata={"saved": False})
 
     def __post_init__(self):
         self.before = np.stack([self.x, self.v, self.force])
@@ -168,11 +168,22 @@ class CentralDifference(Integrator):
         averages = begin_averages(self._observed.windows, extremes)
         extremes.recent[:, 2] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
-        book = dict(work=work, energy=own.sum(), largest=max(np.abs(own).sum(), self._least))
         ledger = Ledger.empty()
         open_ledger(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
-        seen = dict(power=np.zeros(len(system.families)), extremes=extremes, events=events, averages=averages)
-        return ExplicitCourse(time=0.0, x=x, v=v, force=force, ledger=ledger, **seen, **book)
+        return ExplicitCourse(
+            time=0.0,
+            x=x,
+            v=v,
+            extremes=extremes,
+            events=events,
+            work=work,
+            ledger=ledger,
+            averages=averages,
+            energy=own.sum(),
+            largest=max(np.abs(own).sum(), self._least),
+            force=force,
+            power=np.zeros(len(system.families)),
+        )
 
     def save(self, course):
         """The `ExplicitCourse` as arrays by name, for a checkpoint."""
@@ -183,7 +194,7 @@ class CentralDifference(Integrator):
         return ExplicitCourse.of_arrays(arrays)
 
     @property
-    def _keys(self):
+    def _keys(self) -> dict:
         return dict(safety=self.safety, step_size=self.step_size)
 
     def refined(self, by=None):
@@ -220,7 +231,7 @@ class CentralDifference(Integrator):
         carried = course.power, np.zeros((2, changing))
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
-    def advance(self, course, times):
+    def advance(self, course: ExplicitCourse, times):
         """Take a course to each of some times; equal steps lead to each.
 
         See `refweb.dynamics.integrators.integrator.Integrator.advance`; a `SolverError` for a number that is not finite

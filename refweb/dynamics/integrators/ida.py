@@ -208,7 +208,8 @@ class Ida(Sundials):
         from sksundae.ida import IDAJacTimes, IDAPrecond
 
         if self.linear_solver != "block":
-            return self._whole(*self._whole_pattern(), self.unknowns + len(self._heavy) + 2 * self._count)
+            rows, columns = self._whole_pattern()
+            return self._whole(rows, columns, self.unknowns + len(self._heavy) + 2 * self._count)
         self._symmetric = Symmetric(self.system.pattern)
         precond, times = IDAPrecond(self._set_up, self._precondition), IDAJacTimes(None, self._jacobian_times)
         return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)

@@ -288,6 +288,7 @@ class Integrator(Protocol):
             With the supports where motion has them, the values of probes and sums there as extremes, the events that
             have happened by being there, and the energy at the start.
         """
+        ...
 
     def advance(self, course: Course, times: Sequence[float]) -> History:
         """Take a course to each of some times in turn.
@@ -311,9 +312,11 @@ class Integrator(Protocol):
         SolverError
             Where no step is to be had, or a number is not finite.
         """
+        ...
 
     def refuse_drift(self, course: Course) -> None:
         """Refuse a course that is complete, where its books are open by more than a result may have; `OpenBook`."""
+        ...
 
     def spent(self, course: Course) -> dict:
         """What a course has spent, for ``run.json``.
@@ -324,12 +327,15 @@ class Integrator(Protocol):
             ``nfev``, ``njev`` and ``nlu``, evaluations of forces and of tangents and factorizations, and whatever else
             there is to say.
         """
+        ...
 
     def save(self, course: Course) -> dict[str, np.ndarray]:
         """A course as arrays by name, for a checkpoint."""
+        ...
 
     def load(self, arrays: dict[str, np.ndarray]) -> Course:
         """The course of a checkpoint, for an integrator made of the same arguments."""
+        ...
 
     def refined(self, by: float | None = None) -> Integrator:
         """The method on the same system, with the same probes, sums and events and a smaller error.
@@ -340,6 +346,7 @@ class Integrator(Protocol):
             How many times as fine steps or tolerances are; by default as a twin has them, whose difference says what
             the error is.
         """
+        ...
 
     def error_share(self, course: Course, finer: Course) -> float:
         """Error of a finer run over that of this one, by the order of the method [1].
@@ -349,6 +356,8 @@ class Integrator(Protocol):
         course, finer : Course
             A run at its end, and that of ``refined()``.
         """
+        ...
 
     def next_knob(self, share: float) -> float:
         """Factor on the knob that brings down errors which are ``share`` times what they may be."""
+        ...

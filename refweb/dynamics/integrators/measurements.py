@@ -102,7 +102,7 @@ class Measurements:
         ``energies(sample)`` is what sums weigh.
         """
         note_time(extremes.looked, sample.time)
-        values = {i: self.probe(i, sample) for i in self._followed}
+        values: dict = {i: self.probe(i, sample) for i in self._followed}
         if len(self._weights):
             values |= enumerate(self._weights @ energies(sample), self.probed)
         turned = []

@@ -282,8 +282,9 @@ class Model(NamedTuple):
     @classmethod
     def of(cls, system):
         """That of a `refweb.system.system.System`."""
-        parts = (part.of(system) for part in (Inertia, Families, Rubbed, Motions, Reels))
-        return cls(*parts, system.corners, Outside.of(system))
+        inertia, families, rubbed = Inertia.of(system), Families.of(system), Rubbed.of(system)
+        motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
+        return cls(inertia, families, rubbed, motions, reels, system.corners, outside)
 
 
 @record

@@ -7,6 +7,7 @@ rule and the trapezoidal one differ too much, as where damped lines go slack in 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -44,7 +45,7 @@ class Sample(NamedTuple):
     force: np.ndarray
     lines: np.ndarray
     power: np.ndarray
-    shown: dict = MappingProxyType({})
+    shown: Mapping = MappingProxyType({})
 
 
 class Rates(NamedTuple):

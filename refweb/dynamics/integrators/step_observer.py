@@ -90,6 +90,7 @@ class StepObserver(Integrator):
     knob, retry, beside = "rtol", 0.1, False
     breathe = staticmethod(lambda t: None)
     course_type = ObservedCourse
+    _made_of: tuple
     takes_massless = takes_links = False
     """Whether nodes without mass have a place in the method's equations, and rigid links."""
     restarts = False
@@ -217,9 +218,9 @@ class StepObserver(Integrator):
         sample, work = self._book.sample(0.0, x, v), np.zeros(len(system.families) + 1)
         energies = self._book.energies(sample, work, 0.0)
         extremes, averages, values = self._measurements.at_start(sample, energies)
-        seen = dict(extremes=extremes, averages=averages, events=self._events.copy())
-        course = self.course_type(time=0.0, x=x, v=v, work=work, **seen)
-        for event in course.events:
+        events = self._events.copy()
+        course = self.course_type(time=0.0, x=x, v=v, extremes=extremes, events=events, work=work, averages=averages)
+        for event in events:
             starts_above(event, values[event["slot"]])
         self._book.open(course, energies)
         self._enter(course)
@@ -252,7 +253,7 @@ class StepObserver(Integrator):
         """Factor on rtol for errors that are ``share`` times what they may be."""
         return min(max(0.5 * share**-1.5, 0.01), 0.1)
 
-    def advance(self, course, times):
+    def advance(self, course: ObservedCourse, times):
         """Take a course to each of some times, see `refweb.dynamics.integrators.integrator.Integrator.advance`."""
         times = np.atleast_1d(np.asarray(times, dtype=float))
         history = History.empty(len(times), self._measurements.probed, self.system.families)
@@ -280,7 +281,7 @@ class StepObserver(Integrator):
         with self._told(course):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
-    def _take_step(self, course, end):
+    def _take_step(self, course: ObservedCourse, end):
         """One step of the method, not beyond a corner of a table, nor further than a body can be passed."""
         stop = self._limits.stop(course.time, course.x, course.v, end)
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen

@@ -13,6 +13,7 @@ import io
 import os
 import re
 import warnings
+from collections.abc import Callable
 
 import numpy as np
 
@@ -32,8 +33,7 @@ DENSE = 80
 class Sundials(StepObserver):
     """A solver of SUNDIALS on one system.
 
-    A subclass brings ``_made(**options)``, the solver of sksundae at the tolerances, ``_initial(t, x, v)``, what its
-    ``init_step`` takes, and ``_linear_options()``, the linear solver.
+    A subclass brings what is named below as its own, and says in `__init__` what `max_order` is.
 
     Parameters
     ----------
@@ -47,10 +47,29 @@ class Sundials(StepObserver):
     """
 
     linear_solver = choice = ""
+    max_order: int
+    _symmetric: Symmetric
+    _jacobian: Callable
 
     def __init__(self, system, *observed, **tolerances):
         super().__init__(system, *observed, **tolerances)
         self._product, self._exact, self._true = None, False, False
+
+    # What a subclass brings, besides `_jacobian` as its solver calls it
+
+    def _made(self, **options):
+        """The solver of sksundae at the tolerances."""
+        raise NotImplementedError
+
+    def _initial(self, t, x, v):
+        """What ``init_step`` of the solver takes."""
+        raise NotImplementedError
+
+    def _linear_options(self) -> dict:
+        """The linear solver, as options; a "block" one factorizes with `_symmetric`."""
+        raise NotImplementedError
+
+    # What is made of it
 
     def spent(self, course):
         """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""

@@ -150,7 +150,8 @@ class Contact(Table):
             if self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0:
                 losing.setdefault((body.shape.depth(), int(body.spin is not None)), []).append(body)
         families = [self._penalty(net, element, depth, bodies) for depth, bodies in pressed.items()]
-        return families + [self._friction(net, element, *key, bodies) for key, bodies in losing.items()]
+        lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
+        return families + lost
 
     def _numbers(self, net, bodies, spins=0):
         """Cells and data of every element with each of some bodies, ``spins`` of 1 with their rotations."""

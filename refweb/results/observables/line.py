@@ -11,12 +11,20 @@ from .observable import Observable, Value
 class Line(Observable):
     """A number of each line.
 
-    Subclasses have ``values(state)``, shape (lines,), ``scale(net)``, by which ``column`` of tension and strain of each
-    element is multiplied, and ``bound(tension, net)``, the error of each element that a proven one of tensions makes.
+    Subclasses have `values`, `bound` and `scale`, by which ``column`` of tension and strain of each element is
+    multiplied.
     """
 
     keys, at = ("line",), "line"
     column = 0
+
+    def values(self, state):
+        """What each line shows in a state, shape (lines,)."""
+        raise NotImplementedError
+
+    def bound(self, tension, net):
+        """Error of each element that a proven one of tensions [N] makes, shape (cells,)."""
+        raise NotImplementedError
 
     def on(self, system):
         """Refuse lines that the net does not have."""
@@ -113,5 +121,6 @@ class Strain(Line):
     def error(self, state, equilibrium):
         """None where duality leaves it open whether the line is slack: then its strain is not unique."""
         error = super().error(state, equilibrium)
-        open_ = equilibrium.duality_bound is not None and self.of(state).value <= error
-        return None if open_ else error
+        if error is None or equilibrium.duality_bound is None:
+            return error
+        return None if self.of(state).value <= error else error

@@ -12,10 +12,14 @@ from .observable import Observable, Value
 class Nodal(Observable):
     """A vector of each row of the unknowns, of which a component or the magnitude counts.
 
-    Subclasses have ``vectors(state)``, shape (rows, 3), and a probe.
+    Subclasses have `vectors` and a probe.
     """
 
     keys = ("node", "body", "component")
+
+    def vectors(self, state):
+        """What each row shows in a state, shape (rows, 3)."""
+        raise NotImplementedError
 
     def on(self, system):
         """Refuse nodes and bodies that the net does not have."""
