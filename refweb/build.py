@@ -12,10 +12,10 @@ from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
 from .messages import nearest, shown
 from .net import discretisation
+from .net.web import Web
 from .registry import EFFECTS, INTEGRATORS, load, name_of
 from .settings import START_STATES
 from .system.system import System
-from .tables import Table
 
 MAX_WINDOWS = 1e4
 """Largest number of windows, of observables that are averaged, that a run is long."""
@@ -79,7 +79,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
 
 def _web(web, folder):
     """The web, made where it is a table."""
-    if not isinstance(web, Table):
+    if isinstance(web, Web):
         return web
     try:
         with refused_at("[web]"):

@@ -38,7 +38,7 @@ def print_scene(scene, system):
         law += f", ε0 = {cable.slackness:g}, η = {cable.smoothing:g}"
     present = [name_of(EFFECTS, effect) for effect in scene.effects]
     count = {name: present.count(name) for name in present}
-    counted = [f"{name} × {times}" if times > 1 else name for name, times in count.items()]
+    counted = [f"{name} × {times}" if times > 1 else f"{name}" for name, times in count.items()]
     named = (f"{name} ({group.law})" if group.law else name for name, group in cable.groups.items())
     groups = f", groups {', '.join(named)}" if cable.groups else ""
     how = f"{solve.kind}, {solve.method}, "
@@ -112,7 +112,7 @@ def _results_of_steps(steps):
         factors[name], unit = scale_of(max(abs(result["value"]) for result in column), column[-1]["unit"])
         grid.add_column(Text(f"{name} [{unit}]" if unit else name), justify="right")
     for n, step in enumerate(steps):
-        row = [f"{step['step']:g}", *([f"{step['load']:.6g}"] if loads else [])]
+        row: list = [f"{step['step']:g}", *([f"{step['load']:.6g}"] if loads else [])]
         for name, column in columns.items():
             value, error = column[n]["value"], column[n]["error"]
             row.append(with_error(value / factors[name], error and error / factors[name]))
@@ -132,8 +132,9 @@ def _results(results, dynamic):
     return grid
 
 
-def _between(least, most, unit):
+def _between(interval, unit):
     """An interval in words; an end of None is infinite."""
+    least, most = interval
     if least is None or most is None:
         ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", least), ("below", most)) if end is not None]
         return "".join(ends) or "on its axis"
@@ -163,7 +164,7 @@ def print_run(summary, more=()):
             rows.append(("", "a value without ± has no known error"))
         for name, r in summary["results"].items():
             if r.get("interval") is not None:
-                rows.append(("", f"{name} lies anywhere {_between(*r['interval'], r['unit'])}"))
+                rows.append(("", f"{name} lies anywhere {_between(r['interval'], r['unit'])}"))
         for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
             found = {n: r for n, r in summary["results"].items() if r.get(key) is not None}
             if found:
@@ -264,7 +265,7 @@ def print_cost(summary):
         errors = (number(run[key], ".1e") for key in ("error_observable", "error_state"))
         work = (str(run[key]) for key in ("nfev", "nsteps"))
         grid.add_row(run["method"], run["setting"], *errors, number(run["cpu_s"], ".3f"), *work)
-    rows = [("runs", grid)] if grid.rows else []
+    rows: list = [("runs", grid)] if grid.rows else []
     told = {}
     for run in (run for run in runs if run["status"] != "solved"):
         told.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
@@ -313,5 +314,5 @@ def _compared(value):
     if value is None:
         return Text("")
     if value["interval"] is not None:
-        return Text(_between(*value["interval"], value["unit"]))
+        return Text(_between(value["interval"], value["unit"]))
     return Text(readable(value["value"], value["error"], value["unit"]))

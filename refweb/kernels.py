@@ -151,7 +151,7 @@ def _with_body(function, options):
     return dispatcher
 
 
-def _compile(decorator, function):
+def _compile(decorator, function) -> Any:
     default = _config.CACHE_DIR
     _config.CACHE_DIR = _folder or default
     try:
@@ -185,7 +185,7 @@ def _named(function):
     return function
 
 
-def kernel(signature=None, **options):
+def kernel(signature=None, **options) -> Any:
     """Compile a function, at once where a signature is given, and keep its machine code on disk.
 
     Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
@@ -212,7 +212,7 @@ def record(cls):
     return cls
 
 
-def ufunc(signatures):
+def ufunc(signatures) -> Any:
     """Compile a scalar function into a numpy ufunc and keep its machine code on disk."""
     return lambda function: _compile(numba.vectorize(signatures, cache=True), function)
 
@@ -238,7 +238,7 @@ def _list_of(item):
     return empty, append
 
 
-def typed_list(item, values):
+def typed_list(item, values) -> Any:
     """A numba typed list of kernels of one signature, or of arrays of one type.
 
     It is filled by compiled functions of explicit signature, whose machine code is kept on disk as well; numba's own

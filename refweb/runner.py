@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import pathlib
 import time
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,7 +25,7 @@ MOST_TIMES = 200
 """Largest number of times at which it is looked whether what acts from outside moves anything."""
 
 
-def run(scene, out=None, force=False, progress=True, announce=None) -> Solution:
+def run(scene, out=None, force=False, progress: bool | Callable | None = True, announce=None) -> Solution:
     """Solve a scene.
 
     Parameters
@@ -58,7 +59,7 @@ def run(scene, out=None, force=False, progress=True, announce=None) -> Solution:
     return _solve(scene, out, progress, announce)
 
 
-def resume(folder, progress=True, announce=None) -> Solution:
+def resume(folder, progress: bool | Callable | None = True, announce=None) -> Solution:
     """Go on with a dynamic run that was killed or interrupted or failed, from its last checkpoint.
 
     Central differences come to what the undisturbed run comes to, bit for bit; CVODE and IDA begin anew there, and come
@@ -232,7 +233,9 @@ def _cpu_by_effect(system, solution):
         from .dynamics.twin_error import steps_with_twin
 
         calls *= steps_with_twin(scene)
-    for family in system.families if state is not None else ():
+    for family in system.families:
+        if state is None:
+            break
         best = np.inf
         for _ in range(3):
             begin = time.perf_counter()

@@ -11,12 +11,17 @@ import pathlib
 import re
 import tomllib
 from dataclasses import field, fields, replace
+from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, in_file, refused_at
 from .messages import nearest, short, shown
 from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of
-from .settings import START_STATES, Accuracy, Head, Output, Static, Supports
+from .settings import START_STATES, Accuracy, Dynamic, Head, Output, Static, Supports
 from .tables import Several, Table, table
+
+if TYPE_CHECKING:
+    from .net.cable import Cable
+    from .net.web import Web
 
 CLASSES_OF_PARTS = {
     "cable": ("Cable",),
@@ -74,14 +79,14 @@ class Scene:
         that makes more than `MAX_HISTORY_ROWS` rows. What does not fit the web or together is refused by `build`.
     """
 
-    web: object
-    cable: object
+    web: Web | Table
+    cable: Cable
     effects: Several = ()
     supports: Supports | None = None
     support: Several = ()
-    solve: Static = field(default_factory=Static)
+    solve: Static | Dynamic = field(default_factory=Static)
     output: Output = field(default_factory=Output)
-    accuracy: Accuracy | None = None
+    accuracy: Accuracy = field(default_factory=Accuracy)
     observe: Several = ()
     event: Several = ()
     title: str = "scene"
@@ -114,7 +119,8 @@ class Scene:
 
     def _fill(self):
         """Fill in the defaults that depend on what is solved."""
-        output, dynamic = self.output, self.solve.kind == "dynamic"
+        output, solve = self.output, self.solve
+        dynamic = isinstance(solve, Dynamic)
         if not dynamic and output.interval is not None:
             raise InputError(f"[output] interval = {output.interval:g} has no meaning in statics: leave it out")
         for key in ("digits", "horizon") if not dynamic and self.accuracy is not None else ():
@@ -122,16 +128,16 @@ class Scene:
                 raise InputError(f"[accuracy] {key} = {shown(value)} has no meaning in statics: leave it out")
         if not dynamic and self.event:
             raise InputError(f"[[event]] {shown(self.event[0].name)} has no meaning in statics: leave it out")
-        interval = (output.interval or min(1e-3, self.solve.duration)) if dynamic else None
+        interval = (output.interval or min(1e-3, solve.duration)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
         object.__setattr__(self, "accuracy", self.accuracy or Accuracy())
-        if not dynamic:
+        if not dynamic or interval is None:
             return
-        if interval > self.solve.duration:
-            raise InputError(f"[output] interval = {interval:g} must be ≤ duration = {self.solve.duration:g} [s]")
-        if self.solve.duration / interval > MAX_HISTORY_ROWS:
-            rows = f"{self.solve.duration / interval:.3g} history rows"
+        if interval > solve.duration:
+            raise InputError(f"[output] interval = {interval:g} must be ≤ duration = {solve.duration:g} [s]")
+        if solve.duration / interval > MAX_HISTORY_ROWS:
+            rows = f"{solve.duration / interval:.3g} history rows"
             raise InputError(f"[output] interval = {interval:g} makes {rows}, at most {MAX_HISTORY_ROWS}")
 
     @staticmethod
@@ -209,7 +215,7 @@ class Scene:
 
     def _tables(self):
         """Its tables but the web."""
-        given = {"cable": self.cable.to_dict()}
+        given: dict = {"cable": self.cable.to_dict()}
         if self.supports is not None:
             given["supports"] = _axes(self.supports.to_dict())
         if self.support:
@@ -234,10 +240,9 @@ class Scene:
     def _repr_html_(self):
         from .results.notebook import of_scene
 
-        sizes = (
-            {"nodes": len(self.web.points), "lines": len(self.web.lines)} if type(self.web).__name__ == "Web" else {}
-        )
-        return of_scene({"web": sizes or self.web.to_dict(), **self._tables()}, self.title)
+        web = self.web
+        told = web.to_dict() if isinstance(web, Table) else {"nodes": len(web.points), "lines": len(web.lines)}
+        return of_scene({"web": told, **self._tables()}, self.title)
 
     @property
     def observables(self):
@@ -257,7 +262,7 @@ class Scene:
         return replace(self, **changes)
 
     @property
-    def contact(self):
+    def contact(self) -> Any:
         """Its ``[contact]``, None where there is none."""
         return next((effect for effect in self.effects if name_of(EFFECTS, effect) == "contact"), None)
 

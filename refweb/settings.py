@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from .errors import InputError
 from .messages import shown
 from .registry import INTEGRATORS, STATICS
@@ -91,7 +93,7 @@ class Static(Table):
         load_steps = [1, 2, 3]
     """
 
-    kind: str = choice("static", default="static")
+    kind: Literal["static"] = choice("static", default="static")
     method: str = choice(STATICS, default="newton")
     load_steps: Several = numbers_list(default=(1.0,))
     mass: str = choice("lumped", "consistent", default="lumped")
@@ -151,7 +153,7 @@ class Dynamic(Table):
         method = "auto"
     """
 
-    kind: str = choice("dynamic", default="dynamic")
+    kind: Literal["dynamic"] = choice("dynamic", default="dynamic")
     method: str = choice(INTEGRATORS, "auto", default="central-difference")
     duration: float = real(above=0, unit="s")
     safety: float | None = real(default=None, above=0, at_most=1)

@@ -13,7 +13,7 @@ import functools
 import math
 import numbers
 from dataclasses import MISSING
-from typing import Any, dataclass_transform
+from typing import Any, ClassVar, dataclass_transform
 
 from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
@@ -37,23 +37,24 @@ def _number(name, value, unit=""):
     unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         _refuse(name, value, f"a number{unit}")
-    if not abs(value) < math.inf:
-        _refuse(name, value, f"a finite number{unit}")
     try:
-        value = float(value)
+        number = float(value)
     except OverflowError:
         _refuse(name, value, f"a finite number{unit}")
-    if abs(value) > LARGEST:
-        _refuse(name, value, f"≤ {LARGEST:g}{' in size' if value < 0 else ''}{unit}")
-    return value
+    if not abs(number) < math.inf:
+        _refuse(name, value, f"a finite number{unit}")
+    if abs(number) > LARGEST:
+        _refuse(name, number, f"≤ {LARGEST:g}{' in size' if number < 0 else ''}{unit}")
+    return number
 
 
 def _whole(name, value, what="a whole number"):
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
         _refuse(name, value, what)
-    if abs(value) > _WHOLE:
+    whole = int(value)
+    if abs(whole) > _WHOLE:
         _refuse(name, value, f"{what} below 2⁶³")
-    return int(value)
+    return whole
 
 
 def _bounded(name, value, unit, above, at_least, below, at_most):
@@ -81,7 +82,7 @@ def _list(name, value, what):
 
 def field(read, *, default=MISSING, default_factory=MISSING, unit="") -> Any:
     """A dataclass field whose values pass through ``read(name, value)``; None passes where it is the default."""
-    made = {"default": default} if default_factory is MISSING else {"default_factory": default_factory}
+    made: dict = {"default": default} if default_factory is MISSING else {"default_factory": default_factory}
     return dataclasses.field(metadata={"read": read, "unit": unit}, **made)
 
 
@@ -253,7 +254,7 @@ def component(default=MISSING) -> Any:
     def read(name, value):
         if isinstance(value, str) and value in ("x", "y", "z"):
             return "xyz".index(value)
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not 0 <= value <= 2:
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not 0 <= int(value) <= 2:
             _refuse(name, value, 'one of 0, 1, 2, "x", "y", "z"')
         return int(value)
 
@@ -349,6 +350,7 @@ class Table:
     """
 
     several = False
+    __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __post_init__(self):
         for f in dataclasses.fields(self):
@@ -374,7 +376,7 @@ class Table:
         with refused_at(where):
             return cls(**given)
 
-    def to_dict(self):
+    def to_dict(self) -> dict:
         """The table as plain TOML values, defaults filled in, absent values left out."""
 
         def plain(value):

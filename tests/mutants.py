@@ -178,7 +178,9 @@ MUTANTS = [
         "return (self.between(v) ** 2).sum(axis=1)",
     ),
     # Contact and friction
-    Mutant("effects/contact/table", "slip_velocity: float = real(1e-2", "slip_velocity: float = real(1e-3"),
+    Mutant(
+        "effects/contact/table", "slip_velocity: float = real(default=1e-2", "slip_velocity: float = real(default=1e-3"
+    ),
     Mutant("effects/contact/table", "return getattr(self, key) if own is None else own", "return getattr(self, key)"),
     Mutant(
         "effects/contact/friction",
@@ -263,7 +265,7 @@ MUTANTS = [
         "float(extremes.values[at]), course.time",
     ),
     Mutant("dynamics/schedule", "if duration - times[-1] > 1e-9 * interval:", "if duration - times[-1] > interval:"),
-    Mutant("dynamics/initial_state", "positions - displacements + twin[0]", "positions + twin[0]"),
+    Mutant("dynamics/initial_state", "positions - displacements + x, x", "positions + x, x"),
     # Checkpoints and folders
     Mutant("dynamics/accuracy_loop", 'int(kept["repeated"])', "0"),
     Mutant("dynamics/accuracy_loop", 'float(kept["drift"])', "np.inf"),
@@ -326,7 +328,7 @@ MUTANTS = [
     Mutant("reference/schema", "without=every - set(own)", "without=()"),
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),
     Mutant("results/comparison", "for least, _ in spans) <= min(", "for least, _ in spans) < min("),
-    Mutant("results/comparison", "None not in spans and max", "max"),
+    Mutant("results/comparison", "len(spans) == len(results) and max", "max"),
 ]
 
 

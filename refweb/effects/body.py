@@ -148,7 +148,8 @@ class Body(Table):
 
     def _form(self):
         """The table of the shape, from what is given of its keys."""
-        kind, given = load(SHAPES[self.shape]), {k: value for k, value in self.form.items() if value is not None}
+        kind, noted = load(SHAPES[self.shape]), vars(self)["form"]  # by `__init__`, a dict
+        given = {key: value for key, value in noted.items() if value is not None}
         for f in fields(kind):
             if f.default is MISSING and f.name not in given:
                 raise InputError(f'{f.name} is missing: shape = "{self.shape}" needs {f.name} = ...')

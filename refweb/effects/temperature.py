@@ -8,7 +8,7 @@ from ..accepted import accepts, any_of
 from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
-from ..tables import Table, by_group, checked, field, real, rows, table
+from ..tables import Several, Table, by_group, checked, field, real, rows, table
 from .length_factor import scaled
 
 
@@ -30,7 +30,7 @@ class GroupTemperature(Table):
     """
 
     expansion: float | None = real(default=None, unit="1/K")
-    change: object = field(_change, default=None)
+    change: Several = field(_change, default=None)
 
 
 @table
@@ -61,7 +61,7 @@ class Temperature(Table):
     """
 
     expansion: float = real(unit="1/K")
-    change: object = field(_change, unit="K")
+    change: Several = field(_change, unit="K")
     groups: dict = by_group(GroupTemperature, "temperature", default_factory=dict)
 
     def check(self):
@@ -82,9 +82,9 @@ class Temperature(Table):
         given = np.stack([found.get("expansion", none), found.get("change", none)], axis=1)
         drives = []
         for one in np.unique(given, axis=0):
-            own = [tables[number] if number >= 0 else self for number in one]
-            _refuse_none(*own, "groups ")
-            drives.append(scaled(net, np.flatnonzero((given == one).all(axis=1)), _factor(*own)))
+            expanding, changing = (tables[number] if number >= 0 else self for number in one)
+            _refuse_none(expanding, changing, "groups ")
+            drives.append(scaled(net, np.flatnonzero((given == one).all(axis=1)), _factor(expanding, changing)))
         return drives
 
 

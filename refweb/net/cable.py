@@ -14,7 +14,7 @@ from .tension_laws import NAMES, SMOOTH
 
 SMOOTH_LAW = {"slackness": 0.0, "smoothing": 1e-5}
 """Parameters of the smooth law where none are given."""
-_DENSE = dict(at_least=0, unit="kg/m³")
+_DENSE: dict = dict(at_least=0, unit="kg/m³")
 
 
 @table

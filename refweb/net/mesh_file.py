@@ -71,7 +71,7 @@ class File(Table):
             has = f"lines = {shown(self.lines)} has no meaning with" if self.lines else "lines is missing beside"
             raise InputError(f"{has} path = {shown(self.path)}: CSV has points and lines in two files")
         try:
-            if csv:
+            if self.lines is not None:
                 from .csv_files import web_of
 
                 return web_of(folder / self.path, folder / self.lines)
@@ -107,7 +107,7 @@ def _web_of(mesh):
         lines, length = lines[once], None if length is None else length[once]
         groups = {name: np.unique(place[list(cells)]) for name, cells in {**own, **mesh.groups}.items()}
     rim = mesh.supports if support is None else np.flatnonzero(support)
-    own = dict(kind="file", groups=groups)
+    own: dict = dict(kind="file", groups=groups)
     keep = _kept(mesh, lines, rim, len(points))
     if keep is None:
         return Web(points, lines, length, rim=rim, names=mesh.names, **own)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from ..errors import InputError
@@ -105,7 +107,8 @@ def _arc(n, distance, length):
 
     phi = np.pi / n  # a circle, where the distance is lost beside the length
     if mismatch(phi) < 0.0:
-        phi = brentq(mismatch, 0.0, phi, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=1000)
+        found = brentq(mismatch, 0.0, phi, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=1000)
+        phi = cast(float, found)  # it may be told to give more
     k = np.arange(1, n)
     if phi == 0:
         return k * chord, 0.0 * k

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..messages import nearest, shown
-from ..tables import node_number
+from ..tables import Several, node_number
 from .groups import by_place, members
 
 SELECTIONS = ("centre", "rim", "corners", "all")
@@ -53,14 +53,14 @@ class Web:
     Arrays are C-contiguous and read-only.
     """
 
-    points: np.ndarray
-    lines: np.ndarray
-    natural_length: np.ndarray | None = None
-    rim: np.ndarray = ()
+    points: Several
+    lines: Several
+    natural_length: Several = None
+    rim: Several = ()
     kind: str = "inline"
     cells: int | None = None
     names: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    groups: object = None
+    groups: Several = None
     length_given: bool | None = None
 
     def __post_init__(self):

@@ -8,6 +8,7 @@ where they belong before anything is checked, so that they are refused, or not, 
 from __future__ import annotations
 
 import tomllib
+from typing import Any
 
 from ..errors import InputError, refused_at
 from ..messages import nearest, one_line, short, shown
@@ -48,7 +49,7 @@ def _read(path, word):
     return word
 
 
-def with_value(given, path, value):
+def with_value(given, path, value) -> dict:
     """The dict of a scene file with another value at a path.
 
     Parameters
@@ -91,7 +92,7 @@ def _keys(path):
     return keys
 
 
-def _put(here, keys, above, value):
+def _put(here, keys, above, value) -> Any:
     """What stands ``here``, below the keys ``above``, with a value put at ``keys``; None where nothing stands here."""
     if not keys:
         return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import MISSING
+from typing import Any
 
 from ..registry import EFFECTS, INTEGRATORS, LISTS, PARTS, SHAPES, SOLVES, WEBS, load
 from ..settings import Head
@@ -32,7 +33,7 @@ def schema():
     }
 
 
-def accepted(f, like=None):
+def accepted(f, like=None) -> dict:
     """The schema of what a field accepts; that of anything where its reader says nothing.
 
     ``like`` is the class of tables whose keys are described where a table in the field says nothing of its own.
@@ -41,7 +42,7 @@ def accepted(f, like=None):
     return _plain(given() if callable(given) and not isinstance(given, type) else given, like)
 
 
-def _plain(given, like):
+def _plain(given, like) -> Any:
     """A schema with classes of tables as theirs."""
     if isinstance(given, type):
         return _table(given, like=like)
@@ -50,7 +51,7 @@ def _plain(given, like):
     return [_plain(value, like) for value in given] if isinstance(given, (list, tuple)) else given
 
 
-def _table(kind, *more, fixed=None, without=(), optional=(), like=None):
+def _table(kind, *more, fixed=None, without=(), optional=(), like=None) -> dict:
     """The schema of a table with the keys of some classes.
 
     Parameters

@@ -81,7 +81,7 @@ def _results(folder, summary, several):
             parts = [(step["step"], step["results"]) for step in summary["steps"]]
         found = {(name, step): result for step, results in parts for name, result in results.items()}
         for result in found.values():
-            math.isfinite(result["value"]), math.isfinite(result["error"] or 0.0), result["unit"] + ""
+            _ = math.isfinite(result["value"]), math.isfinite(result["error"] or 0.0), result["unit"] + ""
     except (KeyError, TypeError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
     return found
@@ -107,8 +107,8 @@ def _agree(results):
         return False
     if len({result["value"] for result in results}) == 1:
         return True
-    spans = list(map(_span, results))
-    return None not in spans and max(least for least, _ in spans) <= min(most for _, most in spans)
+    spans = [span for result in results if (span := _span(result)) is not None]
+    return len(spans) == len(results) and max(least for least, _ in spans) <= min(most for _, most in spans)
 
 
 def _span(result):

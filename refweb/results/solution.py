@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..messages import nearest
+
+if TYPE_CHECKING:
+    from ..scene import Scene
 
 SOLVER = dict.fromkeys(
     "method nsteps nfev njev nlu residual duality_gap above_lowest smallest_pivot slack_nodes energy_drift "
@@ -95,10 +98,10 @@ class SolutionData:
         Row numbers and states that stand as VTU in a result folder.
     """
 
-    scene: object
-    state: object = None
+    scene: Scene
+    state: Any = None
     table: dict | None = None
-    path: object = None
+    path: Any = None
     columns: list = field(default_factory=list)
     steps: list = field(default_factory=list)
     solver: dict = field(default_factory=SOLVER.copy)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -91,7 +92,7 @@ class Modes(Solution):
         out.summary(self.summary())
 
 
-def modes(scene, number=10, out=None, force=False, progress=True, announce=None) -> Modes:
+def modes(scene, number=10, out=None, force=False, progress: bool | Callable | None = True, announce=None) -> Modes:
     """The lowest natural frequencies and mode shapes about an equilibrium, without damping.
 
     Of a static scene the equilibrium is that of each load step; of a dynamic one that at t = 0 under gravity, loads,

@@ -7,6 +7,8 @@ is said.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ..errors import InputError, SolverError, in_file
 from ..messages import nearest, shown
 from ..registry import OBSERVABLES, load
@@ -23,7 +25,9 @@ from .cost import Cost
 from .references import compare
 
 
-def cost(scene, observe=None, budget=120.0, out=None, force=False, progress=True, announce=None) -> Cost:
+def cost(
+    scene, observe=None, budget=120.0, out=None, force=False, progress: bool | Callable | None = True, announce=None
+) -> Cost:
     """Run a scene by every method that takes it, from coarse to fine, and compare errors and CPU times.
 
     Parameters
