@@ -7,4 +7,5 @@ page that holds all of its figures) and ``report.md``; the exit status is 1 wher
 ``tests/test_validation.py`` runs every case with ``--quick``. How to write a case says `validation.harness.case`.
 ``cost.explicit``, ``cost.implicit``, ``cost.statics``, ``cost.effects``, ``methods.refinement`` and
 ``paper.fundamental_frequencies`` print tables of their own with ``python -m validation.cost.explicit`` and so on.
+`validation.recipes` has short scripts to copy.
 """

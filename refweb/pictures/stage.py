@@ -60,7 +60,8 @@ class Stage:
         colours = colour_map()(np.clip((frame.fields[self.field] - low) / (high - low), 0, 1))[:, :3]
         model: list[Tubes | Surface | Balls] = [Tubes(frame.paths[~grey], colours[~grey], self.radius)]
         model.append(Tubes(frame.paths[grey], np.tile(SLACK, (grey.sum(), 1)), 0.8 * self.radius))
-        model.append(Balls(self.supports, SUPPORT, 2.2 * self.radius))
+        if len(self.supports):
+            model.append(Balls(self.supports, SUPPORT, 2.2 * self.radius))
         for i, (points, triangles) in enumerate(frame.bodies.values()):
             model.append(Surface(points, triangles, BODIES[i % len(BODIES)]))
         return model
