@@ -100,7 +100,8 @@ _folder = _cache_folder()
 class _CacheByName(FunctionCache):
     """Machine code of a function whose name tells what it captures.
 
-    numba's own key is made of what the function captures as bytes, which of a kernel differ in every process.
+    numba's own key is made of what the function captures as bytes, which of kernels and their types differ in every
+    process.
     """
 
     def _index_key(self, signature, codegen):
@@ -123,8 +124,7 @@ def _with_signature(function, signature, options):
 
 def _with_entry(function, options):
     dispatcher: Any = numba.njit(**options)(function)
-    captured = [cell.cell_contents for cell in function.__closure__ or ()]
-    if any(isinstance(value, Dispatcher) for value in captured):
+    if function.__closure__:
         dispatcher._cache = _CacheByName(function)
     else:
         dispatcher.enable_caching()

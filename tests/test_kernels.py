@@ -1,5 +1,6 @@
 """Kernels that capture kernels: names that are theirs alone, and machine code that the next process finds."""
 
+import json
 import os
 import subprocess
 import sys
@@ -106,3 +107,19 @@ def test_machine_code_is_kept_by_the_content_of_all_kernels(tmp_path, monkeypatc
     law.write_text("@kernel()\ndef law(x):\n    return 2 * x\n")
     folders.append(kernels._cache_folder())
     assert folders[0] == folders[1] != folders[2] and str(package) in folders[0]
+
+
+WARM = """
+import refweb
+solves = {"square-load": {}, "square-impact": {"solve.duration": 2e-3}, "closing-net": {"solve.duration": 5e-3}}
+runs = [refweb.run(refweb.Scene.load(name, values)) for name, values in solves.items()]
+runs.append(refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 2e-3, "solve.method": "cvode"})))
+print([solution.cost["compile_s"] for solution in runs])
+"""
+
+
+def test_a_warm_process_compiles_nothing():
+    """What an earlier process has run is found on disk, lists of kernels and of arrays among it."""
+    for _ in range(2):
+        told = subprocess.run([sys.executable, "-c", WARM], capture_output=True, text=True, check=True).stdout
+    assert json.loads(told) == [0.0, 0.0, 0.0, 0.0]

@@ -28,6 +28,7 @@ def main(arguments=None):
     parser.add_argument("--quick", action="store_true", help="the same assertions on smaller scenes")
     parser.add_argument("--list", action="store_true", help="print the names of the cases and stop")
     parser.add_argument("--out", type=pathlib.Path, default=FOLDER, help="folder of the report")
+    parser.add_argument("--text", type=pathlib.Path, metavar="FILE", help="write the text of the report as well")
     given = parser.parse_args(arguments)
     missing = [name for name in EXTRAS if importlib.util.find_spec(name) is None]
     if missing and not given.list:
@@ -60,6 +61,8 @@ def main(arguments=None):
             bar.advance(task)
         bar.update(task, description="drawing the report")
         page = report.write(given.out, done, given.quick)
+        if given.text is not None:
+            report.write_text(given.text, done, given.quick)
     print(f"report in {page}")
     return int(any(one.case.failures for one in done))
 

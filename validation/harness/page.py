@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from refweb.results.provenance import versions
 
+from .. import how_it_works
 from .case import CASES, Case, text
 from .plots import png
 
@@ -58,6 +59,11 @@ def write(folder, done, quick):
     return page
 
 
+def write_text(path, done, quick):
+    """Write the report as Markdown without its figures."""
+    path.write_text(_markdown(_blocks(done, quick), figures=False), encoding="utf-8")
+
+
 def _blocks(done, quick):
     """The report as a list of blocks (kind, content), which both formats follow."""
     failed = sum(bool(one.case.failures) for one in done)
@@ -76,6 +82,9 @@ def _blocks(done, quick):
         "Differences are relative to the reference unless a row says otherwise. ± is refweb's own estimate or bound.",
     )
     yield "table", ("", ("case", "comparisons", "largest part of a tolerance", "agrees"), _contents(done), "link")
+    title, body = how_it_works.__doc__.split("\n\n", 1)
+    yield "part", title
+    yield from _described(body)
     for part, names in CASES.items():
         here = [one for one in done if one.name in names]
         if here:
@@ -141,6 +150,7 @@ def _inline(words):
     words = re.sub(r"``(.+?)``", r"<code>\1</code>", words)
     words = re.sub(r"\[([^\]]+)\]\((#\w+)\)", r'<a href="\2">\1</a>', words)
     words = re.sub(r"\bdoi:(10\.\S+?)(?=[.,;:)]*(?:\s|$))", r'<a href="https://doi.org/\1">doi:\1</a>', words)
+    words = re.sub(r"\*\*([^*\s][^*]*)\*\*", r"<strong>\1</strong>", words)
     return re.sub(r"\*([^*\s][^*]*)\*", r"<em>\1</em>", words)
 
 
@@ -195,7 +205,7 @@ def _page(blocks, images):
     return f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
 
 
-def _markdown(blocks):
+def _markdown(blocks, figures=True):
     def line(cells):
         return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
@@ -220,7 +230,7 @@ def _markdown(blocks):
         elif kind == "verdict":
             out.append(f"> {content.claim}\n>\n> **{content.verdict}**: {content.because}")
         elif kind == "figure":
-            out.append(f"![{content[1]}]({content[0]})")
+            out.append(f"![{content[1]}]({content[0]})" if figures else f"*Figure: {content[1]}*")
         else:
             out.append(content)
     return "\n\n".join(out) + "\n"

@@ -113,8 +113,8 @@ class CentralDifference(Integrator):
             raise InputError(
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
-        self._model = Model.of(system)
-        self._observed = Observed.of(probes, sums, self._model.families.outs)
+        outs = tuple(system.per_cell())
+        self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
         self._events, self._least = event_rows(events), least_energy(net)
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")

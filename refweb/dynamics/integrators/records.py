@@ -131,8 +131,8 @@ class Families(NamedTuple):
     dampings: List
 
     @classmethod
-    def of(cls, system):
-        """Those of a system; natural lengths that change do so in a copy of their own."""
+    def of(cls, system, outs):
+        """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
         families, net = system.families, system.net
         lines = net.line_data.copy() if system.line_drives else net.line_data
         numbers = [lines if family.lines else family.data for family in families]
@@ -144,7 +144,7 @@ class Families(NamedTuple):
             forces=typed_list(FORCE, [family.force for family in families]),
             cells=typed_list(INDICES, [family.cells for family in families]),
             data=typed_list(MATRIX, numbers),
-            outs=typed_list(MATRIX, system.per_cell()),
+            outs=typed_list(MATRIX, outs),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
             energies=typed_list(ENERGY, [family.energy or no_energy for family in families]),
@@ -280,9 +280,9 @@ class Model(NamedTuple):
     outside: Outside
 
     @classmethod
-    def of(cls, system):
-        """That of a `refweb.system.system.System`."""
-        inertia, families, rubbed = Inertia.of(system), Families.of(system), Rubbed.of(system)
+    def of(cls, system, outs):
+        """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
+        inertia, families, rubbed = Inertia.of(system), Families.of(system, outs), Rubbed.of(system)
         motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
         return cls(inertia, families, rubbed, motions, reels, system.corners, outside)
 
@@ -319,7 +319,6 @@ class Observed(NamedTuple):
     @classmethod
     def of(cls, probes, sums, outs):
         """Probes and sums of a system whose families write ``outs`` per cell."""
-        families, outs = len(outs), list(outs)
         numbers = [outs[p.family] if p.family >= 0 else np.ascontiguousarray(p.data, dtype=float) for p in probes]
         windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
         signs[windows.slots] = 0.0
@@ -327,7 +326,7 @@ class Observed(NamedTuple):
             probes=typed_list(PROBE, [probe.kernel for probe in probes]),
             rows=typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
             data=typed_list(MATRIX, numbers),
-            sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3),
+            sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(outs) + 3),
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
