@@ -29,6 +29,13 @@ METHODS = {
 """Every kind of steps, as keys of ``[solve]``."""
 
 
+def some(cases, every):
+    """Cases of a parametrized test, of which the ordinary run takes one of ``every``, and the slow one the others."""
+    slow = pytest.mark.slow
+    apart = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [pytest.param(*case, marks=slow if number % every else ()) for number, case in enumerate(apart)]
+
+
 def interrupt(scene, folder):
     """Run a scene into a folder, and interrupt it when half of it is done."""
 

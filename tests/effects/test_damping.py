@@ -269,7 +269,7 @@ def test_decay_of_a_longitudinal_mode(law, kind):
 
 
 @pytest.mark.parametrize("method", [Cvode, Ida])
-@pytest.mark.parametrize("order, consistent", [(1, False), (2, False), (2, True), (3, False)])
+@pytest.mark.parametrize("order, consistent", nets.some([(2, True), (1, False), (3, False), (2, False)], 2))
 def test_decay_at_every_order(method, order, consistent):
     kind, zeta = dict(elements=4, order=order, consistent=consistent), 0.05
     omega, shape = mode(bar([], **kind), 0)

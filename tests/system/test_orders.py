@@ -6,6 +6,7 @@ the error, of relative size h or h², bends the line by less than `ORDER`. Where
 """
 
 import functools
+import itertools
 from dataclasses import replace
 
 import mpmath
@@ -122,7 +123,7 @@ def held_ends(web, cable):
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("law", ["tension-only", "linear"])
+@pytest.mark.parametrize("law", nets.some(["tension-only", "linear"], 2))
 @pytest.mark.parametrize("case", CASES)
 def test_catenary_converges_with_the_orders_of_the_element(case, law, order):
     """p + 1 in L2, by a quadrature finer than the element's own; 2p at the ends of elements, in the mean square.
@@ -236,8 +237,7 @@ def test_the_two_masses_bracket_the_frequencies(order):
 CELLS = 4
 
 
-@pytest.mark.parametrize("consistent", [False, True])
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order, consistent", nets.some(list(itertools.product(ORDERS, [False, True])), 3))
 def test_frequencies_of_a_square_net(order, consistent):
     """A net of N × N squares of strings of side a, held at its rim: 2 cos(ωa/c) = cos(pπ/N) + cos(qπ/N), 0 < p, q < N.
 
