@@ -23,7 +23,7 @@ def parser():
         prog="refweb",
         description="Equilibrium and dynamics of space webs: cable nets, often slack, flat and tensionless.",
     )
-    top.add_argument("--version", action="store_true", help="show the version and leave")
+    top.add_argument("--version", action="store_true", help="show the version and exit")
     verbs = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, reference in COMMANDS.items():
         verb = load(reference)

@@ -156,7 +156,7 @@ def _acting(effects):
     for name, effect in sorted(zip(names, effects, strict=True), key=lambda one: tables.index(one[0])):
         count[name] = count.get(name, 0) + 1
         if not effect.several and count[name] > 1:
-            raise InputError(f"[{name}] stands {count[name]} times: a scene has one")
+            raise InputError(f"[{name}] is listed {count[name]} times: a scene has one")
         acting.append(_Placed(f"[[{name}]] {count[name]}" if effect.several else f"[{name}]", effect))
     return acting
 
@@ -188,8 +188,8 @@ def _check_start(solve, accuracy):
     """Refuse finer elements where the state to start from is that of these."""
     if solve.kind == "dynamic" and solve.start not in START_STATES and accuracy.refine:
         raise InputError(
-            f"[accuracy] refine = true must be false with [solve] start = {shown(solve.start)}: its state is "
-            "that of these elements, and finer ones have other nodes"
+            f"[accuracy] refine = true must be false with [solve] start = {shown(solve.start)}: the state "
+            "in that folder is of these elements, and finer ones have other nodes"
         )
 
 
@@ -216,24 +216,24 @@ def _check_average(average, solve):
     if average * MAX_WINDOWS < solve.duration:
         raise InputError(
             f"average = {average:g} must be ≥ {solve.duration / MAX_WINDOWS:g} [s], the duration over {MAX_WINDOWS:g}: "
-            "over so little the mean is the value; leave it out"
+            "a mean over so short a window is the value itself; leave it out"
         )
 
 
 def _check_event(event, earlier, observables, system):
     """Refuse an event of what the system does not have, and one with the name of an ``earlier`` one."""
     if event.name in earlier:
-        raise InputError(f"name = {shown(event.name)} is that of [[event]] {earlier.index(event.name) + 1}")
+        raise InputError(f"name = {shown(event.name)} is already used by [[event]] {earlier.index(event.name) + 1}")
     if event.kind == "contact":
         if not system.contact:
             raise InputError('kind = "contact" needs a [contact] in the scene')
         bodies = [body.name for body in system.net.bodies]
         if event.body is not None and event.body not in bodies:
-            raise InputError(f"body = {shown(event.body)} is no body, {nearest(event.body, bodies)}")
+            raise InputError(f"body = {shown(event.body)} is not a body, {nearest(event.body, bodies)}")
     if event.kind == "taut":
         _check_taut(event, system.net)
     if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
-        raise InputError(f"observe = {shown(event.observe)} is no observable, {nearest(event.observe, names)}")
+        raise InputError(f"observe = {shown(event.observe)} is not an observable, {nearest(event.observe, names)}")
     if event.kind == "threshold" and (average := observables[names.index(event.observe)].average) is not None:
         raise InputError(
             f"observe = {shown(event.observe)} is a mean, average = {average:g}, and events are found by values of an "

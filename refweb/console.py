@@ -202,7 +202,7 @@ def print_run(summary, more=()):
     rows.append(("cost", _cost(cost)))
     rows += [("warning", text) for text in summary["warnings"]]
     if summary["status"] != "solved":
-        resumed = "refweb resume goes on from its last checkpoint" if solver["energy_drift"] is not None else ""
+        resumed = "refweb resume continues from its last checkpoint" if solver["energy_drift"] is not None else ""
         rows.append((summary["status"], summary["message"] or resumed))
     _box(f"{summary['scene']}: {summary['status']}", rows)
 

@@ -17,7 +17,7 @@ class SolverError(RuntimeError):
 
 
 class NoEnd(SolverError):
-    """A method of dynamics that comes to no end of a scene, which another may come to."""
+    """A method of dynamics cannot finish a scene; another method may."""
 
 
 class OpenBook(NoEnd):

@@ -94,7 +94,7 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
         raise InputError(f"{name} is being written by a run that is alive: wait for its end, or stop it")
     scene = scene_of(folder, summary)
     if "kind" in summary or scene.solve.kind == "static":
-        raise InputError(f"{name} holds no dynamic run, and nothing else has checkpoints: use refweb run --force")
+        raise InputError(f"{name} holds no dynamic run, and only dynamic runs have checkpoints: use refweb run --force")
     check_folder(folder, force=True)
     kept = checkpoint(folder, name) if (folder / "checkpoint.npz").exists() else None
     if kept is None:
@@ -218,7 +218,7 @@ def _idle(system, times):
         if acts.any() and not (acts & ~system.supported).any():
             rows = np.flatnonzero(acts.any(axis=1))
             names = ", ".join(map(system.row_name, rows[:4])) + (", ..." if len(rows) > 4 else "")
-            yield f"the {family.name} on {names} acts on supports alone, which take it: it moves nothing"
+            yield f"the {family.name} on {names} acts only on supports, which carry it: it moves nothing"
 
 
 def _cpu_by_effect(system, solution):

@@ -74,9 +74,9 @@ class Scene:
     Raises
     ------
     InputError
-        For an empty title or one above 200 characters, a negative seed, what is no list or no effect among them; in
-        statics for an interval, digits, a horizon and events; in dynamics for an interval above the duration, or one
-        that makes more than `MAX_HISTORY_ROWS` rows. What does not fit the web or together is refused by `build`.
+        For an empty title or one above 200 characters, a negative seed, what is not a list, and what is not an effect
+        in it; in statics for an interval, digits, a horizon and events; in dynamics for an interval above the duration,
+        or one that makes more than `MAX_HISTORY_ROWS` rows. `build` refuses what does not fit the web or together.
     """
 
     web: Web | Table
@@ -106,7 +106,7 @@ class Scene:
         for effect in self.effects:
             if name_of(EFFECTS, effect) is None:
                 kind = type(effect).__name__
-                raise InputError(f"{kind} is no effect, {nearest(kind, EFFECTS)}")
+                raise InputError(f"{kind} is not an effect, {nearest(kind, EFFECTS)}")
         for key, kinds in CLASSES_OF_PARTS.items():
             value = getattr(self, key)
             for one in value if isinstance(value, tuple) else [value]:
@@ -159,6 +159,9 @@ class Scene:
         path = file_of(source)
         try:
             given = {"title": path.stem, **tomllib.loads(path.read_bytes().decode("utf-8-sig"))}
+        except UnicodeDecodeError as error:
+            where = f"byte {error.start} is not UTF-8"
+            raise InputError(f"{path.name}: is not a scene, a text in UTF-8 ({where}): name a TOML file") from None
         except (ValueError, OSError, RecursionError) as error:  # a ValueError also for a number of thousands of digits
             raise InputError(f"{path.name}: cannot be read: {error}") from None
         name = path.name

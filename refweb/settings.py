@@ -15,7 +15,7 @@ START_STATES = ("web", "equilibrium")
 
 @table
 class Head(Table):
-    """What stands at the head of a scene file, before its tables.
+    """The first lines of a scene file, before its tables.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ class Supports(Table):
     Raises
     ------
     InputError
-        For a negative number of a node, what is no axis, and an empty list of axes; from `Scene.build`, for a node that
-        the web does not have.
+        For a negative number of a node, what is not an axis, and an empty list of axes; from `Scene.build`, for a node
+        that the web does not have.
 
     Examples
     --------
@@ -84,7 +84,7 @@ class Static(Table):
     Raises
     ------
     InputError
-        For an unknown method or mass, and load steps that are none, not finite or more than 100 000.
+        For an unknown method or mass, and a list of load steps that is empty, not finite or longer than 100 000.
 
     Examples
     --------
@@ -112,8 +112,8 @@ class Dynamic(Table):
     ----------
     method : {"central-difference", "explicit", "cvode", "ida", "auto"}
         Explicit central differences, explicit steps of higher order, or CVODE or IDA of SUNDIALS with steps that follow
-        from the error; "auto" chooses by what the scene is, see `refweb.dynamics.method_choice`, and falls back on
-        others where its choice comes to no end, see `refweb.dynamics.fallback`.
+        from the error; "auto" chooses by what the scene is, see `refweb.dynamics.method_choice`, and tries
+        others where its choice cannot finish, see `refweb.dynamics.fallback`.
     duration : float
         Time to simulate [s].
     safety : float
@@ -189,7 +189,7 @@ class Dynamic(Table):
 
 @table
 class Event(Table):
-    """A moment of a dynamic scene that is looked for: the time at which something first happens.
+    """The time at which something first happens in a dynamic scene.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class Event(Table):
     body : str, optional
         Body of a contact, by default any.
     line : int, str or list, optional
-        Lines of which one snaps taut, by number or group, see `refweb.net.groups`.
+        Lines, by number or group, see `refweb.net.groups`, of which the first to become taut counts.
     observe : str, optional
         Name of the observable of a threshold.
     value : float, optional
@@ -280,17 +280,18 @@ class Accuracy(Table):
     Parameters
     ----------
     error : {"twin", "none"}
-        In dynamics by a twin run of a smaller error, or not at all. In statics "none" leaves out the error of
-        smoothing; what the solution itself tells of its error costs next to nothing.
+        In dynamics by a twin, a second run with a smaller error, or not at all. In statics "none" leaves out the error
+        of smoothing; the other errors follow from the solution itself and cost next to nothing.
     digits : int, optional
-        Of dynamics: significant digits that every observable has to have by its ±. Accuracy is raised until that is so,
-        or until it is shown which observables cannot have them.
+        Of dynamics: significant digits that the ± of every observable has to leave. Accuracy is raised until that is
+        so, or until it shows which observables cannot have them.
     refine : bool
-        Whether the error of elements is found, by two more runs with two and four times as many.
+        Whether to find the error of the elements, by two more runs with two and four times as many.
     horizon : bool
-        Of dynamics: whether it is found how long the motion is determined, see `refweb.studies.predictability`.
+        Of dynamics: whether to find the horizon, the time until which the motion is determined. Later than that the
+        smallest difference at the start leaves no digit of it, see `refweb.studies.predictability`.
     ensemble : int, optional
-        With ``horizon``: number of runs that mean and spread of results are taken of.
+        With ``horizon``: number of runs from which mean and spread of the results are taken.
 
     Raises
     ------

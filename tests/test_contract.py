@@ -321,7 +321,7 @@ def test_contact_is_per_body():
     """The table of a body replaces the stiffness for that body alone."""
     (family,) = make("Contact", 1, "linear")[1].families
     assert len(family.cells) == 18 and set(family.data[:9, 1]) == {1e2} and set(family.data[9:, 1]) == {1e4}
-    with pytest.raises(InputError, match='bodies."walls" is no body, did you mean "wall"'):
+    with pytest.raises(InputError, match='bodies."walls" is not a body, did you mean "wall"'):
         CLASSES["Contact"](stiffness=1.0, bodies=dict(walls=dict(stiffness=1.0))).on(make("Contact", 0, "linear")[0])
 
 

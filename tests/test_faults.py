@@ -299,7 +299,7 @@ REFUSED = {
     "no folder": (shutil.rmtree, "is no folder"),
     "no run.json": (lambda folder: (folder / "run.json").unlink(), "holds no run.json"),
     "no scene": (lambda folder: (folder / "scene.toml").unlink(), "holds no run.json and scene.toml"),
-    "history too short": (spoil_history, "is not the history that checkpoint.npz goes with"),
+    "history too short": (spoil_history, "is not the history that checkpoint.npz belongs to"),
     "no history": (lambda folder: (folder / "history.csv").unlink(), "history.csv: cannot be read"),
     "checkpoint cut": (lambda f: os.truncate(f / "checkpoint.npz", 500), "is not what a run of refweb writes"),
     "other web": (other_web, "not that of a run that scene.toml leads to"),

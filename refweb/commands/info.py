@@ -39,7 +39,7 @@ def _folder(folder, as_json):
         else:
             load(COMMANDS[summary.get("kind", "run")]).show(summary)
     except FileNotFoundError:
-        raise InputError(f"{folder}: holds no run.json, so it is no result of refweb") from None
+        raise InputError(f"{folder}: holds no run.json, so it is not a result folder of refweb") from None
     except BrokenPipeError:
         raise
     except (ValueError, OSError, RecursionError) as error:
@@ -62,7 +62,7 @@ def _so_far(folder, summary):
 def _remedy(folder):
     if (folder / "checkpoint.npz").exists():
         return f"refweb resume {folder} continues it"
-    return "refweb run --force begins anew"
+    return "refweb run --force starts it again"
 
 
 def _scene(source, as_json):

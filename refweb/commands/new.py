@@ -11,7 +11,7 @@ from ..messages import short
 
 START = """# What this scene shows, in a line.
 #
-# Units are SI. A table that is present is an effect that is present; take the # away from what is wanted.
+# Units are SI. A table that is present is an effect that is present; remove the # from what you want.
 # `refweb help` lists all tables, `refweb help web` says what [web] may hold. For an editor that completes keys write
 # `refweb schema > refweb.schema.json`, and begin this file with the line `#:schema ./refweb.schema.json`.
 schema = 1
@@ -90,7 +90,7 @@ def add_arguments(parser):
     """The name, and what it begins with."""
     parser.add_argument("name", metavar="NAME", help="the scene file is NAME.toml")
     parser.add_argument("--from", dest="source", metavar="SCENE", help="begin with a copy of this scene, file or name")
-    parser.add_argument("--force", action="store_true", help="replace the file where there is one")
+    parser.add_argument("--force", action="store_true", help="replace the file if it exists")
 
 
 def run(arguments):
@@ -99,8 +99,8 @@ def run(arguments):
     if not target.parent.is_dir():
         raise InputError(f"{short(str(target))}: there is no folder {short(str(target.parent))}")
     if target.is_dir() or (target.exists() and not arguments.force):
-        force = "" if target.is_dir() else ", or force (--force) to replace it"
-        raise InputError(f"{short(str(target))}: is there already: choose another name{force}")
+        force = "" if target.is_dir() else ", or use --force to replace it"
+        raise InputError(f"{short(str(target))}: already exists: choose another name{force}")
     from ..results.files import write_text
 
     write_text(target, scene_text(target, arguments.source))
@@ -127,7 +127,7 @@ def scene_text(target, source=None):
     with in_file(target.name):
         if tomllib.loads(text) != wanted:
             keys = " and ".join(changes)
-            raise InputError(f"{keys} of {name} cannot be changed where they stand: copy the file by hand")
+            raise InputError(f"{keys} of {name} cannot be changed in place: copy the file by hand")
         Scene.from_dict({"title": target.stem, **wanted}, target.parent)
     return text
 

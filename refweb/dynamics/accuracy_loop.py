@@ -18,7 +18,7 @@ ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
 each run is at most this share of that before."""
 CLIMBS = 8
 """Number of times that accuracy is raised for digits that are missing."""
-STAYS = "a higher accuracy changes it as much: it is zero, or not determined, or a peak that needs a shorter interval"
+STAYS = "higher accuracy changes it by as much: it is zero, or not determined, or a peak that needs a shorter interval"
 STUCK = 1.5
 """Factor by which an error has to fall where half the step, or a tenth of rtol, is meant to quarter it."""
 
@@ -147,7 +147,7 @@ def reach_digits(simulation, digits, folder, tell):
     setting = f"{simulation.integrator.knob} = {standing.knob:g}"
     for name, share in missing_digits(solution.reduced, digits).items():
         falls = before.get(name, np.inf) > STUCK * share
-        why = "it would take more still" if falls else STAYS
+        why = "still higher accuracy would help, but is not tried" if falls else STAYS
         known = f"its ± is {share:.3g} times what they allow with {setting}; {why}"
         known = known if np.isfinite(share) else "its ± is not known"
-        solution.warnings.append(f"{name} has not the {digits} digits asked for: {known}")
+        solution.warnings.append(f"{name} does not have the {digits} digits asked for: {known}")

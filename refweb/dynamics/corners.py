@@ -12,7 +12,7 @@ TOLD = 1.5
 
 
 def remarks_on_corners(scene, system):
-    """What corners of tables make of the steps of a run, a list of at most one sentence: none where it is little.
+    """How corners of tables shorten the steps of a run, a list of at most one sentence; empty where that is little.
 
     Parameters
     ----------
@@ -26,14 +26,14 @@ def remarks_on_corners(scene, system):
     corners = corners[(corners > 0.0) & (corners < end)]
     if len(corners) <= FEW_CORNERS:
         return []
-    apart = f"{len(corners)} corners of tables, {end / len(corners):.3g} s apart on average, end steps"
+    apart = f"steps end at {len(corners)} corners of time tables, {end / len(corners):.3g} s apart on average"
     integrator = INTEGRATORS[scene.solve.method].integrator_of(scene.solve, system)
     if not hasattr(integrator, "steps_in"):
-        return [f"{apart}: {scene.solve.method} takes at least as many"]
+        return [f"{apart}: {scene.solve.method} takes at least as many steps"]
     rows = row_times(scene)
     plain = integrator.steps_in(np.diff(rows)).sum()
     steps = integrator.steps_in(np.diff(np.union1d(rows, corners))).sum()
     if len(corners) < plain and steps < TOLD * plain:
         return []
     work = f"{steps / plain:.3g} times the work"
-    return [f"{apart}: {steps:.3g} steps, where stability and rows ask for {plain:.3g}, {work}"]
+    return [f"{apart}: {steps:.3g} steps, where stability and rows need {plain:.3g}, {work}"]

@@ -1,4 +1,4 @@
-"""What ``method = "auto"`` falls back on where the method that it chose comes to no end: others, before it gives up."""
+"""``method = "auto"`` tries other methods where the one that it chose cannot finish, before it gives up."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OTHERS = (
 
 
 class Refusal(NamedTuple):
-    """A method that came to no end of a scene, and why."""
+    """A method that could not finish a scene, and why."""
 
     method: str
     why: str
@@ -42,7 +42,7 @@ class Ways:
     Attributes
     ----------
     refused : list of Refusal
-        Methods that came to no end.
+        Methods that could not finish it.
     choice : refweb.dynamics.method_choice.Choice
         The one it is given to.
     """
@@ -72,7 +72,7 @@ class Ways:
         return {"refused_methods": np.array(methods, dtype=str), "refused_why": np.array(why, dtype=str)}
 
     def give_over(self, error):
-        """Give the scene to the next method that takes it, where one came to no end; in words.
+        """Give the scene to the next method that takes it, where one could not finish; in words.
 
         Parameters
         ----------
@@ -90,10 +90,10 @@ class Ways:
             if len(self.refused) == 1:
                 raise error
             reasons = "; ".join(f"{refusal.method}: {refusal.why}" for refusal in self.refused)
-            raise SolverError(f'method = "auto" finds no method that comes to an end; {reasons}') from None
+            raise SolverError(f'method = "auto" finds no method that can finish; {reasons}') from None
         self.choice = choice
         last = self.refused[-1]
-        return f'method = "auto": {last.method} comes to no end, {name_of(choice.solve)} takes over; {last.why}'
+        return f'method = "auto": {last.method} cannot finish, {name_of(choice.solve)} takes over; {last.why}'
 
     def _next(self):
         """The `Choice` of the first of `OTHERS` that is untried and takes the scene; None where there is none."""
@@ -101,7 +101,7 @@ class Ways:
         for keys in OTHERS:
             solve = given_to(self._scene, **keys)
             if name_of(solve) not in tried and self._takes(solve):
-                return Choice(solve, f"{', '.join(tried)} came to no end")
+                return Choice(solve, f"{', '.join(tried)} could not finish")
         return None
 
     def _takes(self, solve):

@@ -71,7 +71,9 @@ def checkpoint(folder, name, remedy=""):
         with np.load(folder / "checkpoint.npz") as archive:
             return {key: archive[key] for key in archive}
     except OSError as error:
-        reason = "is no folder" if not folder.is_dir() else f"checkpoint.npz cannot be read: {error.strerror or error}"
+        reason = (
+            "is not a folder" if not folder.is_dir() else f"checkpoint.npz cannot be read: {error.strerror or error}"
+        )
         raise InputError(f"{name} {reason};{remedy}".removesuffix(";")) from None
     except Exception as error:  # whatever an archive that is spoilt leads to
         reason = short(str(error) or type(error).__name__)

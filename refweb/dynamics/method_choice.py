@@ -75,7 +75,7 @@ def decided(scene, system):
         why = f"damping makes explicit steps {damped:.3g} times shorter ({price}), and ends the waves they would follow"
         return Choice(given_to(scene, "cvode", family="adams"), why)
     if slow and _quiet(scene, system):
-        why = f"tables alone move it from its equilibrium: no waves ask for {price}"
+        why = f"only tables over time move it from its equilibrium, without waves that would need {price}"
         return Choice(given_to(scene, "cvode", family="bdf"), why)
     if digits >= DIGITS_OF_ORDER_6:
         try:

@@ -17,8 +17,8 @@ from .integrators.integrator import MAX_STEPS_PER_ROW, Course
 from .schedule import FEW_CORNERS, Schedule, blocks
 
 NO_TWIN = (
-    "the run whose last state it starts from came to its end without a twin: ± holds what this run adds, not what the "
-    "state is off already"
+    "the run that it starts from had no twin run: ± holds the error that this run adds, not that of "
+    "the state it starts from"
 )
 
 

@@ -170,8 +170,8 @@ def add_errors(solution, run, twin, rows, share):
     """
     one, other = run.course, twin.course
     if one.stopped != other.stopped:
-        which = "the run" if one.stopped else "its twin of a smaller error"
-        solution.warnings.append(f"no errors are known: an event ends {which} and not the other of the two")
+        which = ["the run", "its twin, the second run of a smaller error"][:: 1 if one.stopped else -1]
+        solution.warnings.append("no errors are known: an event ends {}, but not {}".format(*which))
         return
     factor = 1.0 / (1.0 - share)
     solution.reduced = with_errors(run.results, run.corrections, twin.results, rows, twin.rows, factor)

@@ -70,7 +70,7 @@ class Body(Table):
         For a key that the shape lacks or does not have, sizes or a mass that are not > 0, axes that are zero or not at
         right angles, a rounding above half the smallest size, and a name that is no file name; for a free body that has
         no mass or is a box or a cylinder, a fixed one that moves, and a ring that turns about another axis than its
-        normal; from ``extend``, for a name that stands twice, and a free body in statics.
+        normal; from ``extend``, for a name that is listed twice, and a free body in statics.
 
     Examples
     --------
@@ -160,9 +160,9 @@ class Body(Table):
     def extend(self, net):
         """The net with one more row."""
         if any(body.name == self.name for body in net.bodies):
-            raise InputError(f'name = "{self.name}" stands twice: names of bodies are unique')
+            raise InputError(f'name = "{self.name}" is listed twice: names of bodies are unique')
         if not self.fixed and net.quasi_static:
-            raise InputError("fixed = false: a free body has no place in statics; fixed = true holds it")
+            raise InputError("fixed = false: a free body cannot be used in statics; fixed = true holds it")
         body = RigidBody(
             name=self.name,
             row=len(net.points),

@@ -18,7 +18,8 @@ class Reel(Table):
     lines : int, str or list
         Lines, by number or group (see `refweb.net.groups`), or "all".
     factor : sequence of (t, factor)
-        Natural length over its own [1], > 0; linear in between, end values held. In statics t is the load step.
+        Natural length over that without the reel [1], > 0; linear in between, end values held. In statics t is the
+        load step.
 
     Raises
     ------
@@ -42,7 +43,7 @@ class Reel(Table):
         """Refuse a natural length that is not positive."""
         for i, (_, factor) in enumerate(self.factor):
             if not factor > 0.0:
-                raise InputError(f"factor[{i}][1] = {factor:g} must be > 0 [1]: no line is reeled in to nothing")
+                raise InputError(f"factor[{i}][1] = {factor:g} must be > 0 [1]: a line cannot be reeled in to nothing")
 
     def on(self, net):
         """The drive of the natural lengths."""

@@ -42,8 +42,8 @@ class Temperature(Table):
     expansion : float
         Coefficient of linear expansion α [1/K]; that of aramid is negative.
     change : float or sequence of (t, change)
-        Difference ΔT [K] to the temperature at which natural lengths are their own, at all times, or linear in between
-        and end values held. In statics t is the load step.
+        Difference ΔT [K] to the temperature at which natural lengths are those of the web: one number for all times, or
+        a table, linear in between, end values held. In statics t is the load step.
     groups : dict of str to GroupTemperature
         Values that differ by group of lines; groups that share lines give them different keys.
 

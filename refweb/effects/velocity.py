@@ -38,7 +38,7 @@ class Velocity(Table):
     def start(self, net, supported, v):
         """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""
         if net.quasi_static:
-            raise InputError("a velocity has no place in statics: leave it out")
+            raise InputError("a velocity cannot be used in statics: leave it out")
         for node in net.find(self.node):
             allowed = [axis for axis in range(3) if not supported[node, axis]]
             stopped = [axis for axis in range(3) if supported[node, axis] and self.value[axis] != 0.0]

@@ -32,7 +32,8 @@ class Group(Table):
     density : float, optional
         ρ [kg/m³], ≥ 0.
     slackness, smoothing : float, optional
-        ε0 and η of the smooth law [1], ≥ 0.
+        Of the smooth law: the strain ε0 at which lines become taut, and the width η of the passage from slack to taut
+        [1], ≥ 0.
     prestrain : float, optional
         Natural length = distance/(1 + prestrain) [1], > −1.
     strength : float, optional
@@ -80,7 +81,8 @@ class Cable(Table):
     density : float
         ρ [kg/m³], ≥ 0; mass follows natural length.
     slackness, smoothing : float
-        ε0 and η of the smooth law [1], 0 and 1e-5 by default.
+        Of the smooth law: the strain ε0 at which lines become taut, and the width η of the passage from slack to taut
+        [1]; 0 and 1e-5 by default.
     prestrain : float
         Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
     strength : float, optional

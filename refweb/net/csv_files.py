@@ -63,7 +63,7 @@ def _table(path, known):
             reader = csv.reader(file, skipinitialspace=True)
             rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(map(str.strip, row))]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path.name} is no text of rows with commas: {error}") from None
+        raise InputError(f"{path.name} is not a text of rows with commas: {error}") from None
     head = [name.lower() for name in rows[0][1]] if rows else []
     for name in head:
         if name not in known:

@@ -92,7 +92,7 @@ def givers(groups, tables, count, where="groups"):
     for number, (name, table) in enumerate(tables.items()):
         if name not in groups:
             hint = nearest(name, groups) if groups else "this web has no groups"
-            raise InputError(f"{where} {shown(name)} is the group of no line, {hint}")
+            raise InputError(f"{where} {shown(name)} is not a group of lines, {hint}")
         for key in table.to_dict():
             by = found.setdefault(key, np.full(count, -1))
             for line in groups[name][by[groups[name]] >= 0][:1]:

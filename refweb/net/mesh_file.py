@@ -141,7 +141,7 @@ def _check_cells(mesh):
     other = sorted(set(held) - set(INNER) - {"polyline", *HARMLESS})
     if other or not mesh.lines:
         text = ", ".join(f"{count} {kind}" for kind, count in sorted(held.items())) or "no"
-        raise InputError(f"it holds {text} cells: a web has lines and no others; {mesh.remedy}")
+        raise InputError(f"it holds {text} cells: a web has only lines; {mesh.remedy}")
 
 
 def _segments(blocks, points):

@@ -82,9 +82,11 @@ def listed(folder):
         Where ``web.pvd`` cannot be read or lists no web.
     """
     if not Path(folder).is_dir():
-        raise InputError(f'"{folder}" is no folder')
+        raise InputError(f'"{folder}" is not a folder')
     try:
         sets = list(ElementTree.parse(Path(folder) / "web.pvd").iter("DataSet"))
+    except FileNotFoundError:
+        raise InputError(f'"{folder}" holds no web.pvd: name a result folder, as refweb run writes it') from None
     except (OSError, ElementTree.ParseError) as error:
         raise InputError(f'"{folder}" is not a result folder: web.pvd cannot be read ({error})') from None
     found = {}

@@ -132,7 +132,7 @@ def _target(out, default, endings=None):
     from matplotlib.figure import Figure
 
     if out is None and not default.parent.is_dir():
-        raise InputError(f"{default.parent} is no folder")
+        raise InputError(f"{default.parent} is not a folder")
     out = Path(default if out is None else out)
     endings = endings or sorted(Figure().canvas.get_supported_filetypes())
     ending = out.suffix[1:].lower()

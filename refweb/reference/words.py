@@ -7,8 +7,8 @@ import textwrap
 from .pages import header_of, line_of, names, pages_of
 
 RULES = (
-    "Units are SI. A table that is present is an effect that is present. Tables and keys that are not here are "
-    "refused, with the nearest that is; so are numbers that are not finite or above 1e100 in size.",
+    "Units are SI. A table that is present is an effect that is present. Other tables and keys are refused, and "
+    "the message names the nearest; so are numbers that are not finite or above 1e100 in size.",
     'A node is a number, from 0, or a name: "centre", the node nearest the origin; "rim", the nodes that the web '
     'itself supports; "corners", those of a flat web; "all"; or one of the web\'s own names. Lines are numbers, '
     'groups, or "all".',

@@ -50,7 +50,7 @@ def compare(folders):
         has = "; ".join(
             f"{f} has {', '.join(dict.fromkeys(n for n, _ in r))}" for f, r in zip(folders, found, strict=True)
         )
-        raise InputError(f"no result is there twice: {has}")
+        raise InputError(f"no two folders have a result in common: {has}")
     return {
         "folders": list(map(str, folders)),
         "status": [summary["status"] for summary in summaries],

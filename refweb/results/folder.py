@@ -105,9 +105,11 @@ def check_folder(folder, force=False):
     if full and is_alive(folder):
         raise InputError(f"{name}: is being written by a run that is alive: choose another folder, or stop that run")
     if full and not force:
-        raise InputError(f"{name}: is not empty: choose another folder, or force (--force) to replace its results")
+        raise InputError(
+            f"{name}: is not empty: choose another folder, or replace its results with --force (in Python force=True)"
+        )
     if full and read_summary(folder) is None:
-        raise InputError(f"{name}: holds no run.json of refweb, so it is no result of it: nothing was removed")
+        raise InputError(f"{name}: holds no run.json of refweb, so it is not a result folder: nothing was removed")
 
 
 def clear(folder, keep=("run.json",)):
@@ -204,7 +206,7 @@ class Folder:
         except OSError as error:
             raise InputError(f"{self.path / self._table}: cannot be read: {error.strerror}") from None
         if len(kept) < row + 2 or header != ",".join(self._columns):
-            raise InputError(f"{self.path / self._table}: is not the history that checkpoint.npz goes with")
+            raise InputError(f"{self.path / self._table}: is not the history that checkpoint.npz belongs to")
         with self._written():
             self._history = open(self.path / self._table, "r+b", buffering=0)
             _lock(self._history)

@@ -146,7 +146,7 @@ def strain_remark(strain):
     if strain[0] > MUCH:
         yield (
             f"line {strain[1]} is strained by {100.0 * strain[0]:.3g} %, above {100.0 * MUCH:g} %: no cable stretches "
-            "that far, and its law says nothing of it; lower what acts on it, or raise modulus or area"
+            "that far, and its law does not describe it; lower what acts on it, or raise modulus or area"
         )
 
 

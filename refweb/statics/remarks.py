@@ -38,7 +38,7 @@ def remark_on_open(state, equilibrium):
     if not len(open_):
         return ""
     some = ", ".join(map(str, open_[:4])) + (", ..." if len(open_) > 4 else "")
-    how = "stand in parts that only slack lines hold"
+    how = "are in parts that only slack lines hold"
     if np.isin(open_, state.slack_nodes).all():
         how = "hang on slack lines only"
     elif equilibrium.floating.parts is None:
@@ -64,8 +64,8 @@ def remarks_on(state, stats, utilisation, equilibrium):
         law = list(NAMES)[net.laws[others[0]]]
         yield (
             "bound",
-            f'line {net.line[others[0]]} can push (law = "{law}"): the proven bound of law = "tension-only" ends with '
-            "it, and ± are estimates",
+            f'line {net.line[others[0]]} can push (law = "{law}"): ± are estimates, as the proven '
+            'bound asks for law = "tension-only" on all lines',
         )
     if state.system.dead and (net.laws != TENSION_ONLY).any() and stats["smallest_pivot"] != -1:
         pushing = "bars" if _bars_push(state) else "slack lines"
@@ -112,5 +112,5 @@ def collapse_remark(state):
     if far > size and state.strain.max() < 1.0:
         yield (
             f"the web collapses: node {int(moved.argmax())} moves by {moved.max():.4g} m, and the whole web measures "
-            f"{size:.4g} m; lines that do not push hold no shape that hangs on nothing, add supports or lines"
+            f"{size:.4g} m; lines that do not push cannot keep the shape of what nothing holds: add supports or lines"
         )

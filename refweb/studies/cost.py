@@ -181,7 +181,7 @@ def _agreement(found):
     )
     if not found.independent:
         return (
-            f"There are runs of one kind of method alone: {one} and {other} are {agreed:.1f} digits apart, which says "
+            f"There are runs of only one kind of method: {one} and {other} are {agreed:.1f} digits apart, which says "
             "how it converges, and no more."
         )
     if f"{known:.1f}" == f"{agreed:.1f}":

@@ -152,7 +152,7 @@ def _at_rest(system):
     """The system that vibrates; refuses what has no modes."""
     rest = system.at_rest()
     if rest.constraints:
-        raise InputError("[[link]]: modes take no lengths that are held exactly: make it a stiff line")
+        raise InputError("[[link]]: modes cannot hold lengths exactly: make it a stiff line")
     for family in rest.families:
         if family.stiffness is not None and not family.symmetric:
             raise InputError(f"{family.name} has no potential, so there are no natural modes: leave it out")

@@ -112,7 +112,7 @@ class Pencil:
             mark = squared[wanted - 1] - 1e-7 * abs(squared[wanted - 1] - shift)
             if self.below(mark) == low + np.count_nonzero(squared < mark):
                 return vectors[:, :wanted]
-        raise SolverError(f"no modes at step {self.t:g}: below ω² = {mark:.4g} 1/s² some of them stay unfound")
+        raise SolverError(f"no modes at step {self.t:g}: below ω² = {mark:.4g} 1/s² some modes are not found")
 
     def _nearest(self, shift, size, attempt):
         """Eigenvalues next above a shift, as far as they are found, and their vectors."""

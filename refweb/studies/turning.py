@@ -189,7 +189,7 @@ def _definite(gyroscopic, number, least):
         if gyroscopic.below(mark) == np.count_nonzero(omega < mark):
             break
     else:
-        raise SolverError(f"no modes at step {pencil.t:g}: below ω = {mark:.4g} 1/s some of them stay unfound")
+        raise SolverError(f"no modes at step {pencil.t:g}: below ω = {mark:.4g} 1/s some modes are not found")
     omega, vectors, stiff, split = omega[:number], vectors[:, :number], stiff[:number], split[:number]
     rest = gyroscopic.rest(1j * omega, vectors)
     soft = np.column_stack([solve(r.real) + 1j * solve(r.imag) for r in rest.T])

@@ -98,7 +98,7 @@ def _observable(scene, name):
         return next(o for o in (*scene.observables, *default()) if not (o.observable.booked or o.average))
     names = {o.name: o for o in scene.observables}
     if name not in names:
-        raise InputError(f"observe = {shown(name)} is no observable of the scene, {nearest(name, names)}")
+        raise InputError(f"observe = {shown(name)} is not an observable of the scene, {nearest(name, names)}")
     if names[name].average is not None:
         raise InputError(
             f"observe = {shown(name)} is a mean, average = {names[name].average:g}: methods are compared by values of "

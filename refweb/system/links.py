@@ -152,7 +152,7 @@ class Links:
         try:
             return splu(self._matrix)
         except RuntimeError:
-            raise SolverError("links have come to stand so that their forces are not determined") from None
+            raise SolverError("links have moved so that their forces are not determined") from None
 
     def start(self, x, v, force):
         """Accelerations of what has mass [m/s²], and λ [N], for the forces of all else [N]."""

@@ -60,7 +60,7 @@ WRONG = {
     "too large": ("rows = 3", "rows = 1000000000", "[web] rows × columns = 3000000000 must be ≤ 1000000"),
     "slackness": ("strength = 1e6", "slackness = 0.1", "[cable] slackness = 0.1 has no meaning with law"),
     "prestrain": ("strength = 1e6", "prestrain = -1.5", "[cable] prestrain = -1.5 must be > -1 [1]"),
-    "group": ("[[load]]", "[cable.groups.radial]\n[[load]]", '[cable.groups] "radial" is the group of no line'),
+    "group": ("[[load]]", "[cable.groups.radial]\n[[load]]", '[cable.groups] "radial" is not a group of lines'),
     "syntax": ("side = 0.5", "side = ", "wrong.toml: cannot be read: Invalid value (at line 9"),
     "schema": ("title", "schema = 2\ntitle", "schema = 2 must be 1"),
 }
@@ -133,7 +133,7 @@ def test_folder_in_use(here, capsys):
     for out, force, message in [
         ("file", [], "file is a file, not a folder"),
         ("file/folder", ["--force"], "file is a file, not a folder"),
-        ("full", [], "is not empty: choose another folder, or force (--force)"),
+        ("full", [], "is not empty: choose another folder, or replace its results with --force"),
         ("full", ["--force"], "holds no run.json"),
         ("foreign", ["--force"], "holds no run.json of refweb"),
         ("n" * 300, [], "File name too long"),
@@ -141,6 +141,24 @@ def test_folder_in_use(here, capsys):
         assert main(["run", WEB, "--out", out, *force]) == 2
         refused(capsys, f"result folder {out[:50]}", message)
     assert files(here) == ["file", "foreign/run.json", "full/mine.txt"]
+
+
+@pytest.mark.parametrize("verb", ["info", "check", "run"])
+def test_what_is_not_a_scene(verb, here, capsys):
+    """A picture in place of a scene: what is wrong, and what to name."""
+    (here / "web.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    assert main([verb, "web.png"]) == 2
+    refused(capsys, "web.png: is not a scene, a text in UTF-8 (byte 0 is not UTF-8)", "name a TOML file")
+    assert files(here) == ["web.png"]
+
+
+def test_what_is_not_a_result_folder(here, capsys):
+    (here / "empty").mkdir()
+    for given, message in [("empty", "holds no web.pvd: name a result folder"), ("none", "none is not a folder")]:
+        assert main(["picture", given]) == 2
+        refused(capsys, given, message)
+    assert main(["info", "empty"]) == 2
+    refused(capsys, "empty: holds no run.json, so it is not a result folder")
 
 
 def test_force_removes_only_what_a_run_wrote(here, capsys):

@@ -81,7 +81,7 @@ kind = "static"
     )
     capsys.readouterr()
     assert main(["new", "third", "--from", "meshes/net.toml"]) == 2
-    assert "third.toml: web.path of net.toml cannot be changed where they stand" in capsys.readouterr().err
+    assert "third.toml: web.path of net.toml cannot be changed in place" in capsys.readouterr().err
     assert not (here / "third.toml").exists()
 
 
@@ -90,8 +90,8 @@ def test_new_does_not_overwrite(here, capsys):
     (here / "folder.toml").mkdir()
     (here / "wrong.toml").write_text("[web]\nkind = 'paper'\n")
     for arguments, message in [
-        (["net"], "net.toml: is there already: choose another name, or force (--force) to replace it"),
-        (["folder", "--force"], "folder.toml: is there already: choose another name\n"),
+        (["net"], "net.toml: already exists: choose another name, or use --force to replace it"),
+        (["folder", "--force"], "folder.toml: already exists: choose another name\n"),
         (["no/net"], "no/net.toml: there is no folder no"),
         (["other", "--from", "catenari"], 'catenari: no such file and no shipped scene, did you mean "catenary"?'),
         (["other", "--from", "wrong.toml"], "wrong.toml: [cable] is missing"),

@@ -223,7 +223,7 @@ def test_digits_that_cannot_be_had():
     solution = refweb.run(scene)
     assert solution.status == "solved"
     (text,) = (text for text in solution.warnings if "digits" in text)
-    assert text.startswith("x has not the 3 digits asked for") and "not determined" in text
+    assert text.startswith("x does not have the 3 digits asked for") and "not determined" in text
 
 
 def test_bad_input():

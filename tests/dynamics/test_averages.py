@@ -216,7 +216,7 @@ REFUSED = {
     "negative": (dict(average=-1e-3), {}, "average = -0.001 must be > 0 [s]"),
     "long": (dict(average=0.2), {}, "average = 0.2 must be ≤ duration = 0.1 [s]: no window would be full"),
     "tiny": (dict(average=1e-8), {}, "average = 1e-08 must be ≥ 1e-05 [s], the duration over 10000"),
-    "booked": (dict(quantity="kinetic_energy"), {}, 'no meaning for the booked quantity = "kinetic_energy"'),
+    "booked": (dict(quantity="kinetic_energy"), {}, 'no meaning for quantity = "kinetic_energy", which is summed'),
     "static": ({}, dict(solve=refweb.Static()), "average = 0.001 has no meaning in statics: leave it out"),
     "event": (
         {},

@@ -170,8 +170,8 @@ def test_more_corners_than_steps_are_told(solve):
     solution, without = refweb.run(given), refweb.run(plain)
     taken, asked = solution.solver["nsteps"], without.solver["nsteps"]
     found = re.fullmatch(
-        r"1500 corners of tables, 1.33e-05 s apart on average, end steps: (\S+) steps, where stability and rows ask "
-        r"for (\S+), (\S+) times the work",
+        r"steps end at 1500 corners of time tables, 1.33e-05 s apart on average: (\S+) steps, where stability and "
+        r"rows need (\S+), (\S+) times the work",
         told,
     )
     assert told in solution.warnings and not any("corners" in text for text in without.warnings)
@@ -192,7 +192,7 @@ def test_few_corners_are_not_told(capsys, tmp_path):
         out = capsys.readouterr().out
         assert ("corners" in out) == said and bool(remarks_on_corners(given, given.build())) == said
     implicit = trembling(1500, method="cvode")
-    assert remarks_on_corners(implicit, implicit.build())[0].endswith("end steps: cvode takes at least as many")
+    assert remarks_on_corners(implicit, implicit.build())[0].endswith("on average: cvode takes at least as many steps")
 
 
 def test_auto_counts_corners(monkeypatch):

@@ -844,7 +844,7 @@ def test_massless_node(tmp_path):
 
 def test_free_body_in_statics(tmp_path):
     static = dict(solve=refweb.Static(), output=refweb.Output(), accuracy=None)
-    refused("a free body has no place in statics; fixed = true holds it", tmp_path, **static)
+    refused("a free body cannot be used in statics; fixed = true holds it", tmp_path, **static)
     still = [refweb.Velocity(node="all", value=(0, 0, 1))]
     refused(r"\[\[velocity\]\] 1 a velocity has no place in statics", tmp_path, effects=still, **static)
 
@@ -852,9 +852,9 @@ def test_free_body_in_statics(tmp_path):
 def test_contact_and_bodies(tmp_path):
     one, contact = ball()
     refused(r"\[contact\] there is no \[\[body\]\]", tmp_path, effects=[contact])
-    refused(r'\[\[body\]\] 2 name = "ball" stands twice', tmp_path, effects=[one, one, contact])
+    refused(r'\[\[body\]\] 2 name = "ball" is listed twice', tmp_path, effects=[one, one, contact])
     unknown = [refweb.Observe(name="a", quantity="velocity", body="bal")]
-    refused('body = "bal" is no body, did you mean "ball"', tmp_path, observe=unknown)
+    refused('body = "bal" is not a body, did you mean "ball"', tmp_path, observe=unknown)
     refused("the scene has no .*body", tmp_path, observe=unknown, effects=())
     for name in ("web", "Web", "a/b", "", " "):
         with pytest.raises(refweb.InputError, match="name"):

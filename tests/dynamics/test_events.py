@@ -330,8 +330,9 @@ def test_an_event_that_ends_one_of_two_runs():
     )
     assert [result.error for result in solution.results.values()] == [None, None]
     (warning,) = solution.warnings
-    which = "the run" if solution.events[0]["time"] is not None else "its twin of a smaller error"
-    assert warning == f"no errors are known: an event ends {which} and not the other of the two"
+    which = ["the run", "its twin, the second run of a smaller error"]
+    one, other = which if solution.events[0]["time"] is not None else which[::-1]
+    assert warning == f"no errors are known: an event ends {one}, but not {other}"
 
 
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
@@ -385,11 +386,11 @@ ITEMS = dict(
     observe=[{"name": "deflection", "quantity": "displacement", "reduce": "max"}],
 )
 REFUSED = {
-    "body": ({"kind": "contact", "body": "bal"}, '[[event]] 1 body = "bal" is no body, did you mean "ball"?'),
+    "body": ({"kind": "contact", "body": "bal"}, '[[event]] 1 body = "bal" is not a body, did you mean "ball"?'),
     "line": ({"kind": "taut", "line": 24}, "[[event]] 1 line = 24 must be 0 … 23"),
     "observe": (
         {"kind": "threshold", "observe": "deflexion", "value": 1.0},
-        '[[event]] 1 observe = "deflexion" is no observable, did you mean "deflection"?',
+        '[[event]] 1 observe = "deflexion" is not an observable, did you mean "deflection"?',
     ),
     "kind": ({"kind": "contakt"}, '[[event]] 1 kind = "contakt" must be one of "contact", "taut", "threshold"'),
     "no kind": ({}, "[[event]] 1 kind is missing"),
@@ -429,7 +430,7 @@ def test_wrong_events(name):
 
 def test_events_that_fit_nothing():
     touch = {"name": "touch", "kind": "contact"}
-    refused('[[event]] 2 name = "touch" is that of [[event]] 1', given([touch, {**touch, "body": "ball"}]))
+    refused('[[event]] 2 name = "touch" is already used by [[event]] 1', given([touch, {**touch, "body": "ball"}]))
     without = given([touch])
     for key in ("body", "contact"):
         del without[key]

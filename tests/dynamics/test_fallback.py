@@ -1,4 +1,4 @@
-"""``method = "auto"`` falls back on another method where the one it chose comes to no end, and says so."""
+"""``method = "auto"`` falls back on another method where the one it chose cannot finish, and says so."""
 
 import json
 
@@ -77,7 +77,7 @@ def test_the_next_that_takes_the_scene(more, used, once, tmp_path, capsys):
 
     print_run(json.loads((tmp_path / "run" / "run.json").read_text()))
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert f"central-difference comes to no end, {used}" in said and "takes over; energy drift" in said
+    assert f"central-difference cannot finish, {used}" in said and "takes over; energy drift" in said
     with pytest.raises(OpenBook):
         refweb.run(hammer(method="central-difference"))
 
@@ -105,7 +105,7 @@ def test_from_an_implicit_method_to_an_explicit_one(twice, tmp_path):
 def test_where_no_method_comes_to_an_end(tmp_path):
     """A force whose energies are beyond any number: the refusal names each method with its reason."""
     endless = blow(1e100, [(0.0, 0.0), (1e-3, 1e60)])
-    with pytest.raises(SolverError, match="no method that comes to an end") as refusal:
+    with pytest.raises(SolverError, match="no method that can finish") as refusal:
         refweb.run(endless, out=tmp_path / "run")
     summary = json.loads((tmp_path / "run" / "run.json").read_text())
     assert summary["status"] == "failed" and summary["message"] == str(refusal.value)

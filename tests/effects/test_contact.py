@@ -715,7 +715,9 @@ def test_refused_contact(given, message):
 
 def test_spin_without_friction_is_refused():
     ball = refweb.Body(**BALL, angular_velocity=(0.0, 0.0, 1.0))
-    with pytest.raises(refweb.InputError, match='friction = 0 of body "it", which turns: friction > 0 alone feels it'):
+    with pytest.raises(
+        refweb.InputError, match='friction = 0 with body "it", which turns: only friction > 0 feels that'
+    ):
         nets.system(nets.skew_web(), nets.skew_cable(), [ball, refweb.Contact(stiffness=1e3)], False)
 
 

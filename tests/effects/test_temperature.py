@@ -187,7 +187,7 @@ def test_a_scene_is_read_and_written():
         (dict(expansion=0.0, change=-2.0, groups={"edge": {"expansion": 1.0}}), "groups.edge 1 .* = -1 must be > 0"),
         (
             dict(expansion=0.0, change=1.0, groups={"edges": {}}),
-            r'groups "edges" is the group of no line, did .*edge',
+            r'groups "edges" is not a group of lines, did .*edge',
         ),
         (dict(expansion=0.0, change=1.0, groups={"edge": {"modulus": 1.0}}), "groups.edge modulus = 1.0: unknown key"),
         (

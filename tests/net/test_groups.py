@@ -118,7 +118,7 @@ def test_a_thicker_rim(tmp_path, capsys):
     system = refweb.Scene.load(tmp_path / "scene.toml").build()
     assert system.net.cable_mass == pytest.approx(500.0 * 1e-4 * (12 * 3 + 12), rel=1e-14)
     for groups, more, message in (
-        ("[cable.groups.rims]\narea = 1.0", "", '[cable.groups] "rims" is the group of no line, did you mean "rim"?'),
+        ("[cable.groups.rims]\narea = 1.0", "", '[cable.groups] "rims" is not a group of lines, did you mean "rim"?'),
         (
             "[cable.groups.ring-2]\narea = 1e-4\n[cable.groups.columns]\narea = 2e-4",
             "",

@@ -508,9 +508,9 @@ def test_files_that_are_no_web(mesh, tmp_path):
     for cells, message in (
         (
             [("triangle", [[0, 1, 2]]), ("line", [[2, 3]])],
-            "it holds 1 line, 1 triangle cells: a web has lines and no others; ",
+            "it holds 1 line, 1 triangle cells: a web has only lines; ",
         ),
-        ([("vertex", [[0]])], "it holds 1 vertex cells: a web has lines and no others; "),
+        ([("vertex", [[0]])], "it holds 1 vertex cells: a web has only lines; "),
         ([("line", [[0, 1], [1, 2], [2, 9]])], "lines[2] = [2, 9] must be node numbers 0 … 3"),
     ):
         meshio.Mesh(mesh.points, cells).write(tmp_path / "net.vtu")

@@ -120,7 +120,7 @@ def test_what_cannot_be_compared(tmp_path, capsys, monkeypatch):
         (["broken"], "broken/scene.toml: cannot be read"),
         (["strange"], "strange/run.json: is not what a run of refweb writes"),
         (["cost"], "cost: its run.json holds no results"),
-        (["other"], "no result is there twice: a has d; other has e"),
+        (["other"], "no two folders have a result in common: a has d; other has e"),
     ]:
         assert main(["compare", "a", *second]) == 2
         out, err = capsys.readouterr()

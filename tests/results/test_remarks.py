@@ -43,7 +43,7 @@ def test_a_load_on_supports_only(solve):
     """Of two tables the one that does nothing; where some node or axis is free, none."""
     free, held = pull((0.0, 0.0, 1.0)), pull((1.0, 0.0, 2.0), node=[0, 2])
     assert told(solved(free, held, solve=solve), "acts on supports alone") == [
-        "the load on node 0, node 2 acts on supports alone, which take it: it moves nothing"
+        "the load on node 0, node 2 acts only on supports, which carry it: it moves nothing"
     ]
     assert not told(solved(free, pull((1.0, 0.0, 2.0), node=[0, 1]), solve=solve), "acts on supports alone")
 

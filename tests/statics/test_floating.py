@@ -196,7 +196,7 @@ def test_what_floats_is_told(capsys, tmp_path):
     (tmp_path / "scene.toml").write_text(as_toml(pulled_apart(OBSERVE[:3]).to_dict()), encoding="utf-8")
     assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out")]) in (None, 0)
     told = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "2 nodes stand in parts that only slack lines hold, their positions are not unique: 1, 2" in told
+    assert "2 nodes are in parts that only slack lines hold, their positions are not unique: 1, 2" in told
     assert "x lies anywhere from 0.5999 to 1.3 m" in told
 
 

@@ -318,7 +318,7 @@ class Halved(CentralDifference):
     [
         (dict(budget=0.0), "budget = 0"),
         (dict(budget=math.nan), "budget = nan"),
-        (dict(observe="centr"), 'observe = "centr" is no observable of the scene, did you mean "centre"'),
+        (dict(observe="centr"), 'observe = "centr" is not an observable of the scene, did you mean "centre"'),
         (dict(observe="energy"), 'is of quantity "kinetic_energy", must be one of'),
     ],
 )

@@ -340,7 +340,7 @@ def test_modes_that_are_not_found_are_missed(monkeypatch):
         return squared[keep], vectors[:, keep]
 
     monkeypatch.setattr(pencil, "eigsh", careless)
-    with pytest.raises(refweb.SolverError, match="stay unfound"):
+    with pytest.raises(refweb.SolverError, match="some modes are not found"):
         lattice(16, 6)
 
 

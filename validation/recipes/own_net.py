@@ -19,7 +19,7 @@ def scene(layers=LAYERS, duration=0.6):
     return refweb.Scene(
         title="Own net hit by a sphere",
         web=refweb.Layers(mesh="square", layers=layers, cell_area=mesh**2),
-        # Such a net has the groups "rim", "anchors", "inner" and more: see `refweb help web layers`.
+        # Such a net has the groups "rim", "anchors", "inner" and more: see `refweb help web.layers`.
         cable=refweb.Cable(
             law="tension-only",
             modulus=1e9,  # Pa

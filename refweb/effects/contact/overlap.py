@@ -162,7 +162,7 @@ class Deepest(NamedTuple):
     def _remedy(self):
         power = f"1/{self.exponent + self.moving:g}"
         return (
-            f"stiffness = {self.enough:g} would do in place of {self.stiffness:g}, or leave it out "
+            f"stiffness = {self.enough:g} is enough in place of {self.stiffness:g}, or leave it out "
             f"(the overlap falls with k to the power {power})"
         )
 
@@ -255,7 +255,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     """
     net, deep = system.net, AIM * allowed(body)
     if not math.isfinite(deep):
-        raise InputError(f'stiffness is missing for body "{body.name}", whose size has no end: give stiffness = ...')
+        raise InputError(f'stiffness is missing for body "{body.name}", whose size is infinite: give stiffness = ...')
     lines = net.line_data[:, AXIAL_STIFFNESS] / (net.natural_length * exponent * deep ** (exponent - 1.0))
     push = max(_push(system, body, t) for t in (*load_steps, *_times(system)))
     asked = push / deep**exponent

@@ -80,8 +80,8 @@ class Contact(Table):
     ------
     InputError
         For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from
-        ``extend``, for a body that turns and has no friction; from ``on``, without a body, and for one of ``bodies``
-        that is none.
+        ``extend``, for a body that turns and has no friction; from ``on``, without a body, and for a name in
+        ``bodies`` that no body has.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class Contact(Table):
         turned = [body.name for body in net.bodies if not body.fixed and self._of(body, "friction") > 0.0]
         for body in net.bodies:
             if any(body.angular_velocity) and body.name not in turned:
-                raise InputError(f'friction = 0 of body "{body.name}", which turns: friction > 0 alone feels it')
+                raise InputError(f'friction = 0 with body "{body.name}", which turns: only friction > 0 feels that')
         rows = {name: len(net.points) + i for i, name in enumerate(turned)}
         return replace(
             net,
@@ -138,7 +138,7 @@ class Contact(Table):
             raise InputError("there is no [[body]] that the web could touch: add one")
         for name in self.bodies:
             if name not in names:
-                raise InputError(f'bodies."{name}" is no body, {nearest(name, names)}')
+                raise InputError(f'bodies."{name}" is not a body, {nearest(name, names)}')
         for name in self.left_out(net.bodies):
             raise InputError(f'stiffness is missing for body "{name}": a Scene chooses it, a System does not')
         functions = np.linalg.inv(np.vander(np.sort(net.places), increasing=True))

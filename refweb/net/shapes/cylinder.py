@@ -11,7 +11,7 @@ from .rounding import check_rounding, edge_radius, shrunk
 
 @table
 class Cylinder(Shape):
-    """A cylinder; its axis stands third.
+    """A cylinder; its axis is its third direction.
 
     Parameters
     ----------

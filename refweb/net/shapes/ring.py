@@ -16,7 +16,7 @@ TUBE = 0.04
 
 @table
 class Ring(Shape):
-    """A ring as its web sees it along its normal: no end to it along that axis, which stands third.
+    """A ring; along its normal, its third direction, it has no ends.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class Nodal(Observable):
             names = [body.name for body in net.bodies]
             if body not in names:
                 hint = nearest(body, names) if names else "the scene has no [[body]]"
-                raise InputError(f'body = "{body}" is no body, {hint}')
+                raise InputError(f'body = "{body}" is not a body, {hint}')
             return np.array([net.bodies[names.index(body)].row])
         return np.arange(net.nodes) if self.observe.node is None else net.find(self.observe.node)
 

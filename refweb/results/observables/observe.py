@@ -42,13 +42,13 @@ class Observe(Table):
     reduce : {"max", "min", "final"}
         Reduction over time.
     average : float, optional
-        Length of a window [s], in dynamics: the mean over it counts in place of the value, which in a web of many waves
-        has digits where an instant has none. The window slides along the run and ends at the instant: rows of the
-        history hold the mean until their time, and ``reduce`` takes its value of that mean, which stands at no node or
-        line. Until a window is full the mean is that of what has passed, at t = 0 the value itself; the largest and the
-        smallest are those of full windows alone. Of several nodes or lines it is the mean of the largest value, not
-        the largest of means. Energies, work and step size take none: they are booked over steps, where impulses and
-        work between two instants are known already, and not looked at in each.
+        Length of a window [s], in dynamics: its mean is taken in place of the value. In a web of many waves the mean
+        has digits where an instant has none. The window slides along the run and ends at the instant: each row of the
+        history holds the mean until its time, and ``reduce`` takes the largest, smallest or final mean, which belongs
+        to no node or line. Before the first window is full the mean is over the time that has passed, at t = 0 the
+        value itself; "max" and "min" look at full windows only. With several nodes or lines it is the mean of the
+        largest value, not the largest of the means. Energies, work and step size have no window: they are summed over
+        steps.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Observe(Table):
         """Refuse a node, line or component that the quantity does not have."""
         if "," in self.name or '"' in self.name:
             raise InputError(
-                f"name = {shown(self.name)} must be free of commas and quotes: it heads a column of history.csv"
+                f"name = {shown(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
         for key in ("node", "body", "component", "line"):
             if getattr(self, key) is not None and key not in self.observable.keys:
@@ -91,7 +91,8 @@ class Observe(Table):
             raise InputError(f"node = {shown(self.node)} and body = {shown(self.body)} exclude each other")
         if self.average is not None and self.observable.booked:
             raise InputError(
-                f'average = {self.average:g} has no meaning for the booked quantity = "{self.quantity}": leave it out'
+                f'average = {self.average:g} has no meaning for quantity = "{self.quantity}", which is summed over '
+                "steps: leave it out"
             )
 
     @property

@@ -23,9 +23,9 @@ class Overlap(Observable):
         if not system.contact:
             raise InputError('quantity = "overlap" needs [contact] in the scene')
         if body is None and len(names) > 1:
-            raise InputError(f'body is missing: quantity = "overlap" is of one body, {nearest("", names)}')
+            raise InputError(f'body is missing: quantity = "overlap" needs one body, {nearest("", names)}')
         if body is not None and body not in names:
-            raise InputError(f'body = "{body}" is no body, {nearest(body, names)}')
+            raise InputError(f'body = "{body}" is not a body, {nearest(body, names)}')
 
     def _body(self, net):
         """The body it is of."""
