@@ -664,7 +664,7 @@ def test_scene_in_python():
     with pytest.raises(refweb.InputError, match="scene = 5 must be a Scene, a scene file or the name of a shipped"):
         refweb.run(5)
     gravity = refweb.Gravity(acceleration=(0, 0, -1))
-    with pytest.raises(refweb.InputError, match="stands 2 times"):
+    with pytest.raises(refweb.InputError, match="is listed 2 times"):
         refweb.Scene(web=web, cable=cable, effects=[gravity, gravity]).build()
     with pytest.raises(refweb.InputError, match="scene file cannot hold it"):
         refweb.Scene(web=web, cable=cable).to_dict()

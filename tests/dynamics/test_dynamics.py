@@ -846,7 +846,7 @@ def test_free_body_in_statics(tmp_path):
     static = dict(solve=refweb.Static(), output=refweb.Output(), accuracy=None)
     refused("a free body cannot be used in statics; fixed = true holds it", tmp_path, **static)
     still = [refweb.Velocity(node="all", value=(0, 0, 1))]
-    refused(r"\[\[velocity\]\] 1 a velocity has no place in statics", tmp_path, effects=still, **static)
+    refused(r"\[\[velocity\]\] 1 a velocity cannot be used in statics", tmp_path, effects=still, **static)
 
 
 def test_contact_and_bodies(tmp_path):

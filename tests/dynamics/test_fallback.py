@@ -1,4 +1,4 @@
-"""``method = "auto"`` falls back on another method where the one it chose cannot finish, and says so."""
+"""``method = "auto"`` tries another method where the one it chose cannot finish, and says so."""
 
 import json
 

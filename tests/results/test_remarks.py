@@ -42,20 +42,20 @@ def pull(force, node=1):
 def test_a_load_on_supports_only(solve):
     """Of two tables the one that does nothing; where some node or axis is free, none."""
     free, held = pull((0.0, 0.0, 1.0)), pull((1.0, 0.0, 2.0), node=[0, 2])
-    assert told(solved(free, held, solve=solve), "acts on supports alone") == [
+    assert told(solved(free, held, solve=solve), "acts only on supports") == [
         "the load on node 0, node 2 acts only on supports, which carry it: it moves nothing"
     ]
-    assert not told(solved(free, pull((1.0, 0.0, 2.0), node=[0, 1]), solve=solve), "acts on supports alone")
+    assert not told(solved(free, pull((1.0, 0.0, 2.0), node=[0, 1]), solve=solve), "acts only on supports")
 
 
 def test_a_load_that_comes_later():
     """A table that begins with nothing is looked at where there is something."""
     later = refweb.Load(node=0, force=(0.0, 0.0, 1.0), factor=[(0.0, 0.0), (5e-4, 0.0), (6e-4, 1.0), (7e-4, 0.0)])
     solution = solved(later, solve=refweb.Dynamic(duration=1e-3))
-    assert len(told(solution, "acts on supports alone")) == 1
+    assert len(told(solution, "acts only on supports")) == 1
     rolling = refweb.Supports(nodes=[0], components=["x", "y"])
     scene = solution.scene.replace(supports=refweb.Supports(nodes=[2]), support=[rolling])
-    assert not told(refweb.run(scene), "acts on supports alone")
+    assert not told(refweb.run(scene), "acts only on supports")
 
 
 # Strains

@@ -228,7 +228,7 @@ def test_massless_nodes_are_for_ida_alone(coarse):
     refused = {t.method for t in found.trials if t.status == "refused"}
     assert refused == METHODS - {"ida"}
     assert all("has no mass" in t.message for t in found.trials if t.status == "refused")
-    assert not found.independent and "one kind of method alone" in found.sentence
+    assert not found.independent and "only one kind of method" in found.sentence
     assert {t.method for t in found.references} == {"ida"}
 
 

@@ -394,7 +394,7 @@ def test_wrong_input(monkeypatch):
     with pytest.raises(refweb.InputError, match="no node is free"):
         refweb.modes(held)
     linked = refweb.Dynamic(duration=1.0, method="ida")
-    with pytest.raises(refweb.InputError, match=r"\[\[link\]\]: modes take no lengths"):
+    with pytest.raises(refweb.InputError, match=r"\[\[link\]\]: modes cannot hold lengths"):
         refweb.modes(small(solve=linked).replace(effects=[refweb.Link(nodes=[0, 1])]))
     monkeypatch.setattr(System, "at_rest", lambda system: _follower(system))
     with pytest.raises(refweb.InputError, match="elasticity has no potential"):
