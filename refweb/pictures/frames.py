@@ -86,7 +86,7 @@ def listed(folder):
     try:
         sets = list(ElementTree.parse(Path(folder) / "web.pvd").iter("DataSet"))
     except FileNotFoundError:
-        raise InputError(f'"{folder}" holds no web.pvd: name a result folder, as refweb run writes it') from None
+        raise InputError(f'"{folder}" is not a result folder, it holds no web.pvd: name one of refweb run') from None
     except (OSError, ElementTree.ParseError) as error:
         raise InputError(f'"{folder}" is not a result folder: web.pvd cannot be read ({error})') from None
     found = {}

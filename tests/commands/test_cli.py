@@ -154,7 +154,10 @@ def test_what_is_not_a_scene(verb, here, capsys):
 
 def test_what_is_not_a_result_folder(here, capsys):
     (here / "empty").mkdir()
-    for given, message in [("empty", "holds no web.pvd: name a result folder"), ("none", "none is not a folder")]:
+    for given, message in [
+        ("empty", "is not a result folder, it holds no web.pvd: name one of refweb run"),
+        ("none", "none is not a folder"),
+    ]:
         assert main(["picture", given]) == 2
         refused(capsys, given, message)
     assert main(["info", "empty"]) == 2
