@@ -336,7 +336,7 @@ def test_solved_and_static_runs_are_not_resumed(tmp_path, capsys, interrupted):
     shutil.copytree(interrupted, folder)
     assert main(["resume", str(folder)]) == 0
     assert main(["resume", str(folder)]) == 2
-    assert "solved run: there is nothing to go on with" in capsys.readouterr().err
+    assert "solved run: there is nothing to continue" in capsys.readouterr().err
     static = refweb.Scene(web=WEB, cable=CABLE, solve=refweb.Static(load_steps=[0.0]))
     refweb.run(static, out=tmp_path / "static")
     text = (tmp_path / "static" / "run.json").read_text()
