@@ -49,8 +49,7 @@ class Body(Table):
     axis : sequence of 3 float
         Axis of a cylinder.
     rounding : float, optional
-        Radius of the edges of a box or a cylinder [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of its
-        smallest size.
+        Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
     mass : float, optional
         Mass [kg], > 0; needed unless the body is fixed.
     position : sequence of 3 float

@@ -343,12 +343,12 @@ def test_block_slides_to_rest():
     assert 1.6 < slope(np.array(ways) - limit, slips) < 2.0
 
 
-README = (pathlib.Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+REFERENCE = (pathlib.Path(__file__).parents[2] / "validation" / "REFERENCE.md").read_text(encoding="utf-8")
 
 
 def test_slip_velocity_by_default():
-    """At the one that the README names friction is 1/√2 of μ N, and far above it all of it."""
-    slip = float(re.search(r"`slip_velocity` \((\S+) m/s\)", README).group(1))
+    """At the one that the reference names friction is 1/√2 of μ N, and far above it all of it."""
+    slip = float(re.search(r"`slip_velocity` \| number > 0 \| m/s \| `(\S+)`", REFERENCE).group(1))
     web = refweb.Inline(points=[[-0.1, 0, 0], [0.1, 0, 0]], lines=[[0, 1]]).web()
     effects = [rigid("sphere", position=(0.0, 0.0, -0.299)), refweb.Contact(stiffness=1e4, friction=0.5)]
     material = refweb.Cable(law="linear", modulus=1e6, area=1e-4, density=1.0)
@@ -362,11 +362,11 @@ def test_slip_velocity_by_default():
 
 @pytest.mark.parametrize("shape", ["box", "cylinder"])
 def test_rounding_by_default(shape):
-    """Of the share of the smallest size that the README names: a line past an edge touches where the round begins.
+    """Of the share of the smallest size that the reference names: a line past an edge touches where the round begins.
 
     It runs along the edge, in the plane that halves its angle; there the surface lies (√2 − 1) r within the sharp edge.
     """
-    share = float(re.search(r"`rounding` \((\S+) % of the smallest size\)", README).group(1)) / 100.0
+    share = float(re.search(r"> 0, by default (\S+) % of the smallest size", REFERENCE).group(1)) / 100.0
     sizes = dict(box=dict(size=(0.6, 0.5, 0.8)), cylinder=dict(radius=0.3, length=0.5, axis=(0.0, 1.0, 0.0)))[shape]
     within = (np.sqrt(2.0) - 1.0) * share * 0.5
     body = refweb.Body(name="it", shape=shape, position=(0.0, 0.0, 0.0), fixed=True, **sizes)

@@ -22,8 +22,8 @@ class Cylinder(Shape):
     axis : sequence of 3 float
         Its axis.
     rounding : float, optional
-        Radius of the edges [m], > 0, by default `refweb.net.shapes.rounding.ROUNDING` of the smallest size. How depth
-        goes on below says `refweb.net.grown_core`.
+        Radius of the edges [m], > 0, by default 2 % of the smallest size. `refweb.net.grown_core` says how
+        depth goes on below.
 
     Examples
     --------
