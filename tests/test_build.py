@@ -56,7 +56,7 @@ def test_parts_are_enough():
     [
         ({"effects": (refweb.Load(node=3, force=(0, 0, 1)),)}, r"^\[\[load\]\] 1 node = 3 must be 0 … 2"),
         ({"support": (refweb.Supports(nodes=7),)}, r"^\[\[support\]\] 1 nodes = 7 must be 0 … 2"),
-        ({"effects": (refweb.Gravity(acceleration=(0, 0, 1)),) * 2}, r"^\[gravity\] stands 2 times"),
+        ({"effects": (refweb.Gravity(acceleration=(0, 0, 1)),) * 2}, r"^\[gravity\] is listed 2 times"),
     ],
 )
 def test_refusals_begin_with_their_table(changes, message):
