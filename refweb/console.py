@@ -290,7 +290,7 @@ def print_comparison(found):
         said = "agree" if row["agree"] else "differ"
         if row["agree"] is None:
             said = "only in " + next(f for f, value in zip(folders, row["values"], strict=True) if value is not None)
-        difference = "" if row["agree"] is None else readable(apart, None, row["unit"])
+        difference = "" if len(there) < 2 else readable(apart, None, row["unit"])
         grid.add_row(Text(name), *map(_compared, row["values"]), Text(difference), Text(said))
     rows.append(("results", grid))
     known = (value is None or value["error"] is not None for row in found["results"] for value in row["values"])

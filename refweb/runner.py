@@ -11,7 +11,7 @@ import numpy as np
 
 from .errors import InputError, TooSoft, in_file
 from .messages import short
-from .results.folder import Folder, check_folder, is_alive
+from .results.folder import Folder, check_folder, fingerprint, is_alive
 from .results.progress import followed
 from .results.provenance import versions, web_of
 from .results.run_status import Clock, recorded
@@ -99,6 +99,10 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
     kept = checkpoint(folder, name) if (folder / "checkpoint.npz").exists() else None
     if kept is None:
         return _solve(scene, folder, progress, announce)
+    if str(kept.get("scene", "")) not in ("", fingerprint(folder)):
+        raise InputError(
+            f"{name} its scene.toml is not that of the run any more: put it back, or begin anew with refweb run --force"
+        )
     return _solve(scene, folder, progress, announce, kept, summary)
 
 

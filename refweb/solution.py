@@ -9,7 +9,7 @@ import numpy as np
 from .errors import InputError
 from .messages import nearest, short
 from .results.folder import read_summary
-from .results.solution import Result, SolutionData
+from .results.solution import OTHER_ERRORS, Result, SolutionData
 from .scene import Scene
 
 
@@ -120,7 +120,8 @@ class Solution(SolutionData):
         ----------
         what : {"history", "results"}
             The history by time or load step, a column for each quantity; or the results by name, with the columns
-            ``value``, ``error``, ``unit``, ``time``, ``at`` and ``where``.
+            ``value``, ``error``, ``unit``, ``time``, ``at`` and ``where``. Of a run that looked for them ``smoothing``
+            and ``discretisation`` follow.
 
         Returns
         -------
@@ -140,9 +141,10 @@ class Solution(SolutionData):
         except ImportError:
             raise InputError("to_pandas needs pandas: pip install pandas") from None
         if what == "results":
-            keys = ("value", "error", "unit", "time", "at", "where")
+            keys = ["value", "error", "unit", "time", "at", "where"]
+            keys += [key for key in OTHER_ERRORS if any(getattr(r, key) is not None for r in self.results.values())]
             rows = {name: [getattr(result, key) for key in keys] for name, result in self.results.items()}
-            found = pandas.DataFrame.from_dict(rows, orient="index", columns=list(keys))
+            found = pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
             return found.astype({"where": "Int64"})
         table = pandas.DataFrame(dict(self.history))
         table = table.set_index(table.columns[0])
@@ -209,7 +211,7 @@ def load(folder) -> Solution:
             found.utilisation = used["value"], used["line"]
         found.steps = [{**step, "results": _results(step["results"])} for step in summary["steps"]]
         found.reduced = {} if found.steps else _results(summary["results"])
-    except (KeyError, TypeError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
     found.columns, found.state = _columns(folder), _last_state(folder, scene)
     return found
@@ -236,6 +238,8 @@ def scene_of(folder, summary):
 def _results(given):
     """Results by name of what ``run.json`` says of them."""
     found = {name: Result(**one) for name, one in given.items()}
+    if not all(isinstance(one.value, float | int) and isinstance(one.error, float | None) for one in found.values()):
+        raise TypeError("a value is not a number")
     for name, one in found.items():
         if one.interval is not None:
             ends = (-np.inf if one.interval[0] is None else one.interval[0], one.interval[1])

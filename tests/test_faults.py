@@ -302,7 +302,7 @@ REFUSED = {
     "history too short": (spoil_history, "is not the history that checkpoint.npz belongs to"),
     "no history": (lambda folder: (folder / "history.csv").unlink(), "history.csv: cannot be read"),
     "checkpoint cut": (lambda f: os.truncate(f / "checkpoint.npz", 500), "is not what a run of refweb writes"),
-    "other web": (other_web, "not that of a run that scene.toml leads to"),
+    "other web": (other_web, "scene.toml is not that of the run any more"),
 }
 
 
@@ -329,6 +329,24 @@ def test_what_cannot_be_resumed(tmp_path, capsys, interrupted, name):
     err = capsys.readouterr().err
     assert message in err and err.count("\n") == 1
     assert (files(folder) if folder.exists() else {}) == before
+
+
+EDITS = [("density = ", "density = 1"), ("duration = ", "duration = 1"), ('title = "', 'title = "x')]
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_a_run_whose_scene_was_edited_is_not_resumed(tmp_path, capsys, interrupted, edit):
+    """What went before is not that of the edited scene, whatever of it was edited."""
+    folder = tmp_path / "run"
+    shutil.copytree(interrupted, folder)
+    text = (folder / "scene.toml").read_text()
+    assert edit[0] in text
+    (folder / "scene.toml").write_text(text.replace(*edit))
+    before = files(folder)
+    assert main(["resume", str(folder)]) == 2
+    assert "scene.toml is not that of the run any more" in capsys.readouterr().err and files(folder) == before
+    (folder / "scene.toml").write_text(text)
+    assert main(["resume", str(folder)]) == 0
 
 
 def test_solved_and_static_runs_are_not_resumed(tmp_path, capsys, interrupted):

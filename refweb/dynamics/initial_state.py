@@ -10,6 +10,9 @@ from ..errors import InputError
 from ..messages import short
 from ..net.rigid_body import row_names
 
+OFF = 1e-9
+"""Distance from its place at which a support is told of, over the size of the web."""
+
 
 class Start(NamedTuple):
     """Where a run begins.
@@ -43,6 +46,11 @@ def remarks_on(start, system):
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+    off = np.linalg.norm(np.where(system.supported, there, 0.0)[: system.net.nodes], axis=1)
+    off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
+    if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
+        worst = int(off.argmax())
+        yield f"node {worst} is held where the start has it, {off[worst]:.4g} m off its place in this scene"
     pushed = np.concatenate([np.zeros(0), *(energy for contact, energy in inner if contact)])
     if pushed.max(initial=0.0) > 0.0:
         line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
@@ -109,6 +117,8 @@ def stored(system, folder):
         raise InputError(
             f"{name} holds {nodes} nodes, must be those of this scene, {net.nodes}: same web, order and subdivide"
         )
+    if "lines" in given and not np.array_equal(given["lines"], net.web.lines):
+        raise InputError(f"{name} holds other lines between its nodes than this scene: it must be the same web")
     start = _start_at(system, positions, displacements, velocities, bodies)
     x, v = (given.get(f"twin_{one}") for one in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):

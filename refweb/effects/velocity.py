@@ -13,7 +13,7 @@ class Velocity(Table):
     Parameters
     ----------
     node : int, str or list
-        Nodes, by number or name.
+        Nodes, by number or name. Of several velocities of one node the last counts: first those of "all".
     value : sequence of 3 float
         Velocity [m/s].
 

@@ -96,9 +96,14 @@ def _row(key, values):
         "step": key[1],
         "unit": first["unit"],
         "values": [value and {k: value.get(k) for k in ("value", "error", "interval", "unit")} for value in values],
-        "differences": [value and value["value"] - first["value"] for value in values],
+        "differences": [_difference(value, first) for value in values],
         "agree": _agree(there) if len(there) > 1 else None,
     }
+
+
+def _difference(value, first):
+    """Of two values of one unit; None of others."""
+    return value["value"] - first["value"] if value and value["unit"] == first["unit"] else None
 
 
 def _agree(results):

@@ -7,6 +7,7 @@ listed in ``web.pvd`` after it and the checkpoint of its state are there, and it
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import os
 import pathlib
@@ -59,6 +60,11 @@ def is_alive(folder):
     except (OSError, StopIteration):
         return None
     return False
+
+
+def fingerprint(folder):
+    """What tells the scene of a folder apart from others, that of an edited ``scene.toml`` among them."""
+    return hashlib.sha256((folder / "scene.toml").read_bytes()).hexdigest()
 
 
 def reached(folder):
@@ -255,6 +261,7 @@ class Folder:
             net = state.system.net
             arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
             arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
+            arrays |= {"lines": net.web.lines, "scene": fingerprint(self.path)}
             arrays |= run or {}
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self.listed([(number, state.time if shape is None else number)], net.bodies)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+from .solution import OTHER_ERRORS
 from .units import place, readable
 
 
@@ -11,11 +12,16 @@ def of_solution(solution):
     """Title, status, results with their ±, warnings, and what it cost."""
     dynamic = not solution.steps
     head = ["result", "value", *(["time"] if dynamic else []), "at"]
-    rows = []
+    rows, remarks = [], []
     for name, one in solution.results.items():
         time = [f"{one.time:.6g} s"] if dynamic else []
         rows.append([name, readable(one.value, one.error, one.unit), *time, place(one.where, one.at)])
-    said = [solution.message, *(f"warning: {text}" for text in solution.warnings)]
+    for key, text in zip(OTHER_ERRORS, ("smoothing moves", "elements leave"), strict=True):
+        found = {name: r for name, r in solution.results.items() if getattr(r, key) is not None}
+        if found:
+            parts = (f"{name} by {readable(getattr(r, key), None, r.unit)}" for name, r in found.items())
+            remarks.append(f"{text} {', '.join(parts)}")
+    said = [*remarks, solution.message, *(f"warning: {text}" for text in solution.warnings)]
     cost = f"{solution.solver.get('method')}, {solution.cost['cpu_s']:.2f} s CPU"
     if len(solution.steps) > 1:
         said.insert(0, f"at load step {solution.steps[-1]['step']:g}, the last of {len(solution.steps)}")

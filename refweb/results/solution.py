@@ -19,6 +19,10 @@ SOLVER = dict.fromkeys(
 """What a solver reports; None for what it does not know."""
 
 
+OTHER_ERRORS = ("smoothing", "discretisation")
+"""Errors of a result besides ± of the scene as it stands."""
+
+
 class Names(dict):
     """A dict whose unknown keys are answered with the nearest one."""
 
@@ -48,7 +52,7 @@ class Result(NamedTuple):
 
     def plain(self):
         """As a dict, without the errors that were not looked for; an end of an interval that is infinite is None."""
-        extra = {key: value for key in ("smoothing", "discretisation") if (value := getattr(self, key)) is not None}
+        extra = {key: value for key in OTHER_ERRORS if (value := getattr(self, key)) is not None}
         if self.where is not None:
             extra["at"] = self.at
         if self.interval is not None:

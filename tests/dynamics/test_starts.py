@@ -351,6 +351,31 @@ def test_another_net_is_refused(ended, tmp_path, changes, nodes):
     assert not (tmp_path / "out").exists()
 
 
+def chain(points, lines, supports, start="web", **solve):
+    """A chain of lines, in statics under 1 N or in dynamics from a folder."""
+    solve = refweb.Dynamic(duration=1e-3, start=str(start)) if start != "web" else refweb.Static()
+    loads = [refweb.Load(node=1, force=(1.0, 0.0, 0.0))] if start == "web" else []
+    web = refweb.Inline(points=points, lines=lines, supports=supports)
+    return refweb.Scene(web=web, cable=cable(law="linear"), effects=loads, solve=solve)
+
+
+def test_other_lines_between_the_same_nodes_are_refused(tmp_path):
+    points = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
+    refweb.run(chain(points, [[0, 1], [1, 2]], [0, 2]), out=tmp_path / "run")
+    with pytest.raises(refweb.InputError, match="holds other lines between its nodes than this scene"):
+        refweb.run(chain(points, [[0, 1], [0, 2]], [0, 2], tmp_path / "run"))
+
+
+def test_a_support_off_its_place_is_told(tmp_path):
+    """Of the same lines between nodes elsewhere: the start has the node at 2 m, this scene at 3 m."""
+    lines = [[0, 1], [1, 2]]
+    refweb.run(chain([[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines, [0, 2]), out=tmp_path / "run")
+    same = refweb.run(chain([[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines, [0, 2], tmp_path / "run"))
+    assert not same.warnings
+    moved = refweb.run(chain([[0, 0, 0], [1.5, 0, 0], [3, 0, 0]], lines, [0, 2], tmp_path / "run"))
+    assert "node 2 is held where the start has it, 1 m off its place in this scene" in moved.warnings
+
+
 def swing(duration, start="web", error="twin", **changes):
     """A mass on a linear line, thrown along it at 1 m/s: x = sin(ωt)/ω with ω = √(EA/Lm) = 200/s."""
     return refweb.Scene(

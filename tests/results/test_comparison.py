@@ -133,3 +133,11 @@ def test_runs_of_the_catenary(tmp_path):
         refweb.run(refweb.Scene.load("catenary", {"web.elements": elements}), out=tmp_path / name)
     assert compare([tmp_path / "a", tmp_path / "b"])["agree"] and not compare([tmp_path / "a", tmp_path / "c"])["agree"]
     assert [row["path"] for row in compare([tmp_path / "a", tmp_path / "c"])["scene"]] == ["web.elements"]
+
+
+def test_units_that_differ_have_no_difference(tmp_path, capsys):
+    one, other = (folder(tmp_path / unit, {"d": result(1.0, unit=unit)}) for unit in ("m", "N"))
+    assert compare([one, other])["results"][0]["differences"] == [0.0, None]
+    assert main(["compare", str(one), str(other)]) == 1
+    row = next(line for line in capsys.readouterr().out.splitlines() if " d " in line)
+    assert "differ" in row and row.split("N", 1)[1].split() == ["differ", "│"]

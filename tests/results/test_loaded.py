@@ -251,3 +251,33 @@ def test_compiling_is_told_apart():
     assert 0.0 < spent["compile_s"] <= spent["wall_s"]
     function(2.0)
     assert clock.spent()["compile_s"] == spent["compile_s"] and Clock().spent()["compile_s"] == 0.0
+
+
+def test_errors_of_smoothing_and_elements_are_shown_beside(tmp_path):
+    """Of a hanging cable with the smooth law: in tables and in notebooks, as in the terminal."""
+    pytest.importorskip("pandas", reason="an extra of the user's")
+    web = refweb.SingleCable(start=(0, 0, 0), end=(1, 0, 0), elements=4, length=1.1)
+    cable = refweb.Cable(law="smooth", modulus=7e7, area=1e-4, density=200.0)
+    gravity, accuracy = refweb.Gravity(acceleration=(0, 0, -9.81)), refweb.Accuracy(refine=True)
+    found = refweb.run(refweb.Scene(web=web, cable=cable, effects=[gravity], accuracy=accuracy))
+    table, shown = found.to_pandas("results"), found._repr_html_()
+    for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
+        assert table.loc["deflection", key] == getattr(found.results["deflection"], key) > 0.0
+        assert f"{text} deflection by" in shown
+
+
+def test_numbers_that_are_none_are_refused(both, tmp_path):
+    _, read = both
+    read.save(tmp_path / "run")
+    summary = json.loads((tmp_path / "run" / "run.json").read_text())
+    for results in (summary["results"], *(step["results"] for step in summary["steps"])):
+        results["deflection"]["value"] = "abc"
+    (tmp_path / "run" / "run.json").write_text(json.dumps(summary))
+    with pytest.raises(refweb.InputError, match=r"run\.json: is not what a run of refweb writes"):
+        refweb.load(tmp_path / "run")
+
+
+def test_a_folder_is_no_scene(both, capsys):
+    _, read = both
+    assert main(["check", str(read.path)]) == 2
+    assert "is a folder, not a scene file: name " in capsys.readouterr().err

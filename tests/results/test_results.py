@@ -279,7 +279,8 @@ def test_selected_frames(tmp_path, every, kept):
 
 def test_checkpoint(written, solution):
     with np.load(written / "checkpoint.npz") as checkpoint:
-        assert set(checkpoint) == {"time", "positions", "displacements", "velocities", "supported", "bodies"}
+        state = {"time", "positions", "displacements", "velocities", "supported", "bodies"}
+        assert set(checkpoint) == state | {"lines", "scene"}
         assert checkpoint["time"] == STEPS[-1] and checkpoint["bodies"].tolist() == []
         np.testing.assert_array_equal(checkpoint["positions"], solution.positions)
         np.testing.assert_array_equal(checkpoint["displacements"], solution.displacement)

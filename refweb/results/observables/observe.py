@@ -40,7 +40,7 @@ class Observe(Table):
     component : {0, 1, 2, "x", "y", "z"}, optional
         Axis of a nodal quantity; without it the magnitude.
     reduce : {"max", "min", "final"}
-        Reduction over time.
+        Reduction over time; in statics none, where each load step has results of its own.
     average : float, optional
         Length of a window [s], in dynamics: its mean is taken in place of the value. In a web of many waves the mean
         has digits where an instant has none. The window slides along the run and ends at the instant: each row of the
