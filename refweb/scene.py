@@ -330,8 +330,8 @@ def file_of(source):
     if os.path.isfile(path):
         return path
     known = [p.stem for p in shipped]
-    if path.is_dir() and path.name not in known:
-        hint = f": name {short(str(path))}/scene.toml" if (path / "scene.toml").is_file() else ""
+    if os.path.isdir(source) and path.name not in known:
+        hint = f": name {short(str(path))}/scene.toml" if os.path.isfile(path / "scene.toml") else ""
         raise InputError(f"{short(str(source))}: is a folder, not a scene file{hint}")
     if str(path).removesuffix(".toml") not in known:
         raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")

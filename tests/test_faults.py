@@ -349,6 +349,23 @@ def test_a_run_whose_scene_was_edited_is_not_resumed(tmp_path, capsys, interrupt
     assert main(["resume", str(folder)]) == 0
 
 
+def test_an_edit_in_the_middle_of_a_run_is_seen(tmp_path, capsys):
+    """The checkpoint goes with the scene that is run, not with what stands in its file by then."""
+    file = tmp_path / "run" / "scene.toml"
+
+    def edit(text, share):
+        if share > 0.2:
+            file.write_text(file.read_text() + "# edited\n")
+        if share > 0.8:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refweb.run(scene(), out=tmp_path / "run", progress=edit)
+    assert (tmp_path / "run" / "checkpoint.npz").exists()
+    assert main(["resume", str(tmp_path / "run")]) == 2
+    assert "scene.toml is not that of the run any more" in capsys.readouterr().err
+
+
 def test_solved_and_static_runs_are_not_resumed(tmp_path, capsys, interrupted):
     folder = tmp_path / "run"
     shutil.copytree(interrupted, folder)

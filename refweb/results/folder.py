@@ -181,6 +181,7 @@ class Folder:
             (self.path / "frames").mkdir(exist_ok=True)
             clear(self.path)
             write_text(self.path / "scene.toml", text)
+            self._scene = fingerprint(self.path)
         self._start()
 
     @contextlib.contextmanager
@@ -204,6 +205,7 @@ class Folder:
 
     def _go_on(self, row, run):
         """Cut the history behind a row, and remove the frames behind it."""
+        self._scene = fingerprint(self.path)
         try:
             with open(self.path / self._table, "rb") as lines:
                 kept = [len(line) for line, _ in zip(lines, range(row + 2), strict=False)]
@@ -261,7 +263,7 @@ class Folder:
             net = state.system.net
             arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
             arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
-            arrays |= {"lines": net.web.lines, "scene": fingerprint(self.path)}
+            arrays |= {"lines": net.web.lines, "scene": self._scene}
             arrays |= run or {}
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self.listed([(number, state.time if shape is None else number)], net.bodies)
