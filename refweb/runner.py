@@ -60,10 +60,10 @@ def run(scene, out=None, force=False, progress: bool | Callable | None = True, a
 
 
 def resume(folder, progress: bool | Callable | None = True, announce=None) -> Solution:
-    """Go on with a dynamic run that was killed or interrupted or failed, from its last checkpoint.
+    """Continue a dynamic run that was killed or interrupted or failed, from its last checkpoint.
 
-    Central differences come to what the undisturbed run comes to, bit for bit; CVODE and IDA begin anew there, and come
-    to it within their tolerance. A run without a checkpoint begins anew.
+    Central differences come to what the undisturbed run comes to, bit for bit; CVODE and IDA start again there, and
+    come to it within their tolerance. A run without a checkpoint starts from its beginning.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
         return _solve(scene, folder, progress, announce)
     if str(kept.get("scene", "")) not in ("", fingerprint(folder)):
         raise InputError(
-            f"{name} its scene.toml is not that of the run any more: put it back, or begin anew with refweb run --force"
+            f"{name} its scene.toml is not that of the run any more: put it back, or use refweb run --force"
         )
     return _solve(scene, folder, progress, announce, kept, summary)
 
@@ -109,15 +109,15 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
 def _solve(scene, out, progress, announce, kept=None, summary=None):
     """Solve a scene, with a stiffer contact as often as one that refweb chose is too soft; see `_attempt`."""
     clock, scene, told = Clock(), scene.settled(), []
-    while True:
-        try:
-            with followed(progress) as tell:
+    with followed(progress) as tell:
+        while True:
+            try:
                 return _attempt(scene, out, tell, announce, clock, told, kept, summary)
-        except TooSoft as soft:
-            told.append(str(soft))
-            scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
-            if len(told) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
-                scene = scene.replace(chosen=())
+            except TooSoft as soft:
+                told.append(str(soft))
+                scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
+                if len(told) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
+                    scene = scene.replace(chosen=())
 
 
 def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):

@@ -326,16 +326,20 @@ def file_of(source):
     """Path of a scene file, or of a scene shipped with refweb by its name; refused where there is neither."""
     if not isinstance(source, (str, os.PathLike)):
         raise InputError(f"scene = {shown(source)} must be a Scene, a scene file or the name of a shipped scene")
-    path, shipped = pathlib.Path(source), sorted(SHIPPED_SCENES.glob("*.toml"))
+    path, known = pathlib.Path(source), shipped()
     if os.path.isfile(path):
         return path
-    known = [p.stem for p in shipped]
-    if os.path.isdir(source) and path.name not in known:
+    if (name := str(path).removesuffix(".toml")) in known:
+        return known[name]
+    if os.path.isdir(source):
         hint = f": name {short(str(path))}/scene.toml" if os.path.isfile(path / "scene.toml") else ""
         raise InputError(f"{short(str(source))}: is a folder, not a scene file{hint}")
-    if str(path).removesuffix(".toml") not in known:
-        raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
-    return shipped[known.index(path.stem)]
+    raise InputError(f"{short(str(source))}: no such file and no shipped scene, {nearest(path.stem, known)}")
+
+
+def shipped():
+    """Paths of the scenes shipped with refweb, by name."""
+    return {path.stem: path for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
 
 
 def slug(title):

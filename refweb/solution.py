@@ -9,7 +9,7 @@ import numpy as np
 from .errors import InputError
 from .messages import nearest, short
 from .results.folder import read_summary
-from .results.solution import OTHER_ERRORS, Result, SolutionData
+from .results.solution import OTHER_ERRORS, SolutionData, read_results
 from .scene import Scene
 
 
@@ -209,8 +209,8 @@ def load(folder) -> Solution:
         found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
         if used := summary.get("utilisation"):
             found.utilisation = used["value"], used["line"]
-        found.steps = [{**step, "results": _results(step["results"])} for step in summary["steps"]]
-        found.reduced = {} if found.steps else _results(summary["results"])
+        found.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
+        found.reduced = {} if found.steps else read_results(summary["results"])
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
     found.columns, found.state = _columns(folder), _last_state(folder, scene)
@@ -222,7 +222,7 @@ def summary_of(folder):
     folder = pathlib.Path(folder)
     name = f"result folder {short(str(folder))}:"
     if not folder.is_dir():
-        raise InputError(f"{name} is no folder")
+        raise InputError(f"{name} there is no such folder")
     summary = read_summary(folder)
     if summary is None or not (folder / "scene.toml").is_file():
         raise InputError(f"{name} holds no run.json and scene.toml of a run: use refweb run")
@@ -233,18 +233,6 @@ def scene_of(folder, summary):
     """The scene in a result folder, with the stiffness of contact that refweb has chosen still its own to choose."""
     chosen = tuple(name for name, body in summary.get("bodies", {}).items() if body["chosen"])
     return Scene.load(pathlib.Path(folder) / "scene.toml").replace(chosen=chosen)
-
-
-def _results(given):
-    """Results by name of what ``run.json`` says of them."""
-    found = {name: Result(**one) for name, one in given.items()}
-    if not all(isinstance(one.value, float | int) and isinstance(one.error, float | None) for one in found.values()):
-        raise TypeError("a value is not a number")
-    for name, one in found.items():
-        if one.interval is not None:
-            ends = (-np.inf if one.interval[0] is None else one.interval[0], one.interval[1])
-            found[name] = one._replace(interval=(ends[0], np.inf if ends[1] is None else ends[1]))
-    return found
 
 
 def _columns(folder):

@@ -29,6 +29,34 @@ METHODS = {
 """Every kind of steps, as keys of ``[solve]``."""
 
 
+SMALL = """
+title = "Small web"
+
+[web]
+kind = "window"
+mesh = "square"
+rows = 3
+columns = 3
+side = 0.5
+
+[cable]
+law = "tension-only"
+modulus = 1e5
+area = 1e-4
+density = 100.0
+strength = 1e6
+
+[[load]]
+node = "centre"
+force = [0.0, 0.0, 1.0]
+
+[solve]
+kind = "static"
+load_steps = [1, 2, 3]
+"""
+"""A scene file."""
+
+
 def some(cases, every):
     """Cases of a parametrized test, of which the ordinary run takes one of ``every``, and the slow one the others."""
     slow = pytest.mark.slow

@@ -61,7 +61,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     ("dynamics", "*", "A scene through time: start, rows, frames, errors; it does not know the command line."),
     ("what users hold", "solution", ""),
     ("studies", "*", "Runs about runs: errors of elements, horizons, modes and what digits cost."),
-    ("the desk", "runner console", ""),
+    ("the desk", "runner", ""),
     ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
     ("the door", "__main__", ""),
 ]

@@ -296,7 +296,7 @@ def other_web(folder):
 
 
 REFUSED = {
-    "no folder": (shutil.rmtree, "is no folder"),
+    "no folder": (shutil.rmtree, "there is no such folder"),
     "no run.json": (lambda folder: (folder / "run.json").unlink(), "holds no run.json"),
     "no scene": (lambda folder: (folder / "scene.toml").unlink(), "holds no run.json and scene.toml"),
     "history too short": (spoil_history, "is not the history that checkpoint.npz belongs to"),

@@ -1,4 +1,6 @@
-"""Arguments that several verbs have."""
+"""Arguments that several verbs have, and what they print as JSON."""
+
+import json
 
 
 def add_scene(parser):
@@ -21,6 +23,16 @@ def scene_of(arguments):
     from ..reference.paths import read_settings
 
     return Scene.load(arguments.scene, read_settings(arguments.values))
+
+
+def add_json(parser):
+    """What is printed, as JSON."""
+    parser.add_argument("--json", action="store_true", help="as JSON")
+
+
+def print_json(content):
+    """Print a dict as JSON."""
+    print(json.dumps(content, indent=1, ensure_ascii=False))
 
 
 def add_force(parser):

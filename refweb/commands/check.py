@@ -11,9 +11,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Refuse what a run would refuse, else print what it would solve."""
-    from ..console import print_scene
     from ..runner import simulation_of
     from ..solution import Solution
+    from .console import print_scene
 
     scene = scene_of(arguments).settled()
     system = scene.build()

@@ -1,12 +1,12 @@
 """Results of two runs or more side by side: do they agree within ±?"""
 
-import json
+from .arguments import add_json, print_json
 
 
 def add_arguments(parser):
     """The folders, and how to print."""
     parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders, two or more")
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    add_json(parser)
 
 
 def run(arguments):
@@ -15,9 +15,9 @@ def run(arguments):
 
     found = compare(arguments.folders)
     if arguments.json:
-        print(json.dumps(found, indent=1, ensure_ascii=False))
+        print_json(found)
     else:
-        from ..console import print_comparison
+        from .console import print_comparison
 
         print_comparison(found)
     return 0 if found["agree"] else 1

@@ -17,9 +17,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print what is solved, compare the methods, print what they cost."""
-    from ..console import print_scene
     from ..results.progress import followed
     from ..studies.work_precision import cost
+    from .console import print_scene
 
     scene, out = scene_of(arguments), arguments.out
     options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
@@ -32,6 +32,6 @@ def run(arguments):
 
 def show(summary):
     """Print the box of a work-precision diagram from the content of its ``run.json``."""
-    from ..console import print_cost
+    from .console import print_cost
 
     print_cost(summary)

@@ -5,28 +5,24 @@ import pathlib
 
 from ..errors import InputError
 from ..registry import COMMANDS, load
+from .arguments import add_json, print_json
 
 
 def add_arguments(parser):
     """The scene or the folder, and how to print it."""
     parser.add_argument("source", metavar="SCENE | DIR")
-    parser.add_argument("--json", action="store_true", help="as JSON")
+    add_json(parser)
 
 
 def run(arguments):
     """Print what is there."""
+    from ..scene import shipped
+
     folder = pathlib.Path(arguments.source)
-    if folder.is_dir() and ((folder / "run.json").exists() or not _is_shipped(arguments.source)):
+    if folder.is_dir() and ((folder / "run.json").exists() or str(folder) not in shipped()):
         _folder(folder, arguments.json)
     else:
         _scene(arguments.source, arguments.json)
-
-
-def _is_shipped(name):
-    """Whether that is the name of a shipped scene, which a folder without results does not hide."""
-    from ..scene import SHIPPED_SCENES
-
-    return (SHIPPED_SCENES / f"{pathlib.Path(name).name.removesuffix('.toml')}.toml").exists()
 
 
 def _folder(folder, as_json):
@@ -35,7 +31,7 @@ def _folder(folder, as_json):
         if summary.get("status") == "running":
             summary = _so_far(folder, summary)
         if as_json:
-            _print(summary)
+            print_json(summary)
         else:
             load(COMMANDS[summary.get("kind", "run")]).show(summary)
     except FileNotFoundError:
@@ -66,17 +62,14 @@ def _remedy(folder):
 
 
 def _scene(source, as_json):
-    from ..console import print_scene
     from ..results.provenance import web_of
     from ..scene import Scene
 
     scene = Scene.load(source)
     system = scene.build()
     if as_json:
-        _print({"scene": scene.to_dict(), "web": web_of(system)})
+        print_json({"scene": scene.to_dict(), "web": web_of(system)})
     else:
+        from .console import print_scene
+
         print_scene(scene, system)
-
-
-def _print(content):
-    print(json.dumps(content, indent=1, ensure_ascii=False))

@@ -9,9 +9,9 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print name, title and first comment of each."""
-    from ..scene import SHIPPED_SCENES
+    from ..scene import shipped
 
-    texts = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
+    texts = {name: path.read_text(encoding="utf-8") for name, path in shipped().items()}
     titles = {name: tomllib.loads(text).get("title", name) for name, text in texts.items()}
     name_width, title_width = (max(map(len, words)) for words in (titles, titles.values()))
     for name, text in texts.items():

@@ -16,10 +16,10 @@ def add_arguments(parser):
 
 def run(arguments):
     """Print what vibrates, find its modes, print them."""
-    from ..console import print_scene
     from ..results.progress import followed
     from ..scene import slug
     from ..studies.modes import modes
+    from .console import print_scene
 
     scene = scene_of(arguments)
     out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
@@ -31,6 +31,6 @@ def run(arguments):
 
 def show(summary):
     """Print the box of modes from the content of their ``run.json``."""
-    from ..console import print_modes
+    from .console import print_modes
 
     print_modes(summary)

@@ -1,4 +1,4 @@
-"""Go on with a dynamic run that was killed, interrupted or failed."""
+"""Continue a dynamic run that was killed, interrupted or failed."""
 
 
 def add_arguments(parser):
@@ -7,10 +7,10 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Go on from the last checkpoint, print the results."""
+    """Continue from the last checkpoint, print the results."""
     from .. import runner
-    from ..console import print_scene, print_solution
     from ..results.progress import followed
+    from .console import print_scene, print_solution
 
     with followed(True) as tell:
         solution = runner.resume(arguments.folder, progress=tell, announce=print_scene)

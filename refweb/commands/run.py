@@ -20,9 +20,9 @@ def run(arguments):
     from dataclasses import replace
 
     from .. import runner
-    from ..console import print_scene, print_solution
     from ..results.progress import followed
     from ..scene import slug
+    from .console import print_scene, print_solution
 
     scene = scene_of(arguments)
     if arguments.horizon:
@@ -37,6 +37,6 @@ def run(arguments):
 
 def show(summary):
     """Print the box of a finished run from the content of its ``run.json``."""
-    from ..console import print_run
+    from .console import print_run
 
     print_run(summary)

@@ -1,6 +1,6 @@
 """Print the JSON Schema of scene files, by which editors check and complete them."""
 
-import json
+from .arguments import print_json
 
 
 def add_arguments(parser):
@@ -11,4 +11,4 @@ def run(arguments):
     """Print it."""
     from ..reference.schema import schema
 
-    print(json.dumps(schema(), indent=1, ensure_ascii=False))
+    print_json(schema())

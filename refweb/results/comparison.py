@@ -9,6 +9,7 @@ import tomllib
 from ..errors import InputError
 from ..messages import short
 from .folder import read_summary
+from .solution import read_results
 
 
 def compare(folders):
@@ -79,12 +80,10 @@ def _results(folder, summary, several):
     try:
         if several and summary["steps"]:
             parts = [(step["step"], step["results"]) for step in summary["steps"]]
-        found = {(name, step): result for step, results in parts for name, result in results.items()}
-        for result in found.values():
-            _ = math.isfinite(result["value"]), math.isfinite(result["error"] or 0.0), result["unit"] + ""
-    except (KeyError, TypeError, AttributeError):
+        read = [(step, read_results(results)) for step, results in parts]
+    except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
-    return found
+    return {(name, step): result.plain() for step, results in read for name, result in results.items()}
 
 
 def _row(key, values):

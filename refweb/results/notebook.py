@@ -4,23 +4,18 @@ from __future__ import annotations
 
 from html import escape
 
-from .solution import OTHER_ERRORS
-from .units import place, readable
+from .units import other_errors, place, readable
 
 
 def of_solution(solution):
     """Title, status, results with their ±, warnings, and what it cost."""
     dynamic = not solution.steps
     head = ["result", "value", *(["time"] if dynamic else []), "at"]
-    rows, remarks = [], []
+    rows = []
     for name, one in solution.results.items():
         time = [f"{one.time:.6g} s"] if dynamic else []
         rows.append([name, readable(one.value, one.error, one.unit), *time, place(one.where, one.at)])
-    for key, text in zip(OTHER_ERRORS, ("smoothing moves", "elements leave"), strict=True):
-        found = {name: r for name, r in solution.results.items() if getattr(r, key) is not None}
-        if found:
-            parts = (f"{name} by {readable(getattr(r, key), None, r.unit)}" for name, r in found.items())
-            remarks.append(f"{text} {', '.join(parts)}")
+    remarks = other_errors(solution.summary()["results"])
     said = [*remarks, solution.message, *(f"warning: {text}" for text in solution.warnings)]
     cost = f"{solution.solver.get('method')}, {solution.cost['cpu_s']:.2f} s CPU"
     if len(solution.steps) > 1:

@@ -19,8 +19,8 @@ SOLVER = dict.fromkeys(
 """What a solver reports; None for what it does not know."""
 
 
-OTHER_ERRORS = ("smoothing", "discretisation")
-"""Errors of a result besides ± of the scene as it stands."""
+OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "elements leave"}
+"""Errors of a result besides ± of the scene as it stands, and the words before them."""
 
 
 class Names(dict):
@@ -58,6 +58,21 @@ class Result(NamedTuple):
         if self.interval is not None:
             extra["interval"] = [end if np.isfinite(end) else None for end in self.interval]
         return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
+
+
+def read_results(given):
+    """Results by name of what ``run.json`` says of them; a `TypeError` where no run has said that."""
+    found = {name: Result(**one) for name, one in given.items()}
+    for name, one in found.items():
+        if not (
+            isinstance(one.value, float | int) and isinstance(one.error, float | None) and isinstance(one.unit, str)
+        ):
+            raise TypeError(f"{name} is not a number")
+        if one.interval is not None:
+            least, most = one.interval
+            ends = -np.inf if least is None else least, np.inf if most is None else most
+            found[name] = one._replace(interval=ends)
+    return found
 
 
 @dataclass(eq=False, repr=False)

@@ -1,5 +1,7 @@
 """Numbers that people read: values with their ± in readable units, in one notation."""
 
+from .solution import OTHER_ERRORS
+
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
 _SCALED = ("m", "N", "Pa", "J", "s", "m/s", "W")
 """Units that take prefixes."""
@@ -40,6 +42,14 @@ def readable(value, error, unit):
     factor, name = scale_of(value, unit)
     text = with_error(value / factor, error and error / factor)
     return f"{text} {name}".rstrip()
+
+
+def other_errors(results):
+    """Errors besides ±, in words, a text for each kind; of results as ``run.json`` has them."""
+    for key, words in OTHER_ERRORS.items():
+        parts = [f"{n} by {readable(r[key], None, r['unit'])}" for n, r in results.items() if r.get(key) is not None]
+        if parts:
+            yield f"{words} {', '.join(parts)}"
 
 
 def place(where, at):

@@ -7,37 +7,13 @@ import sys
 import tomllib
 
 import pytest
+from nets import SMALL as SCENE
 
 import refweb
 from refweb import scene
 from refweb.__main__ import main
 from refweb.statics import load_steps
 
-SCENE = """
-title = "Small web"
-
-[web]
-kind = "window"
-mesh = "square"
-rows = 3
-columns = 3
-side = 0.5
-
-[cable]
-law = "tension-only"
-modulus = 1e5
-area = 1e-4
-density = 100.0
-strength = 1e6
-
-[[load]]
-node = "centre"
-force = [0.0, 0.0, 1.0]
-
-[solve]
-kind = "static"
-load_steps = [1, 2, 3]
-"""
 WRONG = {
     "unknown table": ("[[load]]", "[[loads]]", '[[loads]]: unknown table or key, did you mean "load"?'),
     "unknown key": ("side =", "sides =", '[web] sides = 0.5: unknown key, did you mean "side"?'),

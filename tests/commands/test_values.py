@@ -4,28 +4,12 @@ import json
 import tomllib
 
 import pytest
+from nets import SMALL
 
 import refweb
 from refweb.__main__ import main
 
-SCENE = """
-[web]
-kind = "window"
-mesh = "square"
-rows = 3
-columns = 3
-side = 0.5
-[cable]
-law = "tension-only"
-modulus = 1e5
-area = 1e-4
-density = 100.0
-[[load]]
-node = "centre"
-force = [0.0, 0.0, 1.0]
-[solve]
-kind = "static"
-"""
+SCENE = SMALL.replace('title = "Small web"\n', "").replace("load_steps = [1, 2, 3]\n", "")
 WRONG = {
     "cable.aera=1": 'net.toml with cable.aera = 1: [cable] aera = 1: unknown key, did you mean "area"?',
     "cable.area=-1": "net.toml with cable.area = -1: [cable] area = -1.0 must be > 0 [m²]",

@@ -73,7 +73,7 @@ def test_the_next_that_takes_the_scene(more, used, once, tmp_path, capsys):
     assert abs(result.value - truth) <= result.error < 0.2 * abs(truth)
     np.testing.assert_allclose(solution.history["time"], np.arange(21) * 1e-3, rtol=1e-12)
     assert len(list((tmp_path / "run" / "frames").iterdir())) == 11
-    from refweb.console import print_run
+    from refweb.commands.console import print_run
 
     print_run(json.loads((tmp_path / "run" / "run.json").read_text()))
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())

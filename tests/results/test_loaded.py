@@ -158,7 +158,7 @@ def test_names_of_blocks(both):
 
 
 def test_what_is_no_run_is_refused(tmp_path):
-    with pytest.raises(refweb.InputError, match="is no folder"):
+    with pytest.raises(refweb.InputError, match="there is no such folder"):
         refweb.load(tmp_path / "none")
     with pytest.raises(refweb.InputError, match=r"holds no run\.json"):
         refweb.load(tmp_path)

@@ -440,7 +440,7 @@ def test_utilisation():
 
 
 def test_utilisation_in_the_box(capsys, tmp_path):
-    from refweb.console import print_solution
+    from refweb.commands.console import print_solution
 
     print_solution(straight("linear", 0.1, groups={"weak": refweb.Group(strength=2e4)}), tmp_path)
     box = capsys.readouterr().out

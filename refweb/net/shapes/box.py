@@ -22,8 +22,7 @@ class Box(Shape):
     axes : list of 2 vectors, optional
         Directions of the first two edges, at right angles; by default x and y.
     rounding : float, optional
-        Radius of the edges [m], > 0, by default 2 % of the smallest size. `refweb.net.grown_core` says how
-        depth goes on below.
+        Radius of the edges [m], > 0, by default 2 % of the smallest size; see `refweb.net.grown_core`.
 
     Examples
     --------

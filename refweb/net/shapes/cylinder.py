@@ -22,8 +22,7 @@ class Cylinder(Shape):
     axis : sequence of 3 float
         Its axis.
     rounding : float, optional
-        Radius of the edges [m], > 0, by default 2 % of the smallest size. `refweb.net.grown_core` says how
-        depth goes on below.
+        Radius of the edges [m], > 0, by default 2 % of the smallest size; see `refweb.net.grown_core`.
 
     Examples
     --------

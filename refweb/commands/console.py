@@ -10,11 +10,11 @@ from rich.panel import Panel
 from rich.table import Table as Grid
 from rich.text import Text
 
-from .errors import InputError
-from .messages import shown
-from .registry import EFFECTS, INTEGRATORS, name_of
-from .results.provenance import web_of
-from .results.units import place, readable, scale_of, with_error
+from ..errors import InputError
+from ..messages import shown
+from ..registry import EFFECTS, INTEGRATORS, name_of
+from ..results.provenance import web_of
+from ..results.units import other_errors, place, readable, scale_of, with_error
 
 
 def _console():
@@ -43,7 +43,7 @@ def print_scene(scene, system):
     groups = f", groups {', '.join(named)}" if cable.groups else ""
     how = f"{solve.kind}, {solve.method}, "
     if solve.method == "auto":
-        from .dynamics.method_choice import decided
+        from ..dynamics.method_choice import decided
 
         solve, why = decided(scene, system)
         how = f"{solve.kind}, {solve.method} ({why}), "
@@ -57,14 +57,14 @@ def print_scene(scene, system):
     area = f"{web['area']:.4g} m², " if web["cells"] else ""
     corners, steps = [], []
     if solve.kind == "dynamic" and len(system.corners):
-        from .dynamics.schedule import FEW_CORNERS
+        from ..dynamics.schedule import FEW_CORNERS
 
         if len(system.corners) > FEW_CORNERS:
-            from .dynamics.corners import remarks_on_corners
+            from ..dynamics.corners import remarks_on_corners
 
             corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
     if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
-        from .dynamics.expected_cost import expected_cost
+        from ..dynamics.expected_cost import expected_cost
 
         with contextlib.suppress(InputError):  # the run refuses it
             steps = [("steps", expected_cost(scene.replace(solve=solve), system))]
@@ -87,7 +87,7 @@ def _stiffness(scene, system):
     """Rows of the box on the stiffness of contact that refweb has chosen."""
     for body in system.net.bodies if scene.chosen else ():
         if body.name in scene.chosen:
-            from .effects.contact.overlap import allowed
+            from ..effects.contact.overlap import allowed
 
             stiffness, exponent = scene.contact.law_of(body)
             unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
@@ -165,11 +165,7 @@ def print_run(summary, more=()):
         for name, r in summary["results"].items():
             if r.get("interval") is not None:
                 rows.append(("", f"{name} lies anywhere {_between(r['interval'], r['unit'])}"))
-        for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
-            found = {n: r for n, r in summary["results"].items() if r.get(key) is not None}
-            if found:
-                parts = (f"{name} by {readable(r[key], None, r['unit'])}" for name, r in found.items())
-                rows.append(("", f"{text} {', '.join(parts)}"))
+        rows += [("", text) for text in other_errors(summary["results"])]
     if horizon := summary.get("horizon"):
         rows.append(("horizon", _horizon(horizon)))
         for name, r in horizon.get("ensemble", {}).items():
