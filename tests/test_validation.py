@@ -95,4 +95,18 @@ def test_report(tmp_path, monkeypatch, capsys):
     (picture,) = re.findall(r"!\[.*?\]\((.*?)\)", words)
     assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
     assert "fails: ZeroDivisionError" in shown and "fails: ZeroDivisionError" in words
+    assert "1 of 2 cases fail: [Title two](#two)" in words and shown.count('class="badge no"') == 1
+    targets = set(re.findall(r'id="(.*?)"', shown))
+    links = set(re.findall(r'href="#(.*?)"', shown))
+    assert links == {"contents", "part", "one", "two"} <= targets
     assert main(["one", "--quick", "--out", str(tmp_path)]) == 0
+    assert '<p class="result yes">The case agrees</p>' in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_letters_of_figures_can_be_read():
+    """9 pixels high, 72 points an inch: letters of 6 pt on a figure of 8 inches ask for 8 · 72 · 9/6 pixels."""
+    page, plot = plots.axes("x", "y")
+    page.set_size_inches(8, 3)
+    plot.set_title("small", fontsize=6)
+    image = plots.image(page)
+    assert image.png.startswith(b"\x89PNG") and image.width == 864

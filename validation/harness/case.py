@@ -25,7 +25,7 @@ list; ``code`` between double backticks. The module has one function ``case(quic
 - ``quick`` asks for the same assertions on smaller or fewer scenes: seconds, not minutes.
 - Figures are drawn only for the report, so ``draw`` is a function without arguments; it returns a
   `matplotlib.figure.Figure`, see `validation.harness.plots`, whose ``picture`` draws a solution as ``refweb picture``
-  does, or the bytes of a PNG.
+  does.
 - A reference never comes from the code under test, and a tolerance says where it comes from.
 - There is no empty cell: what is unknown is said to be unknown.
 """
@@ -165,7 +165,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture and the words below it; ``draw`` gives a matplotlib Figure or the bytes of a PNG."""
+    """A picture and the words below it; ``draw`` gives a matplotlib Figure."""
 
     caption: str
     draw: Callable

@@ -12,7 +12,7 @@ from refweb.results.provenance import versions
 
 from .. import how_it_works
 from .case import CASES, Case, text
-from .plots import png
+from .plots import image
 
 HEADS = ("quantity", "refweb", "reference", "source", "difference", "tolerance, and why", "agrees")
 STYLE = """
@@ -27,11 +27,30 @@ pre { overflow-x: auto; background: #f4f4f2; padding: .6rem .8rem; }
 .scroll { overflow-x: auto; margin: 1rem 0; }
 table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; vertical-align: top; padding: .3rem .7rem .3rem 0; border-bottom: 1px solid #ddd; }
-td { min-width: 4rem; max-width: 22rem; } td.number { white-space: nowrap; } td:first-child { min-width: 11rem; }
-table.number td:nth-child(6) { min-width: 16rem; }
-.yes { color: #2f6b3c; } .no { color: #b3261e; font-weight: bold; }
+td { min-width: 4rem; max-width: 22rem; } td.value { white-space: nowrap; } td:first-child { min-width: 11rem; }
+.number td:nth-child(6) { min-width: 16rem; }
+.yes { color: #22553a; } .no { color: #a3201a; font-weight: bold; }
+td.yes span::before, .badge.yes::before, .result.yes::before { content: "✓ "; }
+td.no span::before, .badge.no::before, .result.no::before { content: "✗ "; }
+.result { font-size: 1.25rem; padding: .6rem .9rem; } .badge { font-size: .8rem; padding: .1rem .5rem; }
+.result, .badge { border-radius: .4rem; background: #e3f1e6; }
+.result.no, .badge.no { background: #fbe4e1; }
+.up { font-size: .8rem; font-weight: normal; margin-left: .5rem; }
 figure { margin: 1.5rem 0; } img { max-width: 100%; height: auto; } figcaption { font-size: .9rem; color: #444; }
 blockquote { margin: 1rem 0; padding: .2rem 0 .2rem 1rem; border-left: 3px solid #1b5e8c; }
+@media (max-width: 45rem) {
+  ul { padding-left: 1.2rem; } td:first-child { min-width: 6rem; }
+  .number thead, .contents thead { display: none; }
+  .number, .number tbody, .number tr, .contents, .contents tbody { display: block; }
+  .number tr { border: 1px solid #ccc; border-radius: .4rem; margin: .7rem 0; padding: .3rem .7rem; }
+  .number td { display: grid; grid-template-columns: 7rem 1fr; gap: .7rem; min-width: 0; max-width: none; border: 0;
+    padding: .15rem 0; white-space: normal; }
+  .number td::before { content: attr(data-label); color: #555; }
+  .contents tr { display: flex; justify-content: space-between; border-bottom: 1px solid #ddd; }
+  .contents td { display: none; border: 0; }
+  .contents td:nth-child(2), .contents td:last-child { display: block; }
+  .contents td:last-child { white-space: nowrap; padding-left: .7rem; }
+}
 """
 
 
@@ -51,8 +70,8 @@ def write(folder, done, quick):
     for one in done:
         for number, figure in enumerate(one.case.figures, 1):
             name = f"{one.name}-{number}.png"
-            images[name] = png(figure.draw())
-            (folder / name).write_bytes(images[name])
+            images[name] = image(figure.draw())
+            (folder / name).write_bytes(images[name].png)
     page = folder / "index.html"
     page.write_text(_page(_blocks(done, quick), images), encoding="utf-8")
     (folder / "report.md").write_text(_markdown(_blocks(done, quick)), encoding="utf-8")
@@ -66,14 +85,12 @@ def write_text(path, done, quick):
 
 def _blocks(done, quick):
     """The report as a list of blocks (kind, content), which both formats follow."""
-    failed = sum(bool(one.case.failures) for one in done)
     rows = sum(len(one.case.rows) for one in done)
     yield "title", "refweb: validation"
     yield (
         "text",
-        f"{len(done)} cases, {rows} comparisons, {failed} cases with a failure; "
-        f"{'quick' if quick else 'full'} run in {sum(one.seconds for one in done):.0f} s "
-        f"on {platform.system()} {platform.machine()}, "
+        f"{len(done)} cases, {rows} comparisons; {'quick' if quick else 'full'} run "
+        f"in {sum(one.seconds for one in done):.0f} s on {platform.system()} {platform.machine()}, "
         + ", ".join(f"{name} {version}" for name, version in versions().items())
         + ".",
     )
@@ -81,17 +98,22 @@ def _blocks(done, quick):
         "text",
         "Differences are relative to the reference unless a row says otherwise. ± is refweb's own estimate or bound.",
     )
-    yield "table", ("", ("case", "comparisons", "largest part of a tolerance", "agrees"), _contents(done), "link")
+    yield "result", (_result(done), not any(one.case.failures for one in done))
+    yield "part", "Contents"
+    yield (
+        "table",
+        ("", ("part", "case", "comparisons", "largest part of a tolerance", "agrees"), _contents(done), "contents"),
+    )
     title, body = how_it_works.__doc__.split("\n\n", 1)
     yield "part", title
     yield from _described(body)
     for part, names in CASES.items():
         here = [one for one in done if one.name in names]
         if here:
-            yield "part", part.replace("_", " ").capitalize()
+            yield "part", _title(part)
         for one in here:
             title, body = text(one.name)
-            yield "case", (one.name, title)
+            yield "case", (one.name, title, not one.case.failures)
             yield from _described(body)
             yield "text", f"``python -m validation {'--quick ' * quick}{one.name}``, {one.seconds:.1f} s"
             for failure in one.case.failures:
@@ -106,12 +128,32 @@ def _blocks(done, quick):
                 yield "figure", (f"{one.name}-{number}.png", figure.caption)
 
 
+def _title(part):
+    return part.replace("_", " ").capitalize()
+
+
+def _result(done):
+    """What came out, in a sentence."""
+    failed = [f"[{text(one.name)[0]}](#{one.name})" for one in done if one.case.failures]
+    if failed:
+        return f"{len(failed)} of {len(done)} cases fail: {', '.join(failed)}"
+    return f"All {len(done)} cases agree" if len(done) > 1 else "The case agrees"
+
+
 def _contents(done):
+    parts = {name: part for part, names in CASES.items() for name in names}
     for one in done:
         used = [row.difference / row.tolerance for row in one.case.rows if row.tolerance > 0]
         share = f"{max(used):.2g}" if used else "no comparison of numbers"
         verdict = "no" if one.case.failures else "yes"
-        yield [f"[{text(one.name)[0]}](#{one.name})", f"{len(one.case.rows)}", share, verdict]
+        part = _title(parts[one.name])
+        link = f"[{part}](#{_anchor(part)})"
+        yield [link, f"[{text(one.name)[0]}](#{one.name})", f"{len(one.case.rows)}", share, verdict]
+
+
+def _anchor(title):
+    """The name of a part as the target of a link."""
+    return re.sub(r"\W+", "_", title.lower()).strip("_")
 
 
 def _row(row):
@@ -154,11 +196,15 @@ def _inline(words):
     return re.sub(r"\*([^*\s][^*]*)\*", r"<em>\1</em>", words)
 
 
+def _mark(agrees):
+    return "yes" if agrees else "no"
+
+
 def _table(title, heads, rows, kind):
     def cell(number, words):
-        marks = {"yes": ' class="yes"', "no": ' class="no"'}
-        mark = marks.get(words, ' class="number"' if kind == "number" and number in (1, 2, 4) else "")
-        return f"<td{mark}>{_inline(words)}</td>"
+        mark = words if words in ("yes", "no") else "value" if kind == "number" and number in (1, 2, 4) else "words"
+        label = html.escape(heads[number], quote=True)
+        return f'<td class="{mark}" data-label="{label}"><span>{_inline(words)}</span></td>'
 
     head = "".join(f"<th>{_inline(word)}</th>" for word in heads)
     body = "\n".join("<tr>" + "".join(cell(i, word) for i, word in enumerate(row)) + "</tr>" for row in rows)
@@ -173,9 +219,13 @@ def _page(blocks, images):
         if kind == "title":
             out.append(f"<h1>{html.escape(content)}</h1>")
         elif kind == "part":
-            out.append(f"<h2>{html.escape(content)}</h2>")
+            out.append(f'<h2 id="{_anchor(content)}">{html.escape(content)}</h2>')
+        elif kind == "result":
+            out.append(f'<p class="result {_mark(content[1])}">{_inline(content[0])}</p>')
         elif kind == "case":
-            out.append(f'<h3 id="{content[0]}">{_inline(content[1])}</h3>')
+            name, title, agrees = content
+            said = f'<span class="badge {_mark(agrees)}">{"agrees" if agrees else "fails"}</span>'
+            out.append(f'<h3 id="{name}">{_inline(title)} {said} <a class="up" href="#contents">contents</a></h3>')
         elif kind == "text":
             out.append(f"<p>{_inline(content)}</p>")
         elif kind == "failure":
@@ -193,10 +243,11 @@ def _page(blocks, images):
             )
         elif kind == "figure":
             name, caption = content
-            data = base64.b64encode(images[name]).decode("ascii")
+            data = base64.b64encode(images[name].png).decode("ascii")
             words = html.escape(caption, quote=True)
+            least = f'style="min-width: {images[name].width}px"'
             out.append(
-                f'<figure><img alt="{words}" src="data:image/png;base64,{data}">'
+                f'<figure><div class="scroll"><img alt="{words}" {least} src="data:image/png;base64,{data}"></div>'
                 f"<figcaption>{_inline(caption)}</figcaption></figure>"
             )
     head = '<meta charset="utf-8">\n<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -214,7 +265,9 @@ def _markdown(blocks, figures=True):
         if kind == "title":
             out.append(f"# {content}")
         elif kind == "part":
-            out.append(f"## {content}")
+            out.append(f'## <a id="{_anchor(content)}"></a>{content}')
+        elif kind == "result":
+            out.append(f"**{content[0]}**")
         elif kind == "case":
             out.append(f'### <a id="{content[0]}"></a>{content[1]}')
         elif kind == "failure":

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import io
+from typing import NamedTuple
 
 import numpy as np
 
 COLOURS = ("#1b5e8c", "#c8553d", "#3c7a4c", "#8a5a9e", "#b58900", "#555555")
 """Colours of lines, the first for refweb; they differ in lightness as well."""
+READABLE = 9.0
+"""Size of the smallest letters on a page [CSS pixel]."""
 REFERENCE = dict(color="#222222", linewidth=1.2)
 """Style of a closed form; refweb's results are markers on it."""
 
@@ -46,10 +49,19 @@ def picture(solution, field=None):
     return drawn(frame, Heading.of(solution.scene.title, solution.scene.solve.kind, solution.status), field)
 
 
-def png(drawn):
-    """The bytes of a PNG, of what a `validation.Figure` draws."""
-    if isinstance(drawn, bytes):
-        return drawn
+class Image(NamedTuple):
+    """A figure as a PNG, and the least width at which its smallest letters can be read [CSS pixel]."""
+
+    png: bytes
+    width: int
+
+
+def image(figure):
+    """The `Image` of a matplotlib figure."""
+    from matplotlib.text import Text
+
     page = io.BytesIO()
-    drawn.savefig(page, format="png")
-    return page.getvalue()
+    figure.savefig(page, format="png")
+    sizes = [text.get_fontsize() for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    width, _ = figure.get_size_inches()
+    return Image(page.getvalue(), round(READABLE * 72.0 * width / min(sizes, default=10.0)))
