@@ -130,7 +130,7 @@ def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=versions())
     if kept is None:
-        solution.warnings += [*told, *_notices(scene, system)]
+        solution.warnings += [*told, *notices(scene, system)]
     else:
         solution.warnings += _before(kept, summary, system, solution.versions)
     simulation = simulation_of(scene, system, solution, kept)
@@ -200,7 +200,12 @@ def simulation_of(scene, system, solution, kept=None):
         return Simulation(scene, system, solution, kept)
 
 
-def _notices(scene, system):
+def notices(scene, system):
+    """What a user should know of a scene before it is solved, each a text."""
+    if system.net.web.kind == "file":
+        from .net.mesh_file import remarks
+
+        yield from remarks(system.net.web)
     if system.net.bodies and not system.contact:
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))

@@ -112,7 +112,8 @@ class Scene:
             for one in value if isinstance(value, tuple) else [value]:
                 if type(one).__name__ not in kinds:
                     names = " or ".join(f"refweb.{kind}" for kind in kinds if kind != "NoneType")
-                    raise InputError(f"{key} = {shown(one)} must be {names}")
+                    several = f"{names}: a list of them is support" if key == "supports" else names
+                    raise InputError(f"{key} = {shown(one)} must be {several}")
         if type(self.web).__name__ != "Web" and not (isinstance(self.web, Table) and hasattr(self.web, "web")):
             raise InputError(f"web = {shown(self.web)} must be a refweb.Web, or one of the tables that make one")
         self._fill()

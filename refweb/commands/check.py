@@ -10,8 +10,8 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Refuse what a run would refuse, else print what it would solve."""
-    from ..runner import simulation_of
+    """Refuse what a run would refuse, else print what it would solve, and what a run would warn of before."""
+    from ..runner import notices, simulation_of
     from ..solution import Solution
     from .console import print_scene
 
@@ -19,3 +19,5 @@ def run(arguments):
     system = scene.build()
     simulation_of(scene, system, Solution(scene))
     print_scene(scene, system)
+    for text in notices(scene, system):
+        print(f"warning: {text}")

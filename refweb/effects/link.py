@@ -14,6 +14,8 @@ from .base import Constraint
 class Link(Table):
     """Massless bars that do not stretch, from each of some nodes to the next; they pull and push.
 
+    Dynamics by ``method = "ida"`` alone can hold them: other methods, statics and modes take a stiff line in its place.
+
     Parameters
     ----------
     nodes : list

@@ -47,6 +47,8 @@ class _Columns:
         found = []
         for number, text in enumerate(self.columns[key]):
             try:
+                if "_" in text:  # which Python takes in numbers
+                    raise ValueError
                 found.append(empty if not text and empty is not None else int(text) if whole else float(text))
             except ValueError:
                 kind = "a whole number" if whole else "a number"

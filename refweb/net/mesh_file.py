@@ -82,6 +82,31 @@ class File(Table):
             raise InputError(f"path = {shown(self.path)}: {error}") from None
 
 
+def remarks(web):
+    """Warnings of what a file often holds by mistake: lines that are there twice, and nodes at one place unjoined."""
+    ends = np.sort(web.lines, axis=1)
+    pairs, of, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    for pair in np.flatnonzero(count > 1)[:1]:
+        one, other = np.flatnonzero(of.ravel() == pair)[:2]
+        yield (
+            f"{int((count - 1).sum())} lines join two nodes that another line joins, {one} and {other} among them: "
+            "each carries load; leave one out if the file has it twice by mistake"
+        )
+    used = np.unique(web.lines)
+    size = np.ptp(web.points[used], axis=0).max() or 1.0
+    cell = np.round((web.points[used] - web.points[used].min(axis=0)) / (1e-9 * size)).astype(np.int64)
+    order = np.lexsort(cell.T)
+    same = np.flatnonzero((np.diff(cell[order], axis=0) == 0).all(axis=1))
+    apart = [(used[order[i]], used[order[i + 1]]) for i in same]
+    joined = set(map(tuple, pairs.tolist()))
+    apart = [pair for pair in (tuple(sorted(map(int, pair))) for pair in apart) if pair not in joined]
+    if apart:
+        yield (
+            f"{len(apart)} pairs of nodes are at one place and no line joins them, {apart[0][0]} and {apart[0][1]} "
+            "among them: the web comes apart there; merge them where the file is made"
+        )
+
+
 def _web_of(mesh):
     """The web of a `refweb.net.mesh_readers.Mesh`."""
     _check_cells(mesh)

@@ -48,9 +48,7 @@ def compare(folders):
     rows = [_row(key, [results.get(key) for results in found]) for key in keys]
     common = [row for row in rows if row["agree"] is not None]
     if not common:
-        has = "; ".join(
-            f"{f} has {', '.join(dict.fromkeys(n for n, _ in r))}" for f, r in zip(folders, found, strict=True)
-        )
+        has = "; ".join(map(_has, folders, summaries, found))
         raise InputError(f"no two folders have a result in common: {has}")
     return {
         "folders": list(map(str, folders)),
@@ -84,6 +82,12 @@ def _results(folder, summary, several):
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
     return {(name, step): result.plain() for step, results in read for name, result in results.items()}
+
+
+def _has(folder, summary, results):
+    """What a run found, in words."""
+    names = ", ".join(dict.fromkeys(name for name, _ in results))
+    return f"{folder} has {names}" if names else f"the run in {folder} is {summary['status']} and has none"
 
 
 def _row(key, values):

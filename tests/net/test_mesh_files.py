@@ -8,7 +8,7 @@ import pytest
 import refweb
 from refweb.__main__ import main
 from refweb.errors import InputError
-from refweb.net.mesh_file import File
+from refweb.net.mesh_file import File, remarks
 
 # Gmsh: a unit square of four curves, whose third is in two physical groups.
 
@@ -241,12 +241,27 @@ def test_csv(tmp_path):
         (NODES, "i,j\n", "lines.csv has no rows below its first"),
         ("x;y;z\n0;0;0\n", "i,j\n0,1\n", 'points.csv: column "x;y;z" is unknown'),
         ("x,y,z\n0,0,\n1,0,0\n", "i,j\n0,1\n", 'points.csv, line 2: z = "" must be a number'),
+        ("x,y,z\n0,0,0\n2_0,0,0\n", "i,j\n0,1\n", 'points.csv, line 3: x = "2_0" must be a number'),
         ("", "i,j\n0,1\n", "points.csv: column x is missing"),
     ],
 )
 def test_csv_refuses(tmp_path, points, lines, message):
     with pytest.raises(InputError, match=re.escape(message)):
         csv(tmp_path, points, lines)
+
+
+def test_what_a_file_has_twice_or_unjoined_is_told(tmp_path, capsys):
+    """A line that is there twice, and two nodes at one place; neither where a line of some length joins the two."""
+    csv(tmp_path, "x,y,z\n0,0,0\n1,0,0\n1,0,0\n2,0,0\n", "i,j\n0,1\n1,0\n2,3\n")
+    text = '[web]\nkind = "file"\npath = "points.csv"\nlines = "lines.csv"\n[supports]\nnodes = "all"\n'
+    text += '[cable]\nmodulus = 1e6\narea = 1e-4\ndensity = 1\n[solve]\nkind = "static"\n'
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    assert main(["check", str(tmp_path / "scene.toml")]) == 0
+    out = capsys.readouterr().out
+    assert "warning: 1 lines join two nodes that another line joins, 0 and 1 among them" in out
+    assert "warning: 1 pairs of nodes are at one place and no line joins them, 1 and 2 among them" in out
+    joined = csv(tmp_path, "x,y,z\n0,0,0\n1,0,0\n1,0,0\n", "i,j,natural_length\n0,1,1\n1,2,0.5\n")
+    assert list(remarks(joined)) == []
 
 
 def test_csv_is_two_files(tmp_path):

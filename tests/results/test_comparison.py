@@ -112,6 +112,7 @@ def test_what_cannot_be_compared(tmp_path, capsys, monkeypatch):
     folder(tmp_path / "broken", {"d": result(1.0)}, scene="x = ")
     folder(tmp_path / "strange", {"d": 1.0})
     folder(tmp_path / "cost", None)
+    folder(tmp_path / "failed", {}, status="failed")
     (tmp_path / "empty").mkdir()
     for second, message in [
         ([], "needs two result folders or more"),
@@ -121,6 +122,7 @@ def test_what_cannot_be_compared(tmp_path, capsys, monkeypatch):
         (["strange"], "strange/run.json: is not what a run of refweb writes"),
         (["cost"], "cost: its run.json holds no results"),
         (["other"], "no two folders have a result in common: a has d; other has e"),
+        (["failed"], "no two folders have a result in common: a has d; the run in failed is failed and has none"),
     ]:
         assert main(["compare", "a", *second]) == 2
         out, err = capsys.readouterr()
