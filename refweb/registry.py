@@ -131,6 +131,7 @@ COMMANDS = {
     "info": "refweb.commands.info",
     "compare": "refweb.commands.compare",
     "picture": "refweb.commands.picture",
+    "plot": "refweb.commands.plot",
     "modes": "refweb.commands.modes",
     "cost": "refweb.commands.cost",
 }

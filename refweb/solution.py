@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,12 @@ from .messages import nearest, short
 from .results.folder import read_summary
 from .results.solution import OTHER_ERRORS, SolutionData, read_results
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from os import PathLike
+
+    from matplotlib.figure import Figure
 
 
 class Solution(SolutionData):
@@ -150,6 +157,37 @@ class Solution(SolutionData):
         table = table.set_index(table.columns[0])
         table.attrs = {"title": self.scene.title, "units": dict(map(_named, self.columns))}
         return table
+
+    def plot(self, quantity: str | Sequence[str] | None = None, out: str | PathLike | None = None) -> Figure:
+        """Draw histories with ±, books, spectra, stress over distance; a notebook shows the figure.
+
+        Parameters
+        ----------
+        quantity : str or sequence of str, optional
+            What is drawn, a panel each: an observable or another column of the history; ``energy`` or ``momentum``, the
+            books; ``spectrum`` of the first observable or ``spectrum:NAME``; ``stress-distance``, ``tension-distance``
+            or ``strain-distance``, from the place that was hit or loaded; ``frequencies`` of modes. By default the
+            observables and the book of energies, in statics the results over load steps, of one stress over distance.
+        out : path-like, optional
+            A ``.png``, ``.svg`` or ``.pdf`` to write.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError
+            For a quantity that there is not, with the nearest, and a place or format that cannot be written.
+        """
+        from .pictures.plots import draw, target, write
+        from .pictures.record import of_solution
+
+        path = None if out is None else target(out)
+        figure = draw(of_solution(self, seen=False), quantity)
+        if path is not None:
+            write(figure, path)
+        return figure
 
     def save(self, folder, force=False):
         """Write the result folder.

@@ -41,6 +41,8 @@ class Frame(NamedTuple):
         Places of supported nodes [m].
     bodies : dict of str to Body
         Bodies by name.
+    ends : ndarray of int, shape (lines, 2)
+        Numbers of the nodes where lines begin and end.
     """
 
     number: int
@@ -52,6 +54,7 @@ class Frame(NamedTuple):
     slack: np.ndarray
     supports: np.ndarray
     bodies: dict
+    ends: np.ndarray
 
 
 class Body(NamedTuple):
@@ -147,7 +150,8 @@ def frame_of(number, time, meshes, supported):
     edges = sum(cells.shape[0] * (cells.shape[1] - 1) for _, cells in blocks)
     tree = edges < len(np.unique(np.concatenate([cells.ravel() for _, cells in blocks])))
     bodies = {name: _surface(mesh) for name, mesh in meshes.items() if name != "web"}
-    return Frame(number, time, paths, start, tree, fields, slack, web.points[supported], bodies)
+    ends = np.concatenate([cells[:, :2] for _, cells in blocks])
+    return Frame(number, time, paths, start, tree, fields, slack, web.points[supported], bodies, ends)
 
 
 def _mesh(path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import tomllib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -35,7 +36,7 @@ class Record(NamedTuple):
     frame : callable
         Gives the `Frame` of a number.
     table : callable
-        Gives (names of columns with units, history by name).
+        Gives (names of columns with units, history by name), read once.
     """
 
     name: str
@@ -57,8 +58,15 @@ class Record(NamedTuple):
         return str(self.summary.get("status", "solved"))
 
 
-def of_folder(folder):
+def of_folder(folder, seen=True):
     """The record of a result folder.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder.
+    seen : bool
+        Whether there have to be frames: a run that failed at once has none, and may have a history.
 
     Raises
     ------
@@ -73,15 +81,25 @@ def of_folder(folder):
     except (OSError, ValueError, KeyError, TypeError):
         scene, kind = {}, "dynamic"
     kind = "modes" if summary.get("kind") == "modes" else kind
-    times = {number: found.time for number, found in listed(folder).items()}
     name = folder.name or folder.resolve().name
-    return Record(name, kind, summary, scene, times, functools.partial(read, folder), lambda: _table(folder))
+    table = functools.cache(functools.partial(_table, folder))
+    return Record(name, kind, summary, scene, _times(folder, seen), functools.partial(read, folder), table)
 
 
-def of_solution(solution):
-    """The record of a `refweb.results.solution.SolutionData`, of its folder where it holds no frames in memory."""
-    if not solution.frames:
-        return of_folder(solution.path)
+def _times(folder, seen):
+    """Times of the frames of a folder by number; none of a run that has a summary and no frames, where that may be."""
+    try:
+        return {number: found.time for number, found in listed(folder).items()}
+    except InputError:
+        if seen or read_summary(folder) is None:
+            raise
+        return {}
+
+
+def of_solution(solution, seen=True):
+    """The record of a `refweb.results.solution.SolutionData`, of its folder where it holds no history in memory."""
+    if solution.table is None:
+        return of_folder(solution.path, seen)
     from ..results.vtu import meshes
 
     states = dict(solution.frames)
@@ -103,9 +121,8 @@ def of_solution(solution):
         tables = {}
     times = {number: state.time for number, state in solution.frames}
     summary = solution.summary()
-    return Record(
-        scene.title, scene.solve.kind, summary, tables, times, frame, lambda: (solution.columns, solution.history)
-    )
+    kind, table = summary.get("kind", scene.solve.kind), (solution.columns, solution.history)
+    return Record(scene.title, kind, summary, tables, times, frame, lambda: table)
 
 
 def _table(folder):
@@ -114,7 +131,10 @@ def _table(folder):
     try:
         with open(path, encoding="utf-8") as lines:
             columns = lines.readline().rstrip("\n").split(",")
-            rows = np.loadtxt(lines, delimiter=",", ndmin=2)
+            whole = (line for line in lines if line.endswith("\n"))  # a run that is alive may be writing the last
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # that there are no rows
+                rows = np.loadtxt(whole, delimiter=",", ndmin=2)
         return columns, as_history(columns, rows)
     except (OSError, ValueError) as error:
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None

@@ -25,6 +25,7 @@ from .vtu import meshes, write_mesh
 
 RESULT_FILES = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif"
+    r"|plot\.(png|svg|pdf)"
     r"|frames/[^/]+_\d{6,}\.vtu|(frames/)?\.refweb-[^/]+"
 )
 """Files that a run writes, and that ``--force`` removes."""

@@ -1,0 +1,20 @@
+"""Plot result folders: histories with ±, books, spectra; several over each other."""
+
+
+def add_arguments(parser):
+    """The folders, what is drawn of them, and where."""
+    parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders; several are drawn over each other")
+    text = (
+        "an observable or another column of history.csv; energy or momentum, their books; spectrum or spectrum:NAME; "
+    )
+    text += "stress-distance, tension-distance or strain-distance; frequencies, of modes. Repeatable (default: the "
+    text += "observables and the book of energies; in statics results over load steps, of one stress over distance)"
+    parser.add_argument("--quantity", action="append", metavar="NAME", help=text)
+    parser.add_argument("--out", metavar="FILE", help="a .png, .svg or .pdf (default: plot.png in the first DIR)")
+
+
+def run(arguments):
+    """Draw, and print where the plot is."""
+    from ..pictures.plots import plot
+
+    print(plot(arguments.folders, quantity=arguments.quantity, out=arguments.out))

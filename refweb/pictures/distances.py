@@ -1,0 +1,131 @@
+"""Stress, tension or strain of lines over their distance from the place that was hit or loaded."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..net.web import Web
+from ..results.units import readable
+from .frames import Frame
+from .sheet import PALE, Panel, label, legend
+from .shown import unit_of
+
+FIELDS = {"stress": "Pa", "tension": "N", "strain": "1"}
+"""What can be drawn, and its unit."""
+MANY = 4000
+"""Lines above which their points are an image in files that are made of strokes."""
+
+
+class Spread(NamedTuple):
+    """What lines have, and how far away they are.
+
+    Attributes
+    ----------
+    frame : refweb.pictures.frames.Frame
+        The instant.
+    values : ndarray, shape (lines,)
+        Their field [SI].
+    distance : ndarray, shape (lines,)
+        Of the middle of each from the place, in the undeformed web [m].
+    slack : ndarray of bool, shape (lines,)
+        Slack lines.
+    origin : str
+        The place in words.
+    """
+
+    frame: Frame
+    values: np.ndarray
+    distance: np.ndarray
+    slack: np.ndarray
+    origin: str
+
+
+def spread(record, field):
+    """The `Spread` of a field at the frame nearest its largest value."""
+    if not record.times:
+        raise InputError(f"{record.name}: has no frames, so it is not known what its lines have")
+    when = time_of_largest(record, field)
+    frame = record.frame(min(record.times, key=lambda number: abs(record.times[number] - when)))
+    if field not in frame.fields:
+        raise InputError(f"{record.name}: its frames hold no {field}")
+    values, middles = np.asarray(frame.fields[field]), frame.origin.mean(axis=1)
+    place, words = _place(record, frame, middles, values, field)
+    return Spread(frame, values, np.linalg.norm(middles - place, axis=1), frame.slack, words)
+
+
+def time_of_largest(record, field):
+    """Time of the largest value of a field, of the first result where no result is of the field; else the last."""
+    results = record.summary.get("results") or {}
+    asked = {one.get("name"): one for one in record.scene.get("observe") or []}
+    own = [name for name in results if asked.get(name, {}).get("quantity") == field]
+    times = [results[name].get("time") for name in [*own, *results]]
+    return next((time for time in times if time is not None), max(record.times.values()))
+
+
+def _place(record, frame, middles, values, field):
+    """Where a web was hit or loaded [m], else where the largest value is; and that in words."""
+    numbers = np.asarray(frame.fields.get("line", np.arange(len(values))))
+    touched = {
+        name: body for name, body in (record.summary.get("bodies") or {}).items() if body.get("line") is not None
+    }
+    if touched:
+        name = max(touched, key=lambda body: touched[body]["overlap"])
+        return middles[numbers == touched[name]["line"]].mean(axis=0), f'where "{name}" touches deepest'
+    loaded = _loaded(record, frame)
+    if loaded is not None:
+        return loaded
+    line = int(np.nanargmax(values))
+    return middles[line], f"line {int(numbers[line])}, where {field} is largest"
+
+
+def _loaded(record, frame):
+    """Where the one node that is loaded stands, and its name; None where there is no such node."""
+    loads = record.scene.get("load") or []
+    count = (record.summary.get("web") or {}).get("nodes", 0)
+    nodes = np.zeros((int(frame.ends.max()) + 1, 3))
+    nodes[frame.ends] = frame.origin[:, [0, -1]]
+    if not loads or not 0 < count <= len(nodes) or "line" in frame.fields:
+        return None
+    try:
+        web = Web(points=nodes[:count], lines=frame.ends, kind=str(record.scene.get("web", {}).get("kind", "inline")))
+        found = np.unique(np.concatenate([web.find(load["node"]) for load in loads]))
+    except (InputError, KeyError, ValueError):  # a name that the scene alone knows
+        return None
+    return (nodes[found[0]], f"node {found[0]}, which is loaded") if len(found) == 1 else None
+
+
+def distances(shown, field):
+    """The panel of a field over the distance from the place that was hit or loaded."""
+    found = [spread(s.record, field) for s in shown]
+    factor, called = unit_of(FIELDS[field], *(one.values for one in found))
+    metre, far = unit_of("m", *(one.distance for one in found))
+
+    def draw(axes):
+        entries = []
+        for s, one in zip(shown, found, strict=True):
+            taut, many = ~one.slack, len(one.values) > MANY
+            size = 3.0 if len(one.values) > 500 else 5.0
+            dots = {"linestyle": "", "markersize": size, "rasterized": many, "markeredgewidth": 0.0, "alpha": 0.75}
+            at, values = one.distance / metre, one.values / factor
+            (points,) = axes.plot(at[taut], values[taut], marker=s.ink.marker, color=s.ink.colour, **dots)
+            largest = readable(float(np.nanmax(one.values)), None, FIELDS[field])
+            place = f", from {one.origin}" if len(places) > 1 else ""
+            entries.append((points, s.said(f"lines at {_when(s.record, one.frame)}, at most {largest}{place}")))
+            if one.slack.any():
+                look = {"linestyle": "", "marker": "x", "markersize": size + 1, "rasterized": many}
+                (points,) = axes.plot(at[one.slack], values[one.slack], color=s.ink.colour if s.name else PALE, **look)
+                entries.append((points, s.said(f"slack: {one.slack.sum()} of {len(one.slack)} lines")))
+        label(axes, field, called)
+        legend(axes, entries)
+
+    places = dict.fromkeys(one.origin for one in found)
+    place = f"\nfrom {next(iter(places))}" if len(places) == 1 else ""
+    return [Panel(draw, f"distance in the undeformed web [{far}]{place}", 3.4)]
+
+
+def _when(record, frame):
+    """The time of a frame in words."""
+    return f"t = {frame.time:.6g} s" if record.kind == "dynamic" else f"step {frame.time:g}"

@@ -1,0 +1,242 @@
+"""Plots of runs: histories with ±, books, spectra, stress over distance, load steps and frequencies, one or overlaid.
+
+`kinds` says what there is to draw of a record, `draw` draws it as a figure, `plot` writes that of some folders.
+"""
+
+from __future__ import annotations
+
+import functools
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..messages import nearest, short
+from ..results.files import write_atomically
+from . import books, distances, histories, spectra
+from .record import Record, of_folder
+from .sheet import Ink, sheet
+from .shown import Shown
+
+ENDINGS = ("png", "svg", "pdf")
+"""Formats of plots."""
+LETTERS_STAY: dict[Any, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "refweb"}
+"""What keeps text as text in files that are made of strokes, and their names the same each time."""
+BESIDE: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""What is written of a file's making: nothing, so that equal plots are equal files."""
+SPECTRUM, DISTANCE = "spectrum:", "-distance"
+NOT_OURS = {"cost": "its diagram is cost.png there, by refweb cost"}
+
+
+def kinds(record):
+    """What there is to draw of a record: names that `draw` takes, and a line on each, the most telling first.
+
+    Besides these any column of its table can be drawn, and ``spectrum:`` before one of a dynamic run.
+    """
+    shown = Shown(record, "", Ink.of(0))
+    if record.kind == "modes":
+        return {"frequencies": "Natural frequencies with ±"}
+    rows = len(shown.along)
+    found = {}
+    if record.kind == "dynamic":
+        found |= {name: f"{name} over time" for name in shown.observables}
+        if shown.energies:
+            found.setdefault("energy", "Energy by kind over time, and how far its book is open")
+        if books.has_momentum(shown):
+            found.setdefault("momentum", "Momentum against the impulses of supports and loads")
+        if rows >= spectra.FEWEST and shown.observables:
+            found.setdefault("spectrum", f"Spectrum of {shown.observables[0]}")
+    elif rows > 1:
+        found |= {name: f"{name} over the load step, with ±" for name in shown.observables}
+        if shown.energies:
+            found.setdefault("energy", "Energy by kind over the load step")
+    if record.times:
+        found |= {f"{field}{DISTANCE}": f"{field} of lines over distance" for field in distances.FIELDS}
+    return found
+
+
+def usual(record):
+    """Names of what is drawn of a record where nothing is asked for."""
+    found = list(kinds(record))
+    if record.kind == "dynamic":
+        observables = Shown(record, "", Ink.of(0)).observables
+        return [name for name in found if name in observables or name == "energy"]
+    plain = [name for name in found if name != "energy" and not name.endswith(DISTANCE)]
+    return plain or found[:1] or Shown(record, "", Ink.of(0)).observables
+
+
+def draw(records, what=None):
+    """Draw some of the `kinds` of one record, or of several over each other.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+        Runs of one kind.
+    what : str or sequence of str, optional
+        Names of `kinds`, or of columns of their tables; by default observables and the book of energies, in statics the
+        results over load steps, of one load step stress over distance, of modes their frequencies.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Panels one below the other; a notebook shows it.
+
+    Raises
+    ------
+    InputError
+        For a name that no record has, with the nearest; records of several kinds, or without rows.
+    """
+    shown, notes = _beside([records] if isinstance(records, Record) else list(records))
+    names = [what] if isinstance(what, str) else list(what or _usual_of_all(shown))
+    panels, missing = [], {}
+    for name in dict.fromkeys(names):
+        having = [s for s in shown if _has(s, name)]
+        if not having:
+            known = dict.fromkeys(k for s in shown for k in (*kinds(s.record), *s.units))
+            if name.startswith(SPECTRUM):
+                known = [f"{SPECTRUM}{column}" for s in shown for column in list(s.units)[1:]]
+            raise InputError(f'quantity = "{short(name)}": there is nothing of that name, {nearest(name, known)}')
+        panels += _panels(having, name)
+        for s in shown:
+            missing.setdefault(s.name, []).extend([name] if s not in having else [])
+    notes += [f"{who} has no {', '.join(names)}" for who, names in missing.items() if names]
+    figure = sheet(panels, _title(shown), notes)
+    setattr(figure, "_repr_png_", functools.partial(_as_png, figure))  # noqa: B010  # what notebooks look for
+    return figure
+
+
+def _usual_of_all(shown):
+    """Names of what is drawn of several records where nothing is asked for: what two have at least, else all."""
+    names = [name for s in shown for name in usual(s.record)]
+    return [name for name in names if names.count(name) > 1] or names
+
+
+def _beside(records):
+    """Records as they are drawn beside others, and what is to be said of them."""
+    if not records:
+        raise InputError("there is nothing to plot: name a result folder")
+    for record in records:
+        if (kind := record.summary.get("kind")) not in (None, "modes"):
+            words = NOT_OURS.get(kind, "plots are of runs and of modes")
+            raise InputError(f"{record.name}: holds {short(str(kind))}, not a run: {words}")
+    if len(found := dict.fromkeys(record.kind for record in records)) > 1:
+        raise InputError(f"{' and '.join(found)} runs have no axis in common: plot them one by one")
+    single = len(records) == 1
+    shown = [Shown(r, "" if single else r.name, Ink.of(n)) for n, r in enumerate(records)]
+    notes = [s.said(_ended(s.record)) for s in shown if s.record.status != "solved"]
+    empty = [s for s in shown if not len(s.along)]
+    if len(empty) == len(shown):
+        raise InputError(f"{records[0].name}: its history has no rows, so there is nothing to plot")
+    notes += [f"{s.name} has no rows" for s in empty]
+    return [s for s in shown if s not in empty], notes
+
+
+def _ended(record):
+    """How a run ended that is not solved."""
+    message = str(record.summary.get("message") or "")
+    return f"run {record.status}" + (f": {message[:200]}" if message else "")
+
+
+def _title(shown):
+    titles = list(dict.fromkeys(s.record.title[:100] for s in shown))
+    status = shown[0].record.status
+    note = f" — run {status}" if len(shown) == 1 and status != "solved" else ""
+    return (", ".join(titles) if len(titles) <= 3 else f"{len(shown)} runs") + note
+
+
+def _has(s, name):
+    """Whether a record has what a name stands for."""
+    if name.startswith(SPECTRUM) and name not in s.units:
+        return s.record.kind == "dynamic" and name.removeprefix(SPECTRUM) in list(s.units)[1:]
+    if name == "spectrum":
+        return s.record.kind == "dynamic" and bool(s.observables)
+    return name in s.units or name in kinds(s.record)
+
+
+def _panels(shown, name):
+    """Panels of what a name stands for: columns before all else."""
+    kind = shown[0].record.kind
+    if any(name in s.units for s in shown):
+        if kind == "dynamic":
+            return histories.history(shown, name)
+        return histories.steps(shown, name) if kind == "static" else histories.of_modes(shown, name)
+    if name == "frequencies":
+        return histories.frequencies(shown)
+    if name.startswith(SPECTRUM) or name == "spectrum":
+        return spectra.spectrum(shown, name.removeprefix(SPECTRUM) if ":" in name else shown[0].observables[0])
+    if name.endswith(DISTANCE):
+        return distances.distances(shown, name.removesuffix(DISTANCE))
+    return books.energy(shown) if name == "energy" else books.momentum(shown)
+
+
+def plot(folders, quantity=None, out=None):
+    """Draw result folders over each other, and write the figure.
+
+    Parameters
+    ----------
+    folders : sequence of path-like
+        Result folders.
+    quantity : str or sequence of str, optional
+        As ``what`` of `draw`.
+    out : path-like, optional
+        A ``.png``, ``.svg`` or ``.pdf``; default ``plot.png`` in the first folder.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        As for `draw`, for what is no result folder, and a place or format that cannot be written.
+    """
+    folders = [Path(folder) for folder in folders]
+    records = [of_folder(folder, seen=False) for folder in folders]
+    if len({record.name for record in records}) < len(records):
+        records = [r._replace(name=str(folder)) for r, folder in zip(records, folders, strict=True)]
+    path = target(folders[0] / "plot.png" if out is None else out)
+    write(draw(records, quantity), path)
+    return path
+
+
+def target(out):
+    """The path of a plot that can be written; `InputError` for others."""
+    out = Path(out)
+    ending = out.suffix[1:].lower()
+    if ending not in ENDINGS:
+        raise InputError(f'out = "{out}": unknown format "{ending}", {nearest(ending, ENDINGS)}')
+    if not out.parent.is_dir():
+        raise InputError(f'out = "{out}": there is no folder "{out.parent}"')
+    if out.is_dir() or not all(os.access(path, os.W_OK) for path in (out, out.parent) if path.exists()):
+        raise InputError(f'out = "{out}": cannot be written, choose another place')
+    return out
+
+
+def write(figure, path):
+    """Write a figure to a ``.png``, ``.svg`` or ``.pdf``, atomically, its text as text."""
+    from matplotlib import rc_context
+
+    ending = Path(path).suffix[1:].lower()
+    with rc_context(LETTERS_STAY):
+        write_atomically(
+            Path(path), lambda name: figure.savefig(name, format=ending, metadata=BESIDE.get(ending), dpi="figure")
+        )
+
+
+def as_svg(figure):
+    """A figure as the text of an SVG, for a page."""
+    from matplotlib import rc_context
+
+    text = io.StringIO()
+    with rc_context(LETTERS_STAY):
+        figure.savefig(text, format="svg", metadata=BESIDE["svg"])
+    return text.getvalue()
+
+
+def _as_png(figure):
+    """A figure as a notebook shows it."""
+    image = io.BytesIO()
+    figure.savefig(image, format="png", dpi="figure")
+    return image.getvalue()

@@ -1,0 +1,123 @@
+"""Sheets: panels of a plot one below the other, their inks, units and letters, legible on a phone as well."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+WIDTH, RESOLUTION = 6.4, 150
+"""Width of a sheet [inch] and pixels in an inch."""
+LETTERS = 11
+"""Size of letters [pt]."""
+TALL, LOW = 2.3, 1.6
+"""Heights of panels [inch]."""
+DARK, PALE, GRID = "#222222", "#888888", "#dddddd"
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442", "#000000")
+"""Colours that colour-blind people tell apart, by Okabe and Ito (2008)."""
+STYLES = ("-", "--", "-.", ":", (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 2)), (0, (9, 2, 2, 2)))
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+MOST = 1000
+"""Parts of a long history whose extremes are drawn: about one for each pixel."""
+
+
+class Ink(NamedTuple):
+    """How one of several things is drawn: colour, style of lines, marker."""
+
+    colour: str
+    style: str | tuple
+    marker: str
+
+    @classmethod
+    def of(cls, number):
+        """That of a number from 0 on."""
+        return cls(*(kinds[number % len(kinds)] for kinds in (COLOURS, STYLES, MARKERS)))
+
+
+class Panel(NamedTuple):
+    """A part of a sheet.
+
+    Attributes
+    ----------
+    draw : callable
+        Called with the `matplotlib.axes.Axes` to draw on.
+    along : str
+        What its horizontal axis is, with its unit: panels below each other share one that is the same.
+    height : float
+        Its height [inch].
+    note : str
+        What stands below the sheet.
+    """
+
+    draw: Callable
+    along: str
+    height: float = TALL
+    note: str = ""
+
+
+def sheet(panels, title, notes=()):
+    """The `matplotlib.figure.Figure` of some panels, with a title and, below them, what else is to be known."""
+    from matplotlib.figure import Figure
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    notes = dict.fromkeys(filter(None, [*(panel.note for panel in panels), *notes]))
+    words, below = textwrap.wrap(title, 48), [line for note in notes for line in textwrap.wrap(note, 84)]
+    heights = [panel.height for panel in panels]
+    size = (WIDTH, sum(heights) + 0.25 * len(words) + 0.2 * len(below) + 0.5)
+    figure = Figure(figsize=size, dpi=RESOLUTION, layout=ConstrainedLayoutEngine(h_pad=0.06, w_pad=0.06))
+    column = figure.subplots(len(panels), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for number, (axes, panel) in enumerate(zip(column, panels, strict=True)):
+        axes.grid(color=GRID, linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.tick_params(labelsize=LETTERS - 1, colors=DARK)
+        if number and panels[number - 1].along == panel.along:
+            axes.sharex(column[number - 1])
+            column[number - 1].tick_params(labelbottom=False)
+            column[number - 1].set_xlabel("")
+        axes.set_xlabel(panel.along, size=LETTERS, color=DARK)
+        panel.draw(axes)
+    look = {"x": 0.02, "ha": "left", "parse_math": False}
+    figure.suptitle("\n".join(words), size=LETTERS + 2, weight="bold", color=DARK, **look)
+    if below:
+        figure.supxlabel("\n".join(below), size=LETTERS - 1, color=DARK, **look)
+    return figure
+
+
+def legend(axes, entries, columns=1):
+    """Name what is drawn above the axes, where it covers nothing; ``entries`` are (handle, words)."""
+    if entries:
+        handles, words = zip(*entries, strict=True)
+        look = {"frameon": False, "borderaxespad": 0.1, "handlelength": 2.2, "columnspacing": 1.2, "labelspacing": 0.25}
+        place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns, "fontsize": LETTERS - 1}
+        words = ["\n ".join([""] + textwrap.wrap(text, 58 // columns))[1:] for text in words]
+        drawn = axes.legend(handles, words, **place, **look)
+        for text in drawn.get_texts():
+            text.set(parse_math=False, color=DARK)
+
+
+def label(axes, name, unit=""):
+    """Name the vertical axis, with its unit."""
+    axes.set_ylabel(f"{name} [{unit}]" if unit else name, size=LETTERS, color=DARK, parse_math=False)
+
+
+def telling(*columns, most=MOST):
+    """Numbers of the rows that a drawing of long columns needs: extremes of each column in each of ``most`` parts.
+
+    All rows of columns that are short; the first and the last row in any case.
+    """
+    rows = len(columns[0])
+    if rows <= 4 * most:
+        return np.arange(rows)
+    size = -(-rows // most)
+    found = [np.array([0, rows - 1])]
+    for column in columns:
+        padded = np.full(size * -(-rows // size), np.nan)
+        padded[:rows] = column
+        parts = padded.reshape(-1, size)
+        begin = size * np.arange(len(parts))
+        for least in (np.where(np.isnan(parts), np.inf, parts), np.where(np.isnan(parts), np.inf, -parts)):
+            found.append(begin + least.argmin(axis=1))
+    return np.unique(np.minimum(np.concatenate(found), rows - 1))

@@ -1,0 +1,112 @@
+"""What of a record is drawn in a plot: its history with units, its results with ±, and how it looks beside others."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..results.solution import Result, read_results
+from ..results.units import readable, scale_of
+from .record import Record
+from .sheet import Ink
+
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+"""Digits of exponents."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A record beside others in a plot.
+
+    Attributes
+    ----------
+    record : refweb.pictures.record.Record
+        What is drawn.
+    name : str
+        What tells it from the others; empty where there are none.
+    ink : refweb.pictures.sheet.Ink
+        How its lines look.
+    """
+
+    record: Record
+    name: str
+    ink: Ink
+
+    @functools.cached_property
+    def units(self):
+        """Unit of each column of the history by name, "1" of numbers; the first is time, load step or mode."""
+        return dict(column.removesuffix("]").rsplit(" [", 1) for column in self.record.table()[0] if " [" in column)
+
+    @property
+    def history(self):
+        """Columns of the history by name."""
+        return self.record.table()[1]
+
+    @property
+    def along(self):
+        """The first column: time [s], in statics the load step."""
+        return self.history[next(iter(self.units))]
+
+    @property
+    def observables(self):
+        """Names of the observables among the columns."""
+        asked = self.record.scene.get("observe")
+        names = [one.get("name") for one in asked] if isinstance(asked, list) else list(self.results)
+        return [name for name in names if name in self.units]
+
+    @property
+    def energies(self):
+        """Names of the columns of the book of energies [J]: what is stored or lost, work, the total; none without it."""
+        names = [name for name in list(self.units)[1 + len(self.observables) :] if self.units[name] == "J"]
+        return names if "total_energy" in names else []
+
+    @functools.cached_property
+    def results(self):
+        """Results by name, each a `refweb.results.solution.Result`; none while the run goes on."""
+        return _results(self.record.summary)
+
+    @functools.cached_property
+    def steps(self):
+        """Results of each load step: pairs of the step and its results by name."""
+        found = self.record.summary.get("steps")
+        return [(step["step"], _results(step)) for step in found if "step" in step] if isinstance(found, list) else []
+
+    def said(self, words):
+        """Words about it, behind its name where there are others."""
+        return f"{self.name}: {words}" if self.name and words else self.name or words
+
+
+def _results(summary):
+    try:
+        return read_results(summary.get("results") or {})
+    except (TypeError, ValueError, AttributeError):  # not what a run writes
+        return {}
+
+
+def unit_of(unit, *values):
+    """(factor, name) of the readable unit of the largest of some values, a power of ten where no prefix makes one."""
+    size = float(max((np.abs(v[np.isfinite(v)]).max(initial=0.0) for v in map(np.atleast_1d, values)), default=0.0))
+    factor, name = scale_of(size, unit)
+    if size == 0.0 or 1e-2 <= size / factor < 1e5:
+        return factor, name
+    power = int(np.floor(np.log10(size)))
+    return 10.0**power, f"10{str(power).translate(RAISED)} {scale_of(0.0, unit)[1]}".rstrip()
+
+
+def bar(result: Result, factor=1.0):
+    """± of a result as lengths below and above it, shape (2, 1); None where it is not known."""
+    if result.interval is not None:
+        ends = [result.value - result.interval[0], result.interval[1] - result.value]
+        return np.array([[end if np.isfinite(end) else 0.0] for end in ends]) / factor
+    return None if result.error is None else np.full((2, 1), result.error / factor)
+
+
+def told(result: Result):
+    """A result in words, with its ±."""
+    words = readable(result.value, result.error, result.unit)
+    if result.interval is not None:
+        least, most = (readable(end, None, result.unit) for end in result.interval)
+        return f"{words}, anywhere from {least} to {most}"
+    return words

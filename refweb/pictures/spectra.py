@@ -1,0 +1,118 @@
+"""Spectra of histories: amplitudes by frequency, of rows that are equally far apart."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..results.units import readable, scale_of
+from .sheet import DARK, Panel, label, legend
+from .shown import unit_of
+
+FEWEST = 32
+"""Number of rows below which a spectrum tells nothing: it would have a dozen frequencies."""
+EVEN = 1e-6
+"""Share of the interval by which rows may be off."""
+WIDTH_OF_A_LINE = 2.0
+"""Resolution of the window over 1/duration: two equal sines that are farther apart are two peaks."""
+DECADES = 5
+"""Powers of ten below the largest amplitude that are drawn."""
+
+
+class Spectrum(NamedTuple):
+    """Amplitudes of a history.
+
+    Attributes
+    ----------
+    frequency : ndarray
+        From 0 on to half the number of rows in a second [Hz].
+    amplitude : ndarray
+        Of a sine of that frequency [unit of the history].
+    resolution : float
+        How far apart two frequencies have to be to be told apart [Hz].
+    peak : int, optional
+        Number of the largest amplitude that is above those beside it and, in frequency, above the resolution; None
+        where there is none, as in a history that only grows.
+    """
+
+    frequency: np.ndarray
+    amplitude: np.ndarray
+    resolution: float
+    peak: int | None
+
+
+def spectrum_of(time, values, name="history"):
+    """The spectrum of a history about its mean, by a Hann window.
+
+    Parameters
+    ----------
+    time : ndarray, shape (rows,)
+        Times [s]. The last row, that of the end or of an event, may be nearer than the others and is left out then.
+    values : ndarray, shape (rows,)
+        What is there.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        For fewer than `FEWEST` rows, rows that are not equally far apart, and values that are not finite.
+    """
+    if len(time) > 2 and time[-1] - time[-2] < (1.0 - EVEN) * (time[1] - time[0]):
+        time, values = time[:-1], values[:-1]
+    if len(time) < FEWEST:
+        raise InputError(
+            f"spectrum of {name}: has {len(time)} rows, needs {FEWEST} at least: give [output] a shorter interval"
+        )
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    if not np.abs(np.diff(time) - step).max() <= EVEN * step:
+        raise InputError(f"spectrum of {name}: its rows are not equally far apart")
+    if not np.isfinite(values).all():
+        raise InputError(f"spectrum of {name}: it has values that are not finite")
+    window = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(len(time)) / len(time))
+    mean = np.average(values, weights=window)
+    amplitude = 2.0 * np.abs(np.fft.rfft(window * (values - mean))) / window.sum()
+    frequency = np.fft.rfftfreq(len(time), step)
+    resolution = WIDTH_OF_A_LINE / (step * len(time))
+    inner = amplitude[1:-1]
+    high = 1 + np.flatnonzero((inner > amplitude[:-2]) & (inner > amplitude[2:]) & (frequency[1:-1] >= resolution))
+    return Spectrum(frequency, amplitude, resolution, int(high[amplitude[high].argmax()]) if len(high) else None)
+
+
+def spectrum(shown, name):
+    """The panel of the spectrum of a column of the history."""
+    having = [s for s in shown if name in s.units]
+    found = [spectrum_of(s.along, s.history[name], name) for s in having]
+    factor, called = unit_of(having[0].units[name], *(one.amplitude for one in found))
+    cycle, hertz = scale_of(max(float(one.frequency[-1]) for one in found), "Hz")
+
+    def draw(axes):
+        entries = []
+        largest = max(float(one.amplitude.max()) for one in found) / factor
+        for s, one in zip(having, found, strict=True):
+            style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
+            (line,) = axes.plot(one.frequency / cycle, one.amplitude / factor, **style)
+            if one.peak is not None:
+                look = {"color": s.ink.colour, "marker": "v", "markeredgecolor": DARK, "markersize": 8}
+                axes.plot(one.frequency[one.peak] / cycle, one.amplitude[one.peak] / factor, **look)
+            entries.append((line, s.said(_peak(one, s.units[name]))))
+        if largest > 0.0:
+            axes.set_yscale("log")
+            axes.set_ylim(10.0**-DECADES * largest, 2.0 * largest)
+        axes.set_xlim(left=0.0)
+        label(axes, f"amplitude of {name}", called)
+        legend(axes, entries)
+
+    finest = max(one.resolution for one in found)
+    note = f"Frequencies that are {finest:.2g} Hz apart are told apart, by a Hann window on the mean."
+    return [Panel(draw, f"frequency [{hertz}]", 3.0, note)]
+
+
+def _peak(one, unit):
+    """The largest peak of a spectrum in words."""
+    if one.peak is None:
+        return "no peak"
+    at, height = float(one.frequency[one.peak]), float(one.amplitude[one.peak])
+    return f"largest peak at {readable(at, 0.5 * one.resolution, 'Hz')}: {readable(height, None, unit)}"

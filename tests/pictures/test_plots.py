@@ -1,0 +1,395 @@
+"""Plots of small runs: what is drawn is what the run has, told in its units; refusals leave nothing on the disk."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from nets import SMALL
+
+import refweb
+from refweb.__main__ import main
+from refweb.errors import InputError
+from refweb.pictures import books, distances, plots
+from refweb.pictures.record import of_folder
+from refweb.pictures.sheet import Ink, telling
+from refweb.pictures.shown import Shown
+from refweb.pictures.spectra import FEWEST, spectrum_of
+
+SOLVE = '[solve]\nkind = "static"\nload_steps = [1, 2, 3]'
+THROWN = """
+[damping]
+rate = 2.0
+
+[gravity]
+acceleration = [0.0, 0.0, 1.0]
+
+[solve]
+kind = "dynamic"
+duration = 0.2
+
+[output]
+interval = 2e-3
+frames = 20
+
+[[observe]]
+name = "deflection"
+quantity = "displacement"
+reduce = "max"
+
+[[observe]]
+name = "speed"
+quantity = "velocity"
+node = "centre"
+component = "z"
+
+[[event]]
+name = "far"
+kind = "threshold"
+observe = "deflection"
+value = 0.02
+"""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A folder of result folders, which no test changes."""
+    place = tmp_path_factory.mktemp("runs")
+    for name, text in {"static": SMALL, "dynamic": SMALL.replace(SOLVE, THROWN)}.items():
+        (place / f"{name}.toml").write_text(text, encoding="utf-8")
+        refweb.run(place / f"{name}.toml", out=place / name, progress=False)
+    shutil.copytree(place / "dynamic", place / "again")
+    refweb.modes(place / "static.toml", number=3, out=place / "modes", progress=False)
+    return place
+
+
+def shown(folder, name=""):
+    return Shown(of_folder(folder), name, Ink.of(0))
+
+
+def texts(figure):
+    """All that is written on a figure."""
+    from matplotlib.text import Text
+
+    return "\n".join(text.get_text() for text in figure.findobj(Text))
+
+
+def of(figure, name):
+    """The axes whose vertical axis is called so."""
+    return next(axes for axes in figure.axes if axes.get_ylabel().startswith(name))
+
+
+def spans(axes):
+    """Lower and upper ends of the bars of ±, in the order of their points."""
+    bars = [c for c in axes.containers if hasattr(c, "has_yerr")]
+    return [bar.lines[2][0].get_segments()[0] for bar in bars]
+
+
+def test_a_history_is_drawn_as_it_is(runs):
+    """In the unit of the axis, its result at its time with ± as long as it is, and where an event happened."""
+    solution = refweb.load(runs / "dynamic")
+    axes = of(plots.draw(of_folder(runs / "dynamic"), "deflection"), "deflection")
+    assert axes.get_ylabel() == "deflection [mm]" and axes.get_xlabel() == "time [s]"
+    line = axes.get_lines()[0].get_xydata()
+    history = solution.history
+    np.testing.assert_allclose(line, np.column_stack([history["time"], 1e3 * history["deflection"]]), rtol=1e-14)
+    result = solution.results["deflection"]
+    (ends,) = spans(axes)
+    np.testing.assert_allclose(ends[:, 0], result.time)
+    np.testing.assert_allclose(ends[:, 1], 1e3 * np.array([result.value - result.error, result.value + result.error]))
+    (event,) = solution.events
+    assert any(np.allclose(line.get_xdata(), event["time"]) for line in axes.get_lines())
+    assert "far" in texts(axes.figure) and "±" in texts(axes.figure)
+
+
+def test_no_band_where_no_error_is_known(runs):
+    """Columns that are no results have none, nor has a result without ±."""
+    record = of_folder(runs / "dynamic")
+    assert spans(of(plots.draw(record, "kinetic_energy"), "kinetic_energy")) == []
+    results = {name: {**one, "error": None} for name, one in record.summary["results"].items()}
+    axes = of(plots.draw(record._replace(summary={**record.summary, "results": results}), "deflection"), "deflection")
+    (bar,) = (c for c in axes.containers if hasattr(c, "has_yerr"))
+    assert not bar.has_yerr and not any("±" in text.get_text() for text in axes.get_legend().get_texts())
+
+
+def test_energies_are_stacked_to_what_came_in(runs):
+    """Each area is as high as its energy: all of them are total and loss, of potential energy what is above its least.
+
+    They are as large as that at the start and work but for the drift that the run itself has found.
+    """
+    s = shown(runs / "dynamic")
+    table, book = s.history, books.energy_book(s)
+    assert list(book.parts) == ["strain_energy", "potential_energy", "kinetic_energy", "dissipated_energy"]
+    low = table["potential_energy"].min()
+    assert low < 0.0 and book.least["potential_energy"] == low
+    np.testing.assert_allclose(book.top + low, table["total_energy"] + table["dissipated_energy"], atol=1e-14)
+    largest = max(np.abs(v).sum() for v in zip(*(table[name] for name in book.parts), strict=True))
+    drift = s.record.summary["solver"]["energy_drift"]
+    assert np.abs(book.drift).max() == pytest.approx(drift * largest, rel=0.5)
+    axes = of(plots.draw(s.record, "energy"), "energy")
+    factor = {"J": 1.0, "mJ": 1e3}[axes.get_ylabel().split("[")[1][:-1]]
+    tops = [area.get_paths()[0].get_extents().y1 for area in axes.collections]
+    np.testing.assert_allclose(tops, factor * np.cumsum(list(book.parts.values()), axis=0).max(axis=1))
+    work = table["work"] - table["work"][0]
+    np.testing.assert_allclose(axes.get_lines()[-1].get_ydata(), factor * (book.top[0] + work))
+
+
+def test_momentum_against_impulses(runs):
+    """Momentum is what supports, load, gravity and damping gave, along each axis."""
+    book = books.momentum_book(shown(runs / "dynamic"))["z"]
+    largest = np.abs(book.impulses["impulse of loads and all else"]).max()
+    assert largest > 0.01 and np.abs(book.drift).max() < 1e-12 * largest
+    axes = of(plots.draw(of_folder(runs / "dynamic"), "momentum"), "along z")
+    names = [text.get_text().strip() for text in axes.figure.axes[0].get_legend().get_texts()]
+    assert names[0].startswith("momentum") and len(names) == 4
+    np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), axes.get_lines()[3].get_ydata(), atol=1e-9 * largest)
+
+
+@pytest.mark.parametrize("cycles", [25.0, 25.3])
+def test_the_spectrum_of_a_sine(cycles):
+    """Its peak is within half a line of the sine, and as high but for what a Hann window loses between lines, 15 %."""
+    time = np.arange(400) * 1e-2
+    found = spectrum_of(
+        time, 3.0 + 0.2 * np.sin(2 * np.pi * cycles / 4.0 * time) + 0.02 * np.sin(2 * np.pi * 20 * time)
+    )
+    assert found.resolution == pytest.approx(2.0 / 4.0)
+    assert abs(found.frequency[found.peak] - cycles / 4.0) <= 0.5 / 4.0
+    high = found.amplitude[found.peak]
+    assert high == pytest.approx(0.2, rel=1e-3) if cycles == 25.0 else 0.85 * 0.2 < high < 0.2
+    assert found.amplitude[80] == pytest.approx(0.02, rel=1e-2)
+
+
+def test_a_spectrum_that_there_is_not():
+    """Of few rows, rows at odd times, values that are not finite; a last row that is nearer is left out."""
+    time = np.arange(FEWEST) * 0.1
+    with pytest.raises(InputError, match=rf"has {FEWEST - 1} rows, needs {FEWEST} at least"):
+        spectrum_of(time[1:], time[1:])
+    with pytest.raises(InputError, match="not equally far apart"):
+        spectrum_of(time**2, time)
+    with pytest.raises(InputError, match="not finite"):
+        spectrum_of(time, time * np.nan)
+    end = np.append(time, time[-1] + 0.03)
+    assert np.array_equal(spectrum_of(end, np.cos(end)).amplitude, spectrum_of(time, np.cos(time)).amplitude)
+    assert spectrum_of(time, np.exp(time)).peak is None
+
+
+def test_stress_over_distance(runs):
+    """From the node that is loaded, at the last load step, where stress is largest: four lines are nearest."""
+    record = of_folder(runs / "static")
+    found = distances.spread(record, "stress")
+    solution = refweb.load(runs / "static")
+    assert found.frame.time == 3.0 and "which is loaded" in found.origin
+    np.testing.assert_allclose(found.values, solution.stress)
+    web = solution.scene.build().net.web
+    middles = web.points[web.lines].mean(axis=1)
+    np.testing.assert_allclose(found.distance, np.linalg.norm(middles - web.points[web.centre], axis=1))
+    axes = of(plots.draw(record, "stress-distance"), "stress")
+    points = sum(len(line.get_xdata()) for line in axes.get_lines())
+    assert points == len(web.lines)
+
+
+def test_distances_are_from_where_a_body_touches(runs):
+    record = of_folder(runs / "static")
+    bodies = {"ball": {"overlap": 1e-4, "line": 5}, "far": {"overlap": 0.0, "line": None}}
+    found = distances.spread(record._replace(summary={**record.summary, "bodies": bodies}), "tension")
+    assert found.distance[5] == 0.0 and '"ball"' in found.origin
+    bare = distances.spread(record._replace(scene={}), "strain")
+    assert bare.distance[np.argmax(bare.values)] == 0.0 and "strain is largest" in bare.origin
+
+
+def test_load_steps_with_their_error(runs):
+    """A point with ± for each step, and the interval of a value that equilibrium leaves open."""
+    record = of_folder(runs / "static")
+    axes = of(plots.draw(record, "max_stress"), "max_stress")
+    unit = {"kPa": 1e3, "Pa": 1.0}[axes.get_ylabel().split("[")[1][:-1]]
+    ends = np.array(spans(axes)) * [1.0, unit]
+    given = [step["results"]["max_stress"] for step in record.summary["steps"]]
+    np.testing.assert_allclose(ends[:, 0, 0], [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(ends[:, 1, 1] + ends[:, 0, 1], [2.0 * one["value"] for one in given])
+    np.testing.assert_allclose(ends[:, 1, 1] - ends[:, 0, 1], [2.0 * one["error"] for one in given], rtol=1e-3)
+    steps = json.loads(json.dumps(record.summary["steps"]))
+    value = steps[2]["results"]["max_stress"]["value"]
+    steps[2]["results"]["max_stress"]["interval"] = [0.5 * value, None]
+    axes = of(plots.draw(record._replace(summary={**record.summary, "steps": steps}), "max_stress"), "max_stress")
+    np.testing.assert_allclose(spans(axes)[2][:, 1] * unit, [0.5 * value, value])
+
+
+def test_modes_with_their_error(runs):
+    record = of_folder(runs / "modes")
+    assert list(plots.kinds(record)) == ["frequencies"]
+    axes = of(plots.draw(record), "frequency")
+    table = record.table()[1]
+    points = [c for c in axes.containers if hasattr(c, "has_yerr")]
+    assert len(points) == 3 and axes.get_xlabel() == "load step"
+    for mode, one in enumerate(points, start=1):
+        np.testing.assert_allclose(one.lines[0].get_ydata(), table["frequency"][table["mode"] == mode])
+    over = of(plots.draw(record, "share_z"), "share_z")
+    np.testing.assert_allclose(over.get_lines()[0].get_ydata(), table["share_z"][-3:])
+    last = {key: column[-3:] for key, column in table.items()}
+    single = record._replace(table=lambda: (record.table()[0], {**last, "frequency": last["frequency"] * [-1, 1, 1]}))
+    figure = plots.draw(single)
+    axes = of(figure, "frequency")
+    assert axes.get_xlabel() == "mode" and "imaginary, unstable" in texts(figure)
+    (cross,) = (line for line in axes.get_lines() if line.get_marker() == "x")
+    np.testing.assert_allclose(cross.get_xydata(), [[1.0, -last["frequency"][0]]])
+
+
+def test_two_folders_overlay(runs):
+    """A line each with its name; who lacks a quantity is named."""
+    records = [of_folder(runs / name) for name in ("dynamic", "again")]
+    records[1] = records[1]._replace(table=lambda: (records[0].table()[0][:2], records[0].table()[1]))
+    figure = plots.draw(records, ["deflection", "speed", "energy"])
+    axes = of(figure, "deflection")
+    words = " ".join(text.get_text() for text in axes.get_legend().get_texts())
+    curves = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+    assert len(curves) == 2 and "dynamic: " in words and "again: " in words
+    assert len({(line.get_color(), str(line.get_linestyle())) for line in curves}) == 2
+    assert "again has no speed" in texts(figure)
+    with pytest.raises(InputError, match="static and dynamic|dynamic and static"):
+        plots.draw([records[0], of_folder(runs / "static")])
+
+
+def test_books_and_the_rest_of_two_folders(runs):
+    records = [of_folder(runs / name) for name in ("dynamic", "again")]
+    figure = plots.draw(records, ["energy", "momentum", "spectrum", "stress-distance"])
+    kinetic = [line for line in of(figure, "kinetic").get_lines() if len(line.get_xdata())]
+    assert len(kinetic) == 2 and np.array_equal(kinetic[0].get_xydata(), kinetic[1].get_xydata())
+    assert len(plots.draw([of_folder(runs / "static")] * 2).axes) == 3
+
+
+def test_what_is_drawn_where_nothing_is_asked_for(runs):
+    """Observables and energies; load steps; of a single one stress over distance."""
+    names = [axes.get_ylabel().split(" [")[0] for axes in plots.draw(of_folder(runs / "dynamic")).axes]
+    assert names == ["deflection", "speed", "energy", "drift"]
+    record = of_folder(runs / "static")
+    assert [a.get_ylabel().split(" [")[0] for a in plots.draw(record).axes] == [
+        "deflection",
+        "max_stress",
+        "max_tension",
+    ]
+    first = {name: column[:1] for name, column in record.table()[1].items()}
+    single = record._replace(table=lambda: (record.table()[0], first))
+    assert [a.get_ylabel().split(" [")[0] for a in plots.draw(single).axes] == ["stress"]
+    for name in ("static", "dynamic", "modes"):
+        record = of_folder(runs / name)
+        for kind in plots.kinds(record):
+            assert plots.draw(record, kind).axes
+
+
+@pytest.mark.parametrize("rows", [5_000, 1_000_003])
+def test_a_long_history_keeps_its_extremes(rows):
+    """Few of its rows, among them the first, the last and the extremes of each part, also of one row; gaps stay out."""
+    values = np.sin(np.arange(rows) * 1e-3)
+    values[[rows // 3, rows // 2]] = 7.0, -7.0
+    values[1234] = np.nan
+    assert 1234 not in telling(values)
+    keep = telling(values, values[::-1])
+    assert len(keep) < 4100 and {0, rows - 1, rows // 3, rows // 2, rows - 1 - rows // 3} <= set(keep.tolist())
+    parts = np.array_split(values, 500)
+    drawn = np.interp(np.arange(rows), keep, np.nan_to_num(values[keep]))
+    for part, there in zip(parts, np.array_split(drawn, 500), strict=True):
+        assert np.nanmax(part) == pytest.approx(there.max(), abs=2e-3 * rows / 1000)
+    assert np.array_equal(telling(values[:100]), np.arange(100))
+
+
+def test_what_a_run_that_failed_has(runs, tmp_path):
+    """The status stands in the title, the message below; a half row of a run that is alive is left out."""
+    folder = shutil.copytree(runs / "dynamic", tmp_path / "half")
+    run = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps({**run, "status": "failed", "message": "it broke", "results": {}}))
+    lines = (folder / "history.csv").read_text().splitlines()
+    (folder / "history.csv").write_text("\n".join([*lines[:20], lines[20][:30]]))
+    shutil.rmtree(folder / "frames")
+    (folder / "web.pvd").unlink()
+    figure = plots.draw(of_folder(folder, seen=False))
+    assert "run failed" in texts(figure) and "it broke" in texts(figure)
+    assert len(of(figure, "deflection").get_lines()[0].get_xdata()) == 19
+    (folder / "history.csv").write_text(lines[0] + "\n")
+    with pytest.raises(InputError, match="no rows"):
+        plots.plot([folder])
+    assert not list(tmp_path.rglob("*.png"))
+
+
+def test_files_whose_text_is_text(runs, tmp_path):
+    """Of an SVG in full, twice the same; a PDF and a PNG begin as such, and nothing else is left."""
+    for ending, head in {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}.items():
+        out = tmp_path / f"plot.{ending}"
+        assert plots.plot([runs / "static"], out=out) == out and out.read_bytes().startswith(head)
+    text = (tmp_path / "plot.svg").read_text(encoding="utf-8")
+    assert ">max_stress [" in text and ">load step<" in text
+    plots.plot([runs / "static"], out=tmp_path / "again.svg")
+    assert (tmp_path / "again.svg").read_text(encoding="utf-8") == text
+    assert len(list(tmp_path.iterdir())) == 4
+    assert plots.as_svg(plots.draw(of_folder(runs / "static"))) == text
+
+
+def test_names_that_letters_cannot_hide(runs):
+    """Dollars, underscores at the beginning and brackets of a title and a name are written as they are."""
+    record = of_folder(runs / "dynamic")
+    columns, table = record.table()
+    columns = [columns[0], "_$x^$ [1]", *columns[2:]]
+    table = dict(zip(["time", "_$x^$", *list(table)[2:]], table.values(), strict=True))
+    record = record._replace(
+        table=lambda: (columns, table), summary={**record.summary, "scene": "a $\\frac$ [b]", "results": {}}, name="_$a"
+    )
+    figure = plots.draw([record, record._replace(name="_b")], "_$x^$")
+    assert plots.as_svg(figure).count("_$a") == 1 and "a $\\frac$ [b]" in texts(figure)
+
+
+WRONG = {
+    "defection": 'quantity = "defection": there is nothing of that name, did you mean "deflection"?',
+    "spectrum:sped": 'did you mean "spectrum:speed"?',
+    "stress_distance": 'did you mean "stress-distance"?',
+    "frequencies": "known: ",
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_quantity_that_there_is_not(runs, tmp_path, name):
+    with pytest.raises(InputError, match=re.escape(WRONG[name])):
+        plots.plot([runs / "dynamic"], quantity=name, out=tmp_path / "plot.png")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_places_and_folders_that_cannot_be(runs, tmp_path):
+    for out, said in {
+        "a.gif": 'unknown format "gif", known: png',
+        "b/a.png": "no folder",
+        "a.pn": 'mean "png"',
+    }.items():
+        with pytest.raises(InputError, match=said):
+            plots.plot([runs / "static"], out=tmp_path / out)
+    with pytest.raises(InputError, match="is not a result folder"):
+        plots.plot([tmp_path])
+    (tmp_path / "run.json").write_text('{"kind": "cost", "versions": {"refweb": "0"}}')
+    with pytest.raises(InputError, match="not a run: its diagram is cost.png there"):
+        plots.plot([tmp_path])
+    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+
+
+def test_from_memory_and_loaded_alike(runs, tmp_path):
+    """With and without a folder, a run gives the same figure, which a notebook shows."""
+    scene = refweb.Scene.load(runs / "dynamic.toml")
+    held = refweb.run(scene, progress=False)
+    loaded = refweb.load(runs / "dynamic")
+    pages = [plots.as_svg(solution.plot()) for solution in (held, loaded)]
+    assert pages[0] == pages[1]
+    figure = held.plot(["energy", "stress-distance"], out=tmp_path / "plot.png")
+    assert (tmp_path / "plot.png").read_bytes()[:4] == figure._repr_png_()[:4] == b"\x89PNG"
+    assert refweb.modes(runs / "static.toml", number=2, progress=False).plot().axes
+    with pytest.raises(InputError, match='did you mean "energy"'):
+        held.plot("enegy", out=tmp_path / "none.png")
+    assert not (tmp_path / "none.png").exists()
+
+
+def test_the_verb(runs, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(runs / "static", "a")
+    assert main(["plot", "a", str(runs / "static"), "--quantity", "max_tension", "--quantity", "energy"]) == 0
+    assert capsys.readouterr().out.strip() == "a/plot.png"
+    assert main(["plot", "a", "--out", "a/plot.svg"]) == 0 and "max_stress" in open("a/plot.svg").read()
+    assert main(["plot", "a", "--quantity", "deflecton"]) == 2
+    assert 'did you mean "deflection"?' in capsys.readouterr().err
+    assert main(["run", str(runs / "static.toml"), "--out", "a", "--force"]) == 0
+    assert not list((tmp_path / "a").glob("plot.*"))
