@@ -58,7 +58,7 @@ class Shown:
 
     @property
     def energies(self):
-        """Names of the columns of the book of energies [J]: what is stored or lost, work, the total; none without it."""
+        """Names of the columns of the book of energies [J]: what is stored or lost, work, and the total."""
         names = [name for name in list(self.units)[1 + len(self.observables) :] if self.units[name] == "J"]
         return names if "total_energy" in names else []
 
