@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .net.single_cable import SingleCable as SingleCable
     from .net.tension_laws import Law as Law
     from .net.web import Web as Web
+    from .pictures.pictures import picture as picture
     from .results.observables.observe import Observe as Observe
     from .runner import resume as resume
     from .runner import run as run

@@ -140,6 +140,7 @@ EXPORTS = (
     "refweb.runner:run",
     "refweb.runner:resume",
     "refweb.solution:load",
+    "refweb.pictures.pictures:picture",
     "refweb.studies.modes:modes",
     "refweb.studies.modes:Modes",
     "refweb.studies.work_precision:cost",

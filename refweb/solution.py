@@ -120,6 +120,32 @@ class Solution(SolutionData):
         result.add_field_data([time], "TimeValue")
         return result
 
+    def picture(
+        self,
+        frame: int | None = None,
+        time: float | None = None,
+        field: str | None = None,
+        range: Sequence[float] | str | None = None,
+        scale: float = 1.0,
+        view: Sequence[float] | str | None = None,
+        out: str | PathLike | None = None,
+    ) -> Figure:
+        """Draw one frame, as `refweb.picture` does, whose options these are.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            It shows itself in a notebook.
+
+        Raises
+        ------
+        InputError
+            No such frame, field, view or format; names the nearest valid one.
+        """
+        from .pictures.pictures import picture
+
+        return picture(self, frame, time, field, range, scale, view, out)
+
     def to_pandas(self, what="history"):
         """Results or history as a table of pandas, which is to be installed.
 

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 TANGENT = np.tan(np.radians(10.0))
-ALONE, LARGE, BELOW = (0.07, 0.08, 0.79, 0.78), (0.02, 0.30, 0.85, 0.60), (0.07, 0.06, 0.79, 0.22)
+ALONE, WHOLE = (0.07, 0.08, 0.79, 0.78), (0.02, 0.04, 0.85, 0.85)
+"""Where a view stands that is the only one [share of the page], with metres along its axes and without."""
+LEFT, WIDTH, BOTTOM, HEIGHT, LEAST = 0.07, 0.79, 0.07, 0.79, 0.12
+"""Of two views that stand one above the other, and the least height of the lower one [share of the page]."""
+BESIDE = (0.02, 0.06, 0.40, 0.82), (0.48, 0.08, 0.37, 0.80)
+"""Where two views stand side by side [share of the page]."""
+VIEWS = ("oblique", "side", "front", "top")
+"""Names of views: in perspective, from two sides along the web, and along its normal."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +66,17 @@ class View:
         flat = np.array([x, y]) * self.half * (-depth if self.perspective else 1.0)
         return self.centre + np.array([*flat, depth]) @ self.axes
 
+    def shows(self, points):
+        """Whether some of what spans these points [m], shape (points, 3), lies within the frame."""
+        if not len(points):
+            return False
+        flat = (self.project(points)[0] - self.offset) / self.half
+        return bool(np.all(flat.max(axis=0) > -1) and np.all(flat.min(axis=0) < 1))
+
+    def share(self, points):
+        """Share of the frame's width that points [m], shape (points, 3), take."""
+        return float(np.ptp(self.project(points)[0][:, 0]) / (2 * self.half[0]))
+
     @property
     def offset(self):
         """Frame coordinates of the middle of the frame, shape (2,)."""
@@ -71,7 +89,7 @@ class View:
         return x - w, x + w, y - h, y + h
 
 
-def choose(origin, points, solid, moved, tree, aspect):
+def choose(origin, points, solid, moved, tree, aspect, named=None):
     """The views that show a web best, and where on the page they stand.
 
     Parameters
@@ -88,6 +106,8 @@ def choose(origin, points, solid, moved, tree, aspect):
         Whether the lines close no loop, as those of a cable.
     aspect : float
         Width/height of the page.
+    named : str or array of 3, optional
+        The only view: one of `VIEWS`, or the direction from the web to the viewer.
 
     Returns
     -------
@@ -100,12 +120,60 @@ def choose(origin, points, solid, moved, tree, aspect):
     extent = np.linalg.norm(np.ptp(points, axis=0))
     low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
     near = np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
+    side = _side(origin)
+    if named is not None:
+        if isinstance(named, str) and named == "oblique":
+            return [View.fit(_oblique(side), near, aspect * WHOLE[2] / WHOLE[3], TANGENT)], [WHOLE]
+        return [View.fit(_named(named, side), near, aspect * ALONE[2] / ALONE[3], margin=1.12)], [ALONE]
     normal = _plane(np.concatenate([origin, points]), extent)
     if normal is not None and (abs(normal[2]) < 0.9 or tree or moved > 1e-3 * extent):
         return [View.fit(_facing(normal), near, aspect * ALONE[2] / ALONE[3], margin=1.12)], [ALONE]
-    side = _side(origin)
-    large = View.fit(_oblique(side), near, aspect * LARGE[2] / LARGE[3], TANGENT)
-    return [large, View.fit(side, near, aspect * BELOW[2] / BELOW[3], margin=1.15)], [LARGE, BELOW]
+    return _pair(_oblique(side), side, near, points, aspect)
+
+
+def _named(named, side):
+    """Axes of the view with a name, or from a direction."""
+    if isinstance(named, str):
+        along, normal, across = side
+        return {"side": side, "front": np.array([-across, normal, along]), "top": _facing(normal)}[named]
+    near = _unit(np.asarray(named, dtype=float))
+    up = np.array([0.0, 0.0, 1.0]) if abs(near[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
+    right = _unit(np.cross(up, near))
+    return np.array([right, np.cross(near, right), near])
+
+
+def _pair(oblique, side, near, points, aspect):
+    """A view in perspective and one from the side, in which the web is as wide; above it, or beside it if it is tall.
+
+    The height of the lower one is such that both are as wide as each other; the larger pair is taken.
+    """
+
+    def stacked(low):
+        rectangles = [(0.02, BOTTOM + 0.04 + low, 0.85, HEIGHT - low), (LEFT, BOTTOM, WIDTH, low)]
+        return rectangles, *_fitted(oblique, side, near, aspect, rectangles)
+
+    def excess(low):
+        (above, below), *views = stacked(low)
+        large, small = views
+        return small.share(points) * below[2] - large.share(points) * above[2]
+
+    low, high = LEAST, 0.6 * HEIGHT
+    for _ in range(20 if excess(low) < 0 else 0):
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle) < 0 else (low, middle)
+    found = [stacked(low), (BESIDE, *_fitted(oblique, side, near, aspect, BESIDE))]
+    widths = [min(v.share(points) * r[2] for v, r in zip(views, where, strict=True)) for where, *views in found]
+    (first, second), large, small = found[int(widths[1] > 1.15 * widths[0])]
+    wider = small.share(points) * second[2] / (large.share(points) * first[2])
+    if wider > 1:
+        small = replace(small, half=(small.half[0] * wider, small.half[1] * wider))
+    return [large, small], [first, second]
+
+
+def _fitted(oblique, side, near, aspect, rectangles):
+    """The view in perspective and the one from the side that just fit into two rectangles."""
+    first, second = (aspect * r[2] / r[3] for r in rectangles)
+    return View.fit(oblique, near, first, TANGENT), View.fit(side, near, second, margin=1.1)
 
 
 def _facing(normal):

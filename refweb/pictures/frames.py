@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..results.vtu import SHAPE_SIZE
 
 CELLS = ("line", "line3", "line4")
 POINTS_ALONG_A_CURVE = 9
@@ -43,6 +44,10 @@ class Frame(NamedTuple):
         Bodies by name.
     ends : ndarray of int, shape (lines, 2)
         Numbers of the nodes where lines begin and end.
+    lifted : ndarray, shape (n, 3)
+        Displacements of supported nodes [m].
+    swing : ndarray, shape (lines, points, 3), or None
+        What a mode adds to the paths [m]; None of what is no mode.
     """
 
     number: int
@@ -55,13 +60,29 @@ class Frame(NamedTuple):
     supports: np.ndarray
     bodies: dict
     ends: np.ndarray
+    lifted: np.ndarray
+    swing: np.ndarray | None
+
+    def posed(self, scale=1.0, phase=1.0):
+        """The frame with displacements times a factor; of a mode, its shape times that and −1…1 of a swing."""
+        if self.swing is not None:
+            return self._replace(paths=self.paths + (scale * phase - 1.0) * self.swing)
+        if scale == 1.0:
+            return self
+        bodies = {
+            name: body._replace(points=body.points + (scale - 1.0) * body.displacement)
+            for name, body in self.bodies.items()
+        }
+        paths = self.origin + scale * (self.paths - self.origin)
+        return self._replace(paths=paths, supports=self.supports + (scale - 1.0) * self.lifted, bodies=bodies)
 
 
 class Body(NamedTuple):
-    """Surface of a body: points [m], shape (points, 3), and triangles, shape (triangles, 3)."""
+    """Surface of a body: points, displacement [m], shapes (points, 3) and (3,), and triangles, shape (triangles, 3)."""
 
     points: np.ndarray
     triangles: np.ndarray
+    displacement: np.ndarray
 
 
 class Listed(NamedTuple):
@@ -104,19 +125,15 @@ def listed(folder):
     return found
 
 
-def read(folder, number):
-    """One frame of a result folder.
+def read(folder, number, found=None):
+    """One frame of a result folder, whose `listed` frames may be given.
 
     Raises
     ------
     InputError
-        Where there is no such frame (names the nearest), or it cannot be read or has positions that are not finite.
+        Where it cannot be read or has positions that are not finite.
     """
-    found = listed(folder)
-    if number not in found:
-        close = min(found, key=lambda n: abs(n - number))
-        raise InputError(f"frame = {number}: no such frame in {folder}, the nearest is {close}, the last {max(found)}")
-    time, paths = found[number]
+    time, paths = (found or listed(folder))[number]
     web = _mesh(paths["web"])
     if not np.isfinite(web.points).all():
         raise InputError(f"frame = {number}: has positions that are not finite, choose an earlier one")
@@ -151,7 +168,27 @@ def frame_of(number, time, meshes, supported):
     tree = edges < len(np.unique(np.concatenate([cells.ravel() for _, cells in blocks])))
     bodies = {name: _surface(mesh) for name, mesh in meshes.items() if name != "web"}
     ends = np.concatenate([cells[:, :2] for _, cells in blocks])
-    return Frame(number, time, paths, start, tree, fields, slack, web.points[supported], bodies, ends)
+    lifted = np.broadcast_to(web.points - origin, web.points.shape)[supported]
+    swing = None
+    if "shape" in web.point_data:
+        mode = _amplitude(web.points, web.point_data["shape"]) * web.point_data["shape"]
+        swing = np.concatenate([_curves(mode[cells], samples) for _, cells in blocks])
+    held = web.points[supported]
+    return Frame(number, time, paths, start, tree, fields, slack, held, bodies, ends, lifted, swing)
+
+
+def _amplitude(points, shape):
+    """What a mode's shape is drawn times [m], of points [m] to which it has been added, both of shape (points, 3).
+
+    It is a share of the diagonal of the box of the points before: what fixes it is found by iteration.
+    """
+    amplitude = 0.0
+    for _ in range(100):
+        size = SHAPE_SIZE * np.linalg.norm(np.ptp(points - amplitude * shape, axis=0))
+        if abs(size - amplitude) <= 1e-14 * size:
+            break
+        amplitude = size
+    return amplitude
 
 
 def _mesh(path):
@@ -206,4 +243,5 @@ def _surface(mesh):
             corners.append(block.data)
         elif block.type == "quad":
             corners += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
-    return Body(mesh.points, np.concatenate(corners))
+    moved = np.reshape(mesh.point_data.get("displacement", np.zeros((1, 3))), (-1, 3))[0]
+    return Body(mesh.points, np.concatenate(corners), moved)

@@ -1,139 +1,156 @@
-"""Pictures and films of a result folder: the web at true scale, its lines coloured by a field.
+"""Pictures of a run: the web, its lines coloured by a field, drawn of a result folder or of a solution in memory.
 
-A web is seen twice: in perspective and, below, from the side, with metres along the axes. What lies in a plane, such as
-a hanging cable, is seen once, along the normal of the plane. Slack lines are grey where the field is a tension, stress
-or strain. Nothing needs a display: `refweb.pictures.render` renders by OpenGL off screen, and by matplotlib where it
-cannot.
+A web is seen twice: in perspective, and from the side with metres along the axes. What lies in a plane, such as a
+hanging cable, is seen once, along the normal of the plane. Colours have one range in all frames of a run, so that two
+pictures of it can be held against each other. Slack lines are grey where the field is a tension, stress or strain.
+Nothing needs a display: `refweb.pictures.render` renders by OpenGL off screen, and by matplotlib where it cannot.
 """
 
 from __future__ import annotations
 
+import functools
 import io
 import os
-import tomllib
 from pathlib import Path
-from typing import NamedTuple
+
+import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest
+from ..messages import nearest, shown
 from ..results.files import write_atomically
-from ..results.folder import read_summary
 from . import render
-from .frames import listed, read
-from .stage import DARK, PALE, Stage, palette
+from .camera import VIEWS
+from .record import of_folder, of_solution
+from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
-SIZE, FILM_SIZE = (1600, 1000), (1200, 750)
-CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}
-"""How the time of a frame reads, by kind of run."""
+SIZE = (1600, 1000)
+"""Of a picture [pixel]."""
 
 
-def picture(folder, frame=None, field=None, out=None):
-    """Draw one frame of a result folder.
+def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, view=None, out=None):
+    """Draw one frame of a run.
 
     Parameters
     ----------
-    folder : path
-        A result folder: ``web.pvd``, ``frames/`` and, for the title, ``run.json`` and ``scene.toml``.
+    source : Solution or path-like
+        A solution, in memory or loaded, or a result folder.
     frame : int, optional
-        The number in the file's name; default the last.
+        Its number, as in the names of files; −1 is the last.
+    time : float, optional
+        The frame nearest a time [s], in statics a load step, is drawn. Default the one nearest the largest value of the
+        first observable; of modes the first.
     field : str, optional
-        Cell data, or point data: lines show the mean over their nodes, of vectors the magnitude. Default ``stress``, or
-        the first there is.
-    out : path, optional
-        Any format matplotlib writes; default ``folder/web.png``.
-
-    Returns
-    -------
-    pathlib.Path
-        The file written.
-
-    Raises
-    ------
-    InputError
-        No result folder, no such frame, field or format; names the nearest valid one.
-    """
-    out = _target(out, Path(folder) / "web.png")
-    last = max(listed(folder))
-    shown = read(folder, last if frame is None else frame)
-    field = _field(shown, field)
-    supports = shown.supports if len(shown.supports) else read(folder, last).supports
-    for page in _pages([shown], field, supports, _heading(folder), SIZE):
-        write_atomically(out, page.savefig)
-    return out
-
-
-def drawn(frame, heading, field=None):
-    """The page of a frame, wherever it comes from, as `picture` writes it.
-
-    Parameters
-    ----------
-    frame : refweb.pictures.frames.Frame
-        What is drawn.
-    heading : Heading
-        What stands above it.
-    field : str, optional
-        As for `picture`.
+        Cell data, or point data: lines show the mean over their nodes, of vectors the magnitude. Default ``stress``, of
+        modes ``shape``, or the first there is.
+    range : (low, high) or "auto", optional
+        What the colours span [SI]; ``"auto"`` the values of this frame. Default the values of all frames.
+    scale : float
+        What displacements, of modes their shape, are drawn times, > 0.
+    view : str or sequence of 3 floats, optional
+        The only view: ``"oblique"``, ``"side"``, ``"front"``, ``"top"``, along the web's normal, or a direction from
+        the web to the viewer. Default an oblique view and one from the side.
+    out : path-like, optional
+        File to write, in any format that matplotlib writes.
 
     Returns
     -------
     matplotlib.figure.Figure
-    """
-    (page,) = _pages([frame], _field(frame, field), frame.supports, heading, SIZE)
-    return page
-
-
-def animate(folder, field=None, out=None, fps=10.0, progress=None):
-    """Draw all frames of a result folder as a GIF, with one camera and one range of colours.
-
-    Parameters
-    ----------
-    folder, field
-        As for `picture`.
-    out : path, optional
-        A ``.gif``; default ``folder/web.gif``.
-    fps : float
-        Frames per second [1/s], > 0 and ≤ 50; the last one stays for a second.
-    progress : callable, optional
-        Called with a line of text and the share that is done, 0 to 1.
-
-    Returns
-    -------
-    pathlib.Path
-        The file written.
+        It shows itself in a notebook.
 
     Raises
     ------
     InputError
-        As for `picture`.
+        No result folder, no such frame, field, view or format; names the nearest valid one.
     """
-    from PIL import Image
-
-    out = _target(out, Path(folder) / "web.gif", ["gif"])
-    if not 0 < fps <= 50:
-        raise InputError(f"fps = {fps} must be > 0 and ≤ 50 [1/s]")
-    frames = [read(folder, number) for number in listed(folder)]
-    field = _field(frames[-1], field)
-    supports = next((frame.supports for frame in reversed(frames) if len(frame.supports)), frames[-1].supports)
-    film, colours = [], Image.new("P", (1, 1))
-    colours.putpalette(palette().ravel().tolist())
-    for page in _pages(frames, field, supports, _heading(folder), FILM_SIZE):
-        image = io.BytesIO()
-        page.savefig(image, format="png")
-        if progress is not None:
-            progress("drawing frames", (len(film) + 1) / len(frames))
-        film.append(Image.open(image).convert("RGB").quantize(palette=colours, dither=Image.Dither.NONE))
-    duration = [round(1000 / fps)] * (len(film) - 1) + [1000]
-    rest = dict(save_all=True, append_images=film[1:], duration=duration, loop=0)
-    write_atomically(out, lambda name: film[0].save(name, **rest))
-    return out
+    out = None if out is None else target(out)
+    page = drawn(record_of(source), frame, time, field, range, scale, view)
+    if out is not None:
+        write_atomically(out, functools.partial(page.savefig, dpi="figure"))
+    return page
 
 
-def _target(out, default, endings=None):
+def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view=None):
+    """The page of a frame of a `refweb.pictures.record.Record`, as `picture` gives it."""
+    number = record.chosen(frame, time)
+    found = record.frame(number)
+    look = look_of(record, found, field, range, scale, view)
+    posed = with_supports(record, found).posed(look.scale)
+    stage = Stage.of(Seen.of(posed, look.field), look, SIZE[0] / SIZE[1])
+    model = stage.model(posed)
+    images = render.images([model], stage.views, stage.pixels(SIZE))
+    page = blank_page(stage, record.title, SIZE)
+    rest = render.unpack(images[0]) if images else [None] * len(stage.views)
+    for axes, view, image, (_, height) in zip(page.axes, stage.views, rest, stage.pixels(SIZE), strict=False):
+        if image is not None:
+            axes.imshow(image, extent=view.extent, aspect="auto", interpolation="none", zorder=0)
+        else:
+            render.polygons(axes, model, view, height)
+        axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
+    page.text(0.03, 0.905, clock_line(record, number, look), size=16, color=DARK, parse_math=False)
+    page.text(0.985, 0.015, f"frame {number}", size=11, color=PALE, ha="right")
+    return page
+
+
+def record_of(source):
+    """The record of a solution or a folder."""
+    return of_folder(source) if isinstance(source, str | os.PathLike) else of_solution(source)
+
+
+def look_of(record, frame, field, limits, scale, view):
+    """What is asked for, checked, as a `Look`; without limits [SI] they are those of all frames."""
+    field = _field(frame, field)
+    if not (np.isfinite(scale) and scale > 0):
+        raise InputError(f"scale = {scale} must be > 0")
+    return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
+
+
+def with_supports(record, frame):
+    """The frame, with the supports of the last one where it knows none."""
+    if len(frame.supports):
+        return frame
+    last = record.frame(max(record.times))
+    return frame._replace(supports=last.supports, lifted=last.lifted)
+
+
+def clock_line(record, number, look):
+    """What stands below the title: when it is, what is exaggerated, and how a run that is not solved ended."""
+    parts = [record.clock(number)]
+    if look.scale != 1:
+        parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {look.scale:g}")
+    if record.status != "solved":
+        parts.append(f"run {record.status}")
+    return "  —  ".join(parts)
+
+
+def blank_page(stage, title, size):
+    """A page with its title, a labelled and empty axes for each view, colour bar and legend."""
     from matplotlib.figure import Figure
 
-    if out is None and not default.parent.is_dir():
-        raise InputError(f"{default.parent} is not a folder")
-    out = Path(default if out is None else out)
+    title = title[:100]
+    figure = Figure(figsize=(16, 10), dpi=size[0] / 16)
+    for view, rect in zip(stage.views, stage.rectangles, strict=True):
+        axes = figure.add_axes(rect)
+        axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
+        stage.annotate(axes, view)
+    stage.legend(figure)
+    large = min(23.0, 23.0 * 58 / max(len(title), 1))
+    figure.text(0.03, 0.945, title, size=large, weight="bold", color="#111111", parse_math=False)
+    setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
+    return figure
+
+
+def png(figure):
+    """The bytes of a figure as PNG."""
+    page = io.BytesIO()
+    figure.savefig(page, format="png", dpi="figure")
+    return page.getvalue()
+
+
+def target(out, endings=None):
+    """The path to write, with an ending that is known, in a folder that is there."""
+    from matplotlib.figure import Figure
+
+    out = Path(out)
     endings = endings or sorted(Figure().canvas.get_supported_filetypes())
     ending = out.suffix[1:].lower()
     if ending not in endings:
@@ -154,53 +171,31 @@ def _field(frame, name):
     return name
 
 
-class Heading(NamedTuple):
-    """What stands above a picture: its title, how a frame's time reads, and a word on a run that is not solved."""
-
-    title: str
-    clock: str
-    note: str
-
-    @classmethod
-    def of(cls, title, kind, status="solved"):
-        """Of a run of a kind, "static", "dynamic" or "modes"."""
-        note = "" if status == "solved" else f"  —  run {status}"
-        return cls(title[:100], CLOCKS.get(str(kind), CLOCKS["dynamic"]), note)
-
-
-def _heading(folder):
-    """The heading that ``run.json`` and ``scene.toml`` give."""
-    run = read_summary(Path(folder)) or {}
+def _limits(record, frame, field, limits):
+    """The range of colours [SI] that is asked for."""
+    if limits is None or field == "slack":
+        if limits is not None:
+            raise InputError('range: the field "slack" has two colours and no range, leave it out')
+        return (0.0, 1.0) if field == "slack" else limits_of(record, field, record.times)
+    if isinstance(limits, str) and limits == "auto":
+        return limits_of(record, field, [frame.number])
     try:
-        kind = tomllib.loads((Path(folder) / "scene.toml").read_text(encoding="utf-8"))["solve"]["kind"]
-    except (OSError, ValueError, KeyError, TypeError):
-        kind = "dynamic"
-    title = str(run.get("scene") or Path(folder).resolve().name)
-    return Heading.of(title, "modes" if run.get("kind") == "modes" else kind, run.get("status", "solved"))
+        low, high = (float(limit) for limit in limits)
+    except (TypeError, ValueError):
+        raise InputError(f'range = {shown(limits)} must be two numbers [SI], low and high, or "auto"') from None
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise InputError(f"range = {low:g} {high:g}: low must be less than high")
+    return low, high
 
 
-def _pages(frames, field, supports, heading, size):
-    """The pages of some frames, one figure after the other."""
-    from matplotlib.figure import Figure
-
-    stage = Stage.of(frames, field, size, supports)
-    models = [stage.model(frame) for frame in frames]
-    pixels = [tuple(round(r * s) for r, s in zip(rect[2:], size, strict=True)) for rect in stage.rectangles]
-    drawn = render.images(models, stage.views, pixels)
-    for i, frame in enumerate(frames):
-        images = render.unpack(drawn[i]) if drawn else [None] * len(stage.views)
-        figure = Figure(figsize=(16, 10), dpi=size[0] / 16)
-        for image, view, rect, (_, height) in zip(images, stage.views, stage.rectangles, pixels, strict=True):
-            axes = figure.add_axes(rect)
-            if image is not None:
-                axes.imshow(image, extent=view.extent, aspect="auto", interpolation="none", zorder=0)
-            else:
-                render.polygons(axes, models[i], view, height)
-            axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
-            stage.annotate(axes, view)
-        stage.legend(figure, frame)
-        large = min(23.0, 23.0 * 58 / len(heading.title))
-        figure.text(0.03, 0.945, heading.title, size=large, weight="bold", color="#111111", parse_math=False)
-        figure.text(0.03, 0.905, heading.clock.format(frame.time) + heading.note, size=16, color=DARK, parse_math=False)
-        figure.text(0.985, 0.015, f"frame {frame.number}", size=11, color=PALE, ha="right")
-        yield figure
+def _view(view):
+    """The view that is asked for: a name, or a direction of shape (3,)."""
+    if view is None or (isinstance(view, str) and view in VIEWS):
+        return view
+    try:
+        direction = np.array(view, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"view = {shown(view)}: is no view, {nearest(str(view), VIEWS)}") from None
+    if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
+        raise InputError(f"view = {shown(view)} must be one of {', '.join(VIEWS)}, or three numbers, not all 0")
+    return direction

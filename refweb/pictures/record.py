@@ -15,7 +15,19 @@ from ..errors import InputError
 from ..messages import short
 from ..results.folder import TABLES, read_summary
 from ..results.solution import as_history
+from ..results.units import readable
+from .arrays import cell_arrays
 from .frames import Frame, frame_of, listed, read
+
+CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}
+"""How the time of a frame reads, by kind of run."""
+
+
+class Values(NamedTuple):
+    """A field in a frame: values of the lines [SI], and which of them are slack, both of shape (lines,)."""
+
+    field: np.ndarray
+    slack: np.ndarray
 
 
 class Record(NamedTuple):
@@ -37,6 +49,8 @@ class Record(NamedTuple):
         Gives the `Frame` of a number.
     table : callable
         Gives (names of columns with units, history by name), read once.
+    values : callable
+        Gives the `Values` of a field in the frame of a number.
     """
 
     name: str
@@ -46,6 +60,7 @@ class Record(NamedTuple):
     times: dict
     frame: Callable[[int], Frame]
     table: Callable[[], tuple]
+    values: Callable[[int, str], Values]
 
     @property
     def title(self):
@@ -56,6 +71,65 @@ class Record(NamedTuple):
     def status(self):
         """How it ended."""
         return str(self.summary.get("status", "solved"))
+
+    def clock(self, number):
+        """When a frame is, in words: its time or load step, of a mode its number and frequency with ±."""
+        text = CLOCKS.get(self.kind, CLOCKS["dynamic"]).format(self.times[number])
+        if self.kind == "modes":
+            found = (self._steps or [{}])[-1].get("results", {}).get(f"frequency_{number}")
+            text += f", {readable(found['value'], found['error'], found['unit'])}" if found else ""
+        return text
+
+    def chosen(self, frame=None, time=None):
+        """The number of the frame to show.
+
+        Parameters
+        ----------
+        frame : int, optional
+            Its number; −1 is the last.
+        time : float, optional
+            The frame nearest a time [s], in statics a load step, is taken. Without either it is that nearest the
+            largest value of the first observable; of modes the first, and where no result has a time the last.
+
+        Raises
+        ------
+        InputError
+            Where there are no frames, or not this one: names the nearest.
+        """
+        if frame is not None and time is not None:
+            raise InputError(f"frame = {frame} and time = {time:g} exclude each other: leave one out")
+        numbers = list(self.times)
+        if not numbers:
+            raise InputError(f'"{short(self.name)}" has no frames: run it with frames = 1 or more in [output]')
+        if frame is not None:
+            if -len(numbers) <= frame < 0:
+                return numbers[frame]
+            if frame not in self.times:
+                close = min(numbers, key=lambda n: abs(n - frame))
+                raise InputError(
+                    f"frame = {frame}: there is no such frame, the nearest is {close}, the last {numbers[-1]}"
+                )
+            return frame
+        if time is None:
+            time = self._time_of_the_largest()
+        elif not np.isfinite(time):
+            raise InputError(f"time = {time} must be a finite number")
+        return numbers[-1] if time is None else min(numbers, key=lambda n: abs(self.times[n] - time))
+
+    @property
+    def _steps(self):
+        """Load steps as ``run.json`` has them."""
+        return self.summary.get("steps") or []
+
+    def _time_of_the_largest(self):
+        """Time, or load step, of the largest value of the first observable; None where there is none."""
+        if self.kind == "modes":
+            return next(iter(self.times.values()))
+        if self.kind == "static":
+            first = [(step["step"], next(iter(step.get("results", {}).values()), None)) for step in self._steps]
+            found = [(abs(one["value"]), step) for step, one in first if one and one["value"] is not None]
+            return max(found, key=lambda pair: pair[0])[1] if found else None
+        return next((one["time"] for one in self.summary.get("results", {}).values()), None)
 
 
 def of_folder(folder, seen=True):
@@ -81,15 +155,23 @@ def of_folder(folder, seen=True):
     except (OSError, ValueError, KeyError, TypeError):
         scene, kind = {}, "dynamic"
     kind = "modes" if summary.get("kind") == "modes" else kind
+    found = _listed(folder, seen)
+    times = {number: one.time for number, one in found.items()}
     name = folder.name or folder.resolve().name
     table = functools.cache(functools.partial(_table, folder))
-    return Record(name, kind, summary, scene, _times(folder, seen), functools.partial(read, folder), table)
+
+    def values(number, field):
+        arrays = cell_arrays(found[number].paths["web"], (field, "slack"))
+        return _values(frame(number), field) if arrays is None else Values(arrays[field], arrays["slack"] > 0.5)
+
+    frame = functools.partial(read, folder, found=found)
+    return Record(name, kind, summary, scene, times, frame, table, values)
 
 
-def _times(folder, seen):
-    """Times of the frames of a folder by number; none of a run that has a summary and no frames, where that may be."""
+def _listed(folder, seen):
+    """The frames of a folder by number; none of a run that has a summary and no frames, where that may be."""
     try:
-        return {number: found.time for number, found in listed(folder).items()}
+        return listed(folder)
     except InputError:
         if seen or read_summary(folder) is None:
             raise
@@ -97,32 +179,37 @@ def _times(folder, seen):
 
 
 def of_solution(solution, seen=True):
-    """The record of a `refweb.results.solution.SolutionData`, of its folder where it holds no history in memory."""
-    if solution.table is None:
+    """The record of a `refweb.results.solution.SolutionData`, of its folder where it holds no frames in memory."""
+    summary = solution.summary()
+    states = {number: (state, None) for number, state in solution.frames}
+    if summary.get("kind") == "modes" and solution.table is not None and solution.spectra:
+        states = {number: (solution.state, shape) for number, shape in enumerate(solution.shapes, start=1)}
+    if not states and solution.path is not None:
         return of_folder(solution.path, seen)
     from ..results.vtu import meshes
 
-    states = dict(solution.frames)
-
     def frame(number):
-        if number not in states:
-            close = min(states, key=lambda n: abs(n - number))
-            raise InputError(
-                f"frame = {number}: there is no such frame, the nearest is {close}, the last {max(states)}"
-            )
-        state = states[number]
+        state, shape = states[number]
         supported = state.system.supported[: state.system.net.nodes].any(axis=1)
-        return frame_of(number, state.time, meshes(state), supported)
+        return frame_of(number, times[number], meshes(state, shape), supported)
 
     scene = solution.scene
     try:
         tables = scene.to_dict()
     except InputError:  # a web made in Python
         tables = {}
-    times = {number: state.time for number, state in solution.frames}
-    summary = solution.summary()
+    times = {number: state.time if shape is None else float(number) for number, (state, shape) in states.items()}
     kind, table = summary.get("kind", scene.solve.kind), (solution.columns, solution.history)
-    return Record(scene.title, kind, summary, tables, times, frame, lambda: table)
+
+    def values(number, field):
+        return _values(frame(number), field)
+
+    return Record(scene.title, kind, summary, tables, times, frame, lambda: table, values)
+
+
+def _values(frame, field):
+    """A field of a whole frame."""
+    return Values(frame.fields[field], frame.slack)
 
 
 def _table(folder):

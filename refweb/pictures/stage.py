@@ -2,68 +2,161 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import InputError
 from ..results.units import prefixed
 from .camera import choose
 from .render import Balls, Surface, Tubes
 
 DARK, PALE, BEFORE, SUPPORT, SLACK = "#333333", "#888888", "#999999", (0.25, 0.25, 0.27), (0.80, 0.80, 0.81)
 BODIES = ((0.45, 0.55, 0.68), (0.70, 0.55, 0.45), (0.55, 0.62, 0.50))
+TWO = {"taut": (0.11, 0.37, 0.55), "slack": (0.90, 0.62, 0.10)}
+"""Colours of the field ``slack``."""
 GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
+
+
+class Look(NamedTuple):
+    """What of frames is drawn, and how.
+
+    Attributes
+    ----------
+    field : str
+        What the colours show.
+    limits : (low, high)
+        Its range [SI].
+    scale : float
+        What displacements are drawn times.
+    view : str, ndarray of shape (3,) or None
+        The only view; None for those that show the web best.
+    """
+
+    field: str
+    limits: tuple
+    scale: float = 1.0
+    view: object = None
+
+
+class Seen(NamedTuple):
+    """What frames hold together.
+
+    Attributes
+    ----------
+    points, supports : ndarray, shape (n, 3)
+        What spans the lines, and the supports [m].
+    bodies : dict of str to ndarray, shape (n, 3)
+        What spans each body [m].
+    origin : ndarray, shape (lines, points, 3)
+        Undeformed lines [m].
+    moved : float
+        Largest component of a displacement [m].
+    tree : bool
+        Whether the lines close no loop.
+    slack : bool
+        Whether some line is drawn as slack.
+    least, most : float
+        Values of lines that are not [SI].
+    """
+
+    points: np.ndarray
+    supports: np.ndarray
+    bodies: dict
+    origin: np.ndarray
+    moved: float
+    tree: bool
+    slack: bool
+    least: float
+    most: float
+
+    @classmethod
+    def of(cls, frame, field):
+        """Of one frame."""
+        grey = _grey(frame, field)
+        values = frame.fields[field][~grey]
+        values = values[np.isfinite(values)]
+        least, most = (float(values.min()), float(values.max())) if len(values) else (np.inf, -np.inf)
+        bodies = {name: body.points for name, body in frame.bodies.items()}
+        moved = float(np.abs(frame.paths - frame.origin).max())
+        slack = bool(frame.slack.any() if field == "slack" else grey.any())
+        points = frame.paths.reshape(-1, 3)
+        return cls(points, frame.supports, bodies, frame.origin, moved, frame.tree, slack, least, most)
+
+    def spanned(self):
+        """The same with only those points that span the others, to a hundredth of their extent."""
+        bodies = {name: _outermost(points) for name, points in self.bodies.items()}
+        return self._replace(points=_outermost(self.points), supports=_outermost(self.supports), bodies=bodies)
+
+    def joined(self, other):
+        """What both hold."""
+        bodies = {
+            name: np.concatenate([*(seen.bodies[name] for seen in (self, other) if name in seen.bodies)])
+            for name in {**self.bodies, **other.bodies}
+        }
+        return self._replace(
+            points=np.concatenate([self.points, other.points]),
+            supports=np.concatenate([self.supports, other.supports]),
+            bodies=bodies,
+            moved=max(self.moved, other.moved),
+            slack=self.slack or other.slack,
+            least=min(self.least, other.least),
+            most=max(self.most, other.most),
+        )
 
 
 @dataclass(frozen=True)
 class Stage:
     """What all pages share.
 
-    `views` and their `rectangles`; the `field` and its `limits` [SI]; the `radius` of lines, the undeformed lines
-    `origin`, shape (lines, points, 3), empty where nothing has moved, the `middle` of the web, shape (3,), and its
-    `supports`, shape (n, 3) [m].
+    The `look`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
+    (lines, points, 3), empty where nothing has moved, and the `middle` of the web, shape (3,) [m]; what has been
+    `seen`.
     """
 
+    look: Look
     views: list
     rectangles: list
-    field: str
-    limits: tuple
     radius: float
     origin: np.ndarray
     middle: np.ndarray
-    supports: np.ndarray
+    seen: Seen
 
     @classmethod
-    def of(cls, frames, field, size, supports):
-        """The stage that shows all of the frames on a page of this size [pixel]."""
-        points = np.concatenate([frame.paths.reshape(-1, 3) for frame in frames])
-        solid = np.concatenate([np.zeros((0, 3)), *(body.points for frame in frames for body in frame.bodies.values())])
-        moved = max(np.abs(frame.paths - frame.origin).max() for frame in frames)
-        origin = frames[0].origin
-        chosen = choose(origin.reshape(-1, 3), points, solid, moved, frames[0].tree, size[0] / size[1])
-        extent = np.linalg.norm(np.ptp(points, axis=0))
+    def of(cls, seen, look, aspect):
+        """The stage that shows what has been seen, on a page of this width/height."""
+        solid = np.concatenate([np.zeros((0, 3)), *seen.bodies.values()])
+        origin = seen.origin
+        chosen = choose(origin.reshape(-1, 3), seen.points, solid, seen.moved, seen.tree, aspect, look.view)
+        extent = np.linalg.norm(np.ptp(seen.points, axis=0))
         length = np.median(np.linalg.norm(np.diff(origin, axis=1), axis=2).sum(axis=1))
         thinnest = 0.0018 if len(chosen[0]) == 1 else 0.0008
         radius = np.clip(0.06 * length, thinnest * extent, 0.0025 * extent)
-        origin = origin if moved > 0 else origin[:0]
-        return cls(*chosen, field, _limits(frames, field), radius, origin, points.mean(axis=0), supports)
+        origin = origin if seen.moved > 0 else origin[:0]
+        return cls(look, *chosen, radius, origin, seen.points.mean(axis=0), seen)
 
-    def grey(self, frame):
-        """Which lines are drawn as slack, shape (lines,)."""
-        return frame.slack & (self.field in GREY_WHERE_SLACK)
+    def pixels(self, size):
+        """(width, height) of each view on a page of this size [pixel]."""
+        return [tuple(round(r * s) for r, s in zip(rect[2:], size, strict=True)) for rect in self.rectangles]
 
     def model(self, frame):
         """The tubes, surfaces and markers of a frame."""
-        grey, low, high = self.grey(frame), *self.limits
-        colours = colour_map()(np.clip((frame.fields[self.field] - low) / (high - low), 0, 1))[:, :3]
+        if self.look.field == "slack":
+            taut, slack = np.array(list(TWO.values()))
+            colours, grey = np.where(frame.slack[:, None], slack, taut), np.zeros(len(frame.slack), dtype=bool)
+        else:
+            grey, (low, high) = _grey(frame, self.look.field), self.look.limits
+            colours = colour_map()(np.clip((frame.fields[self.look.field] - low) / (high - low), 0, 1))[:, :3]
         model: list[Tubes | Surface | Balls] = [Tubes(frame.paths[~grey], colours[~grey], self.radius)]
         model.append(Tubes(frame.paths[grey], np.tile(SLACK, (grey.sum(), 1)), 0.8 * self.radius))
-        if len(self.supports):
-            model.append(Balls(self.supports, SUPPORT, 2.2 * self.radius))
-        for i, (points, triangles) in enumerate(frame.bodies.values()):
-            model.append(Surface(points, triangles, BODIES[i % len(BODIES)]))
+        if len(frame.supports):
+            model.append(Balls(frame.supports, SUPPORT, 2.2 * self.radius))
+        for i, body in enumerate(frame.bodies.values()):
+            model.append(Surface(body.points, body.triangles, BODIES[i % len(BODIES)]))
         return model
 
     def annotate(self, axes, view):
@@ -81,25 +174,67 @@ class Stage:
         axes.set_xlabel(f"{_axis_name(view.axes[0])} [m]", size=13, color=DARK)
         axes.set_ylabel(f"{_axis_name(view.axes[1])} [m]", size=13, color=DARK)
 
-    def legend(self, figure, frame):
-        """Colour bar, and names for what is not on it."""
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.colors import Normalize
+    def legend(self, figure):
+        """Colour bar, and names for what is drawn and not on it."""
         from matplotlib.lines import Line2D
 
-        factor, unit = scaled_unit(self.field, max(map(abs, self.limits)))
-        norm = Normalize(*(factor * limit for limit in self.limits))
-        bar = figure.colorbar(ScalarMappable(norm, colour_map()), cax=figure.add_axes((0.905, 0.36, 0.014, 0.48)))
-        bar.outline.set_visible(False)
-        bar.ax.tick_params(labelsize=13, colors=DARK)
-        bar.ax.set_title(self.field.replace("_", " ") + (f" [{unit}]" if unit else ""), size=15, pad=14, color=DARK)
-        marks = [Line2D([], [], color=SLACK, lw=4, label="slack")] if self.grey(frame).any() else []
-        marks += [Line2D([], [], color=SUPPORT, marker="o", ls="", ms=7, label="support")] if len(self.supports) else []
-        marks += [Line2D([], [], color=BEFORE, lw=0.8, label="undeformed")] if len(self.origin) else []
-        for i, name in enumerate(frame.bodies):
-            marks.append(Line2D([], [], color=BODIES[i % len(BODIES)], marker="o", ls="", ms=13, label=name))
+        parallel = [view for view in self.views if not view.perspective]
+        marks = [Line2D([], [], color=SLACK, lw=4, label="slack")] if self.seen.slack else []
+        if self.look.field == "slack":
+            marks = [Line2D([], [], color=colour, lw=4, label=name) for name, colour in TWO.items()]
+        else:
+            self._bar(figure)
+        if self._seen_in(self.views, self.seen.supports):
+            marks.append(Line2D([], [], color=SUPPORT, marker="o", ls="", ms=7, label="support"))
+        if self._seen_in(parallel, self.origin.reshape(-1, 3)):
+            marks.append(Line2D([], [], color=BEFORE, lw=0.8, label="undeformed"))
+        for i, (name, points) in enumerate(self.seen.bodies.items()):
+            if self._seen_in(self.views, points):
+                marks.append(Line2D([], [], color=BODIES[i % len(BODIES)], marker="o", ls="", ms=13, label=_cut(name)))
         look = {"frameon": False, "fontsize": 13, "labelcolor": DARK, "handlelength": 1.6}
         figure.legend(handles=marks, loc="upper left", bbox_to_anchor=(0.885, 0.32), **look)
+
+    @staticmethod
+    def _seen_in(views, points):
+        return any(view.shows(points) for view in views)
+
+    def _bar(self, figure):
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
+        low, high = self.look.limits
+        factor, unit = scaled_unit(self.look.field, max(abs(low), abs(high)))
+        slip = 1e-9 * (high - low)
+        beyond = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}
+        beyond = beyond[int(self.seen.least < low - slip), int(self.seen.most > high + slip)]
+        scale = ScalarMappable(Normalize(factor * low, factor * high), colour_map())
+        bar = figure.colorbar(scale, cax=figure.add_axes((0.905, 0.36, 0.014, 0.48)), extend=beyond)
+        bar.outline.set_visible(False)
+        bar.ax.tick_params(labelsize=13, colors=DARK)
+        name = _cut(self.look.field.replace("_", " "))
+        bar.ax.set_title(name + (f" [{unit}]" if unit else ""), size=15, pad=14, color=DARK)
+
+
+def _cut(name, most=14):
+    return name if len(name) <= most else name[: most - 1] + "…"
+
+
+def _grey(frame, field):
+    """Which lines are drawn as slack, shape (lines,)."""
+    return frame.slack & (field in GREY_WHERE_SLACK)
+
+
+def _outermost(points):
+    """Those of points [m], shape (n, 3), that lie farthest in one of many directions."""
+    if len(points) <= 300:
+        return points
+    count = 400
+    height = 1 - 2 * (np.arange(count) + 0.5) / count
+    turn = np.pi * (1 + 5**0.5) * np.arange(count)
+    ring = np.sqrt(1 - height**2)
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
+    return points[np.unique((points @ directions.T).argmax(axis=0))]
 
 
 def _triad(axes, view, corner, length):
@@ -120,20 +255,18 @@ def colour_map():
     return ListedColormap(colormaps["viridis"](np.linspace(0.03, 0.95, 256)))
 
 
-def palette():
-    """The colours of a film, shape (colours, 3), 0…255: those of the lines and bodies in their shades, and greys."""
-    colours = colour_map()(np.linspace(0, 1, 48))[:, :3]
-    shades = [colours, 0.8 * colours[::2], 0.6 * colours[::2], 0.5 + 0.5 * colours[::2], 0.75 + 0.25 * colours[::3]]
-    shades += [np.clip(np.linspace(0.4, 1.5, 16)[:, None] * body, 0, 1) for body in BODIES]
-    shades.append(np.linspace(0, 1, 17)[:, None] * np.ones(3))
-    return np.round(255 * np.concatenate(shades)).astype(int)
+def limits_of(record, field, numbers):
+    """Range of a field [SI] in frames of a record: that of lines that are not grey, from 0 where this wastes no half.
 
-
-def _limits(frames, field):
-    """Range of the colours [SI]: that of the taut lines, from 0 where this does not waste half of it."""
-    values = np.concatenate([frame.fields[field][~(frame.slack & (field in GREY_WHERE_SLACK))] for frame in frames])
-    values = values[np.isfinite(values)]
-    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    Frames that cannot be read, as those that a run has left half-written, have no part in it.
+    """
+    low, high = np.inf, -np.inf
+    for number in numbers:
+        with contextlib.suppress(InputError, KeyError):
+            values, slack = record.values(number, field)
+            values = values[np.isfinite(values) & ~(slack & (field in GREY_WHERE_SLACK))]
+            low, high = min(low, values.min(initial=np.inf)), max(high, values.max(initial=-np.inf))
+    low, high = (float(low), float(high)) if low <= high else (0.0, 1.0)
     low = 0.0 if 0 <= low <= 0.5 * high else low
     return (low, high) if high - low > 1e-9 * abs(high) else (min(0.0, high), max(0.0, high) or 1.0)
 

@@ -10,12 +10,13 @@ from PIL import Image
 
 import refweb
 from refweb.errors import InputError
+from refweb.pictures import film as films
 from refweb.pictures import pictures
 from refweb.pictures import render as drawing
 from refweb.pictures.camera import View
-from refweb.pictures.frames import frame_of, read
-from refweb.pictures.stage import Stage, scaled_unit
-from refweb.results.vtu import meshes
+from refweb.pictures.frames import read
+from refweb.pictures.record import of_folder, of_solution
+from refweb.pictures.stage import Look, Seen, Stage, limits_of, scaled_unit
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 FACES = np.array([[i, j, k] for i in (0, 1) for j in (2, 3) for k in (4, 5)])
@@ -75,7 +76,7 @@ def film(tmp_path_factory):
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     monkeypatch.setattr(pictures, "SIZE", (800, 500))
-    monkeypatch.setattr(pictures, "FILM_SIZE", (400, 250))
+    monkeypatch.setattr(films, "SIZE", (400, 250))
 
 
 @pytest.fixture
@@ -89,23 +90,33 @@ def colours(path):
     return len(np.unique(image.reshape(-1, 3), axis=0)), np.mean(np.any(image != 255, axis=2))
 
 
+def drawn(folder, out=None, **options):
+    """The path of a picture of a folder."""
+    out = folder / "web.png" if out is None else out
+    pictures.picture(folder, out=out, **options)
+    return out
+
+
+def staged(frame, field="stress"):
+    return Stage.of(Seen.of(frame, field), Look(field, (0.0, 1.0)), 1.6)
+
+
 def test_picture(film, monkeypatch):
     monkeypatch.undo()
-    out = pictures.picture(film)
-    assert out == film / "web.png"
+    out = drawn(film)
     assert Image.open(out).size == (1600, 1000)
     count, share = colours(out)
     assert count > 500 and share > 0.02
 
 
 def test_both_ways_of_drawing_show_the_same(film, monkeypatch, tmp_path):
-    images, drawn = drawing.images, []
-    monkeypatch.setattr(drawing, "images", lambda *job: drawn.append(images(*job)) or drawn[-1])
-    solid = pictures.picture(film, out=tmp_path / "solid.png")
-    if drawn[0] is None:
+    images, found = drawing.images, []
+    monkeypatch.setattr(drawing, "images", lambda *job: found.append(images(*job)) or found[-1])
+    solid = drawn(film, out=tmp_path / "solid.png")
+    if found[0] is None:
         pytest.skip("no OpenGL here")
     monkeypatch.setattr(drawing, "windows", lambda: [])
-    flat = pictures.picture(film, out=tmp_path / "flat.png")
+    flat = drawn(film, out=tmp_path / "flat.png")
     a, b = (np.asarray(Image.open(path).convert("L")) < 250 for path in (solid, flat))
     assert np.sum(a & b) > 0.85 * np.sum(a | b)
     assert np.any(a != b)
@@ -116,22 +127,22 @@ def test_a_window_that_kills_the_child_is_survived(film, monkeypatch, tmp_path, 
     code = "import os; os.write(2, b'bad X server'); os.kill(os.getpid(), 11)"
     run = subprocess.run
     monkeypatch.setattr(drawing.subprocess, "run", lambda c, **options: run([c[0], "-c", code], **options))
-    assert colours(pictures.picture(film, out=tmp_path / "web.png"))[0] > 500
+    assert colours(drawn(film, out=tmp_path / "web.png"))[0] > 500
     assert capfd.readouterr().err == ""
 
 
 def test_cable_is_seen_along_the_normal_of_its_plane(no_opengl, tmp_path):
-    out = pictures.picture(write(tmp_path / "cable", [(0, 0.0, catenary())]), out=tmp_path / "cable.png")
+    out = drawn(write(tmp_path / "cable", [(0, 0.0, catenary())]), out=tmp_path / "cable.png")
     assert colours(out)[0] > 100
     frame = read(tmp_path / "cable", 0)
-    stage = Stage.of([frame], "stress", pictures.SIZE, frame.supports)
+    stage = staged(frame)
     assert len(stage.views) == 1
     assert np.abs(stage.views[0].axes - [[1, 0, 0], [0, 0, 1], [0, -1, 0]]).max() < 1e-12
 
 
 def test_flat_web_is_seen_obliquely(tmp_path):
     frame = read(write(tmp_path / "flat", [(0, 0.0, tent(height=0.0))]), 0)
-    stage = Stage.of([frame], "stress", pictures.SIZE, frame.supports)
+    stage = staged(frame)
     assert [view.perspective for view in stage.views] == [True, False]
 
 
@@ -162,7 +173,7 @@ def test_curved_elements_of_a_run_are_drawn(no_opengl, tmp_path, order):
     gravity = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
     scene = refweb.Scene(web=web, cable=cable, effects=[gravity], supports=refweb.Supports(nodes=[0, 2]))
     refweb.run(scene, out=tmp_path / "cable")
-    assert colours(pictures.picture(tmp_path / "cable"))[0] > 100
+    assert colours(drawn(tmp_path / "cable"))[0] > 100
     frame = read(tmp_path / "cable", 0)
     assert frame.paths.shape == frame.origin.shape == (4, 9, 3) and frame.tree
     assert not frame.origin[:, :, 1:].any() and np.abs(np.diff(frame.origin, 2, axis=1)).max() < 1e-13
@@ -184,25 +195,22 @@ def test_a_frame_in_memory_is_that_of_its_folder(tmp_path):
     )
     solution = refweb.run(scene)
     solution.save(tmp_path / "out")
-    number, state = solution.frames[-1]
-    supported = state.system.supported[: state.system.net.nodes].any(axis=1)
-    here, there = frame_of(number, state.time, meshes(state), supported), read(tmp_path / "out", number)
+    number = solution.frames[-1][0]
+    here, there = of_solution(solution).frame(number), read(tmp_path / "out", number)
     assert here.fields.keys() == there.fields.keys() and here.bodies.keys() == there.bodies.keys() == {"ball"}
     assert (here.number, here.time, here.tree) == (there.number, there.time, there.tree)
-    pairs = [(getattr(here, name), getattr(there, name)) for name in ("paths", "origin", "slack", "supports")]
+    pairs = [(getattr(here, name), getattr(there, name)) for name in ("paths", "origin", "slack", "supports", "lifted")]
     pairs += [(here.fields[name], there.fields[name]) for name in here.fields]
     for a, b in [*pairs, *zip(here.bodies["ball"], there.bodies["ball"], strict=True)]:
         np.testing.assert_array_equal(a, b)
-    page = pictures.drawn(here, pictures.Heading.of("In memory", "static"))
-    page.savefig(tmp_path / "memory.png")
-    assert (tmp_path / "memory.png").read_bytes() == pictures.picture(tmp_path / "out").read_bytes()
+    assert solution.picture()._repr_png_() == drawn(tmp_path / "out").read_bytes()
 
 
 def test_slack_lines_are_grey_and_no_part_of_the_range(film):
     frame = read(film, 20)
-    stage = Stage.of([frame], "stress", pictures.SIZE, frame.supports)
+    stage = staged(frame)
     assert frame.slack.any() and not frame.slack.all()
-    assert stage.limits[0] == frame.fields["stress"][~frame.slack].min()
+    assert limits_of(of_folder(film), "stress", [20])[0] == frame.fields["stress"][~frame.slack].min()
     assert len(stage.model(frame)[1].paths) == frame.slack.sum()
 
 
@@ -233,23 +241,22 @@ def test_refusals(film, tmp_path):
             pictures.picture(film, **options)
         assert all(word in str(error.value) for word in words) and "\n" not in str(error.value)
     with pytest.raises(InputError, match="not a result folder"):
-        pictures.picture(tmp_path)
+        drawn(tmp_path)
     with pytest.raises(InputError, match='unknown format "png"'):
-        pictures.animate(film, out=film / "web.png")
+        films.animate(film, out=film / "web.png")
 
 
 def test_field_of_points(film, no_opengl, tmp_path):
-    assert colours(pictures.picture(film, frame=10, field="displacement", out=tmp_path / "web.png"))[0] > 500
+    assert colours(drawn(film, frame=10, field="displacement", out=tmp_path / "web.png"))[0] > 500
 
 
 def test_film_has_all_frames(film):
-    out = pictures.animate(film)
-    assert out == film / "web.gif"
+    out = films.animate(film, out=film / "web.gif")
     with Image.open(out) as gif:
         assert gif.n_frames == 3
-        assert gif.size == pictures.FILM_SIZE
+        assert gif.size == films.SIZE
 
 
 def test_import_stays_light():
-    code = "import sys, refweb.pictures.pictures; print(*({'pyvista', 'vtkmodules', 'matplotlib'} & set(sys.modules)))"
+    code = "import sys, refweb.pictures.film; print(*({'pyvista', 'vtkmodules', 'matplotlib'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == ""

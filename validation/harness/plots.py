@@ -38,15 +38,8 @@ def ticks(plot, numbers):
 
 
 def picture(solution, field=None):
-    """The picture of a solution in memory that ``refweb picture`` draws of its folder, a matplotlib figure."""
-    from refweb.pictures.frames import frame_of
-    from refweb.pictures.pictures import Heading, drawn
-    from refweb.results.vtu import meshes
-
-    number, state = solution.frames[-1]
-    supported = state.system.supported[: state.system.net.nodes].any(axis=1)
-    frame = frame_of(number, state.time, meshes(state), supported)
-    return drawn(frame, Heading.of(solution.scene.title, solution.scene.solve.kind, solution.status), field)
+    """The picture of the last frame of a solution, a matplotlib figure."""
+    return solution.picture(frame=-1, field=field)
 
 
 class Image(NamedTuple):

@@ -10,7 +10,6 @@ import pathlib
 import sys
 
 import refweb
-from refweb.pictures.pictures import picture
 
 POINTS = [(-1, -1), (1, -1), (1, 1), (-1, 1), (0, 0), (-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]
 SPOKES = [(1, 6), (6, 5), (2, 7), (7, 5), (3, 8), (8, 5), (4, 9), (9, 5)]  # Gmsh counts nodes from 1
@@ -55,7 +54,7 @@ def main(folder="."):
     for name, result in solution.results.items():
         print(f"largest tension of {name}: {result.value:.6f} ± {result.error:.2g} {result.unit}")
     solution.save(folder / "gmsh-net", force=True)
-    print(picture(folder / "gmsh-net", field="tension"))
+    solution.picture(field="tension", out=folder / "gmsh-net" / "web.png")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ import pathlib
 import sys
 
 import refweb
-from refweb.pictures.pictures import picture
 
 SIDE = 12.0  # of the net [m]
 LAYERS = 8  # a square net of N layers has 2 N - 1 meshes along a side
@@ -54,7 +53,7 @@ def main(folder=".", **sizes):
         print(f"{name}: {result.value:.4g} ± {result.error:.2g} {result.unit}")
     out = pathlib.Path(folder) / "own-net"
     solution.save(out, force=True)  # `web.pvd` in it opens in ParaView
-    print(picture(out, field="tension"))
+    solution.picture(field="tension", out=out / "web.png")
 
 
 if __name__ == "__main__":
