@@ -4,6 +4,8 @@ A mass on a line that is linear and without mass is an oscillator, v sin(ωt)/ω
 that ends at t is v sin(ω(t − ½w)) sin(½ωw)/(½ω²w).
 """
 
+from dataclasses import replace
+
 import nets
 import numpy as np
 import pytest
@@ -244,6 +246,29 @@ def test_digits_of_a_mean():
     for key, truth in truths(windows).items():
         result = solution.results[key]
         assert abs(result.value - truth) <= result.error <= 1e-5 * abs(truth), (key, result, truth)
+
+
+def test_means_beside_horizon_and_ensemble():
+    """Of an oscillator, which is not chaotic: no result is statistical, and the runs of the ensemble say the same."""
+    windows = {"rows": WINDOWS["rows"]}
+    solution = refweb.run(oscillator(windows, accuracy=refweb.Accuracy(horizon=True, ensemble=3)))
+    assert solution.horizon["statistical"] == []
+    for key, truth in truths(windows).items():
+        result, many = solution.results[key], solution.horizon["ensemble"][key]
+        assert abs(result.value - truth) <= result.error
+        assert abs(many["mean"] - result.value) <= result.error and many["deviation"] <= 1e-6 * abs(truth), (key, many)
+
+
+def test_means_beside_refinement():
+    """Of a line of a hundredth of the mass: eight elements move the means by what ± and elements leave together."""
+    case = oscillator({"rows": WINDOWS["rows"]}, accuracy=refweb.Accuracy(refine=True))
+    case = case.replace(cable=replace(case.cable, density=100.0))
+    coarse = refweb.run(case)
+    fine = refweb.run(case.replace(cable=replace(case.cable, subdivide=8), accuracy=refweb.Accuracy(error="none")))
+    for key, result in coarse.results.items():
+        off = abs(fine.results[key].value - result.value)
+        assert off <= result.error + result.discretisation, (key, result, off)
+        assert result.discretisation < 1e-2 * abs(result.value), (key, result)
 
 
 def test_costs_are_compared_by_values_of_an_instant():

@@ -108,6 +108,37 @@ def test_follower_loads(method, kind):
     speed_is(solution, speed, method, width, 1e-6 + stretch / speed**2)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_pressure_in_a_closed_line(method):
+    """Of a regular polygon of n masses: each gets p R sin(2π/n) outwards for a moment, and all of them no momentum.
+
+    It then flies apart, its lines slack: they are longer than their distance.
+    """
+    n, radius, width, speed = 12, 1.0, 1e-6, 0.1
+    turn = 2.0 * np.pi * np.arange(n) / n
+    points = radius * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    factor = triangle(width, speed * MASS / (width * radius * math.sin(2.0 * math.pi / n)))
+    solution = refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(
+                points=points.tolist(), lines=[[i, (i + 1) % n] for i in range(n)], natural_length=[1.0] * n
+            ),
+            cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1e-6),
+            effects=[
+                refweb.PointMass(node="all", mass=MASS),
+                refweb.Pressure(lines="all", normal=(0.0, 0.0, 1.0), value=1.0, factor=factor),
+            ],
+            solve=refweb.Dynamic(duration=0.03, **METHODS[method]),
+            output=refweb.Output(interval=0.01),
+            observe=[refweb.Observe(name="speed", quantity="velocity", node=0, reduce="final")],
+        )
+    )
+    speed_is(solution, speed, method, width, 1e-6)
+    outwards = (solution.velocities * points).sum(axis=1) / radius
+    assert outwards == pytest.approx(np.full(n, speed), rel=2e-3)
+    assert np.abs(solution.velocities.sum(axis=0)).max() < 1e-9 * speed
+
+
 def moved_and_loaded(method, **changes):
     """Energy drift where a node that carries a constant load is moved, with corners between rows and between steps."""
     table = [(0.0, 0.0, 0.0, 0.0), (0.01013, 0.0, 0.0, 0.2), (0.01771, 0.0, 0.0, 0.05), (0.05, 0.0, 0.0, 0.05)]
