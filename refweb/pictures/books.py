@@ -75,6 +75,8 @@ def energy(shown):
     factor, unit = unit_of("J", book.top, book.given)
     keep = telling(*book.parts.values(), most=300)
     at = s.along[keep] / second
+    if len(keep) == 1:  # of one load step a column as broad as half a step
+        keep, at = np.repeat(keep, 2), at + np.array([-0.25, 0.25])
 
     def stack(axes):
         entries, below = [], np.zeros(len(keep))
@@ -93,7 +95,7 @@ def energy(shown):
             entries.append((line, start))
         axes.set_ylim(bottom=0.0)
         if not dynamic:
-            tick_steps(axes, at.tolist())
+            tick_steps(axes, s.along.tolist())
         label(axes, "energy", unit)
         legend(axes, entries, columns=2)
         if dynamic:
@@ -228,7 +230,7 @@ def momentum(shown):
     sizes = {axis: max(_size(b[axis]) for b in books) for axis in AXES}
     drawn = [axis for axis in AXES if sizes[axis] > SMALL * max(sizes.values())] or ["z"]
     small = [axis for axis in AXES if axis not in drawn]
-    note = f"Along {' and '.join(small)} all momenta are below {SMALL:g} of the largest." if small else ""
+    notes = (f"Along {' and '.join(small)} all momenta are below {SMALL:g} of the largest.",) if small else ()
     largest = np.array(max(sizes.values()))
     factor, unit = unit_of("N s", largest)
     second, clock = clock_of(shown)
@@ -243,7 +245,7 @@ def momentum(shown):
             if first:
                 legend(axes, names_of(axes, shown) + entries)
 
-        return Panel(draw, f"time [{clock}]", LOW, note)
+        return Panel(draw, f"time [{clock}]", LOW, notes)
 
     panels = [panel(axis, not number) for number, axis in enumerate(drawn)]
     return [*panels, _momentum_drifts(shown, books, second, clock)]
@@ -296,5 +298,5 @@ def _momentum_drifts(shown, books, second, clock):
         label(axes, "drift", unit)
         legend(axes, entries, columns=3)
 
-    said = "; ".join(s.said(_share(s, "momentum_drift", "momentum")) for s in shown)
-    return Panel(draw, f"time [{clock}]", LOW, said[:1].upper() + said[1:] if len(shown) == 1 else said)
+    said = tuple(s.said(_share(s, "momentum_drift", "momentum")) for s in shown)
+    return Panel(draw, f"time [{clock}]", LOW, said)

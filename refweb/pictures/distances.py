@@ -34,6 +34,8 @@ class Spread(NamedTuple):
         Slack lines.
     origin : str
         The place in words.
+    note : str
+        Which instant it is, where the largest value is that of another one; empty where it is of this.
     """
 
     frame: Frame
@@ -41,28 +43,31 @@ class Spread(NamedTuple):
     distance: np.ndarray
     slack: np.ndarray
     origin: str
+    note: str
 
 
 def spread(record, field):
     """The `Spread` of a field at the frame nearest its largest value."""
     if not record.times:
         raise InputError(f"{record.name}: has no frames, so it is not known what its lines have")
-    when = time_of_largest(record, field)
+    name, when = largest(record, field)
     frame = record.frame(min(record.times, key=lambda number: abs(record.times[number] - when)))
     if field not in frame.fields:
         raise InputError(f"{record.name}: its frames hold no {field}")
     values, middles = np.asarray(frame.fields[field]), frame.origin.mean(axis=1)
     place, words = _place(record, frame, middles, values, field)
-    return Spread(frame, values, np.linalg.norm(middles - place, axis=1), frame.slack, words)
+    note = f"The frame at {at(record, frame.time)} is nearest to {name}, which is of {at(record, when)}."
+    note = "" if frame.time == when or not name else note
+    return Spread(frame, values, np.linalg.norm(middles - place, axis=1), frame.slack, words, note)
 
 
-def time_of_largest(record, field):
-    """Time of the largest value of a field, of the first result where no result is of the field; else the last."""
+def largest(record, field):
+    """(name, time) of the result of a field, of the first result where there is none; "" and the last time else."""
     results = record.summary.get("results") or {}
     asked = {one.get("name"): one for one in record.scene.get("observe") or []}
     own = [name for name in results if asked.get(name, {}).get("quantity") == field]
-    times = [results[name].get("time") for name in [*own, *results]]
-    return next((time for time in times if time is not None), max(record.times.values()))
+    times = [(name, results[name].get("time")) for name in [*own, *results]]
+    return next((one for one in times if one[1] is not None), ("", max(record.times.values())))
 
 
 def _place(record, frame, middles, values, field):
@@ -101,7 +106,7 @@ def distances(shown, field):
     """The panel of a field over the distance from the place that was hit or loaded."""
     found = [spread(s.record, field) for s in shown]
     factor, called = unit_of(FIELDS[field], *(one.values for one in found))
-    metre, far = unit_of("m", *(one.distance for one in found))
+    metre, unit = unit_of("m", *(one.distance for one in found))
 
     def draw(axes):
         entries = []
@@ -109,23 +114,23 @@ def distances(shown, field):
             taut, many = ~one.slack, len(one.values) > MANY
             size = 3.0 if len(one.values) > 500 else 5.0
             dots = {"linestyle": "", "markersize": size, "rasterized": many, "markeredgewidth": 0.0, "alpha": 0.75}
-            at, values = one.distance / metre, one.values / factor
-            (points,) = axes.plot(at[taut], values[taut], marker=s.ink.marker, color=s.ink.colour, **dots)
+            far, values = one.distance / metre, one.values / factor
+            (points,) = axes.plot(far[taut], values[taut], marker=s.ink.marker, color=s.ink.colour, **dots)
             largest = readable(float(np.nanmax(one.values)), None, FIELDS[field])
             place = f", from {one.origin}" if len(places) > 1 else ""
-            entries.append((points, s.said(f"lines at {_when(s.record, one.frame)}, at most {largest}{place}")))
+            entries.append((points, s.said(f"lines at {at(s.record, one.frame.time)}, at most {largest}{place}")))
             if one.slack.any():
                 look = {"linestyle": "", "marker": "x", "markersize": size + 1, "rasterized": many}
-                (points,) = axes.plot(at[one.slack], values[one.slack], color=s.ink.colour if s.name else PALE, **look)
+                (points,) = axes.plot(far[one.slack], values[one.slack], color=s.ink.colour if s.name else PALE, **look)
                 entries.append((points, s.said(f"slack: {one.slack.sum()} of {len(one.slack)} lines")))
         label(axes, field, called)
         legend(axes, entries)
 
     places = dict.fromkeys(one.origin for one in found)
     place = f"\nfrom {next(iter(places))}" if len(places) == 1 else ""
-    return [Panel(draw, f"distance in the undeformed web [{far}]{place}", 3.4)]
+    return [Panel(draw, f"distance in the undeformed web [{unit}]{place}", 3.4, tuple(one.note for one in found))]
 
 
-def _when(record, frame):
+def at(record, time):
     """The time of a frame in words."""
-    return f"t = {frame.time:.6g} s" if record.kind == "dynamic" else f"step {frame.time:g}"
+    return f"t = {time:.6g} s" if record.kind == "dynamic" else f"step {time:g}"

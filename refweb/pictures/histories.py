@@ -39,7 +39,8 @@ def history(shown, name):
         label(axes, name, called)
         legend(axes, entries)
 
-    return [Panel(draw, f"time [{clock}]", note=OF_ALL if any(name in s.results for s in having) else "")]
+    notes = [OF_ALL] if any(name in s.results for s in having) else []
+    return [Panel(draw, f"time [{clock}]", notes=(*notes, *(note for s in having for note in s.other_errors(name))))]
 
 
 def clock_of(shown):
@@ -88,7 +89,7 @@ def steps(shown, name):
         label(axes, name, called)
         legend(axes, entries)
 
-    return [Panel(draw, "load step")]
+    return [Panel(draw, "load step", notes=tuple(note for s in having for note in s.other_errors(name)))]
 
 
 def tick_steps(axes, steps):

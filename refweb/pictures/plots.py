@@ -37,33 +37,29 @@ def kinds(record):
     shown = Shown(record, "", Ink.of(0))
     if record.kind == "modes":
         return {"frequencies": "Natural frequencies with ±"}
-    rows = len(shown.along)
-    found = {}
-    if record.kind == "dynamic":
-        found |= {name: f"{name} over time" for name in shown.observables}
-        if shown.energies:
-            found.setdefault("energy", "Energy by kind over time, and how far its book is open")
-        if books.has_momentum(shown):
-            found.setdefault("momentum", "Momentum against the impulses of supports and loads")
-        if rows >= spectra.FEWEST and shown.observables:
-            found.setdefault("spectrum", f"Spectrum of {shown.observables[0]}")
-    elif rows > 1:
-        found |= {name: f"{name} over the load step, with ±" for name in shown.observables}
-        if shown.energies:
-            found.setdefault("energy", "Energy by kind over the load step")
+    rows, dynamic = len(shown.along), record.kind == "dynamic"
+    over = "time" if dynamic else "the load step, with ±"
+    found = {name: f"{name} over {over}" for name in shown.observables if dynamic or rows > 1}
+    offered = {}
+    if shown.energies:
+        offered["energy"] = "Energy by kind" + (", and how far its book is open" if dynamic else "")
+    if dynamic and books.has_momentum(shown):
+        offered["momentum"] = "Momentum against the impulses of supports and loads"
+    if dynamic and rows >= spectra.FEWEST and shown.observables:
+        offered["spectrum"] = f"Spectrum of {shown.observables[0]}"
     if record.times:
-        found |= {f"{field}{DISTANCE}": f"{field} of lines over distance" for field in distances.FIELDS}
-    return found
+        offered |= {f"{field}{DISTANCE}": f"{field} of lines over distance" for field in distances.FIELDS}
+    return found | {name: words for name, words in offered.items() if name not in found}
 
 
 def usual(record):
     """Names of what is drawn of a record where nothing is asked for."""
-    found = list(kinds(record))
+    shown = Shown(record, "", Ink.of(0))
+    if record.kind == "modes":
+        return ["frequencies"]
     if record.kind == "dynamic":
-        observables = Shown(record, "", Ink.of(0)).observables
-        return [name for name in found if name in observables or name == "energy"]
-    plain = [name for name in found if name != "energy" and not name.endswith(DISTANCE)]
-    return plain or found[:1] or Shown(record, "", Ink.of(0)).observables
+        return [*shown.observables, *(["energy"] if shown.energies else [])]
+    return shown.observables if len(shown.along) > 1 or not record.times else [f"stress{DISTANCE}"]
 
 
 def draw(records, what=None):

@@ -32,8 +32,9 @@ class Ink(NamedTuple):
 
     @classmethod
     def of(cls, number):
-        """That of a number from 0 on."""
-        return cls(*(kinds[number % len(kinds)] for kinds in (COLOURS, STYLES, MARKERS)))
+        """That of a number from 0 on: beyond the colours, these with another style and marker."""
+        again, own = divmod(number, len(COLOURS))
+        return cls(COLOURS[own], STYLES[(own + again) % len(STYLES)], MARKERS[(own + again) % len(MARKERS)])
 
 
 class Panel(NamedTuple):
@@ -47,14 +48,14 @@ class Panel(NamedTuple):
         What its horizontal axis is, with its unit: panels below each other share one that is the same.
     height : float
         Its height [inch].
-    note : str
-        What stands below the sheet.
+    notes : tuple of str
+        What stands below the sheet, once each.
     """
 
     draw: Callable
     along: str
     height: float = TALL
-    note: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def sheet(panels, title, notes=()):
@@ -62,7 +63,7 @@ def sheet(panels, title, notes=()):
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    notes = dict.fromkeys(filter(None, [*(panel.note for panel in panels), *notes]))
+    notes = dict.fromkeys(filter(None, [*(note for panel in panels for note in panel.notes), *notes]))
     words, below = textwrap.wrap(title, 48), [line for note in notes for line in textwrap.wrap(note, 84)]
     heights = [panel.height for panel in panels]
     size = (WIDTH, sum(heights) + 0.25 * len(words) + 0.2 * len(below) + 0.5)

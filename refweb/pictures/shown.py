@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..results.solution import Result, read_results
-from ..results.units import readable, scale_of
+from ..results.units import other_errors, readable, scale_of
 from .record import Record
 from .sheet import Ink
 
@@ -73,6 +73,11 @@ class Shown:
         found = self.record.summary.get("steps")
         return [(step["step"], _results(step)) for step in found if "step" in step] if isinstance(found, list) else []
 
+    def other_errors(self, name):
+        """Errors of a result besides ±, in words."""
+        result = self.results.get(name)
+        return [self.said(text) for text in other_errors({name: result.plain()})] if result is not None else []
+
     def said(self, words):
         """Words about it, behind its name where there are others."""
         return f"{self.name}: {words}" if self.name and words else self.name or words
@@ -107,6 +112,6 @@ def told(result: Result):
     """A result in words, with its ±."""
     words = readable(result.value, result.error, result.unit)
     if result.interval is not None:
-        least, most = (readable(end, None, result.unit) for end in result.interval)
-        return f"{words}, anywhere from {least} to {most}"
+        least, most = (readable(end, None, result.unit) if np.isfinite(end) else "any" for end in result.interval)
+        return f"{words}, may be from {least} to {most}"
     return words

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..results.units import readable, scale_of
-from .sheet import DARK, Panel, label, legend
+from .sheet import DARK, Panel, label, legend, telling
 from .shown import unit_of
 
 FEWEST = 32
@@ -93,7 +93,8 @@ def spectrum(shown, name):
         largest = max(float(one.amplitude.max()) for one in found) / factor
         for s, one in zip(having, found, strict=True):
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(one.frequency / cycle, one.amplitude / factor, **style)
+            keep = telling(one.amplitude)
+            (line,) = axes.plot(one.frequency[keep] / cycle, one.amplitude[keep] / factor, **style)
             if one.peak is not None:
                 look = {"color": s.ink.colour, "marker": "v", "markeredgecolor": DARK, "markersize": 8}
                 axes.plot(one.frequency[one.peak] / cycle, one.amplitude[one.peak] / factor, **look)
@@ -107,7 +108,7 @@ def spectrum(shown, name):
 
     finest = max(one.resolution for one in found)
     note = f"Frequencies that are {finest:.2g} Hz apart are told apart, by a Hann window on the mean."
-    return [Panel(draw, f"frequency [{hertz}]", 3.0, note)]
+    return [Panel(draw, f"frequency [{hertz}]", 3.0, (note,))]
 
 
 def _peak(one, unit):

@@ -113,6 +113,16 @@ def test_no_band_where_no_error_is_known(runs):
     assert not bar.has_yerr and not any("±" in text.get_text() for text in axes.get_legend().get_texts())
 
 
+def test_other_errors_stand_below(runs):
+    """What smoothing and elements do to a result is not in its ±, and is told where that result is drawn."""
+    record = of_folder(runs / "dynamic")
+    results = {name: {**one, "smoothing": 2e-3} for name, one in record.summary["results"].items()}
+    record = record._replace(summary={**record.summary, "results": results})
+    words = texts(plots.draw(record, "deflection"))
+    assert "smoothing moves deflection by 2 mm" in words and "smoothing moves speed" not in words
+    assert "smoothing" not in texts(plots.draw(record, "kinetic_energy"))
+
+
 def test_energies_are_stacked_to_what_came_in(runs):
     """Each area is as high as its energy: all of them are total and loss, of potential energy what is above its least.
 
@@ -196,6 +206,11 @@ def test_distances_are_from_where_a_body_touches(runs):
     assert found.distance[5] == 0.0 and '"ball"' in found.origin
     bare = distances.spread(record._replace(scene={}), "strain")
     assert bare.distance[np.argmax(bare.values)] == 0.0 and "strain is largest" in bare.origin
+    moved = of_folder(runs / "dynamic")
+    time = moved.summary["results"]["deflection"]["time"]
+    near = distances.spread(moved, "stress")
+    assert abs(near.frame.time - time) == min(abs(t - time) for t in moved.times.values()) > 0.0
+    assert "nearest to deflection" in near.note
 
 
 def test_load_steps_with_their_error(runs):
@@ -213,6 +228,7 @@ def test_load_steps_with_their_error(runs):
     steps[2]["results"]["max_stress"]["interval"] = [0.5 * value, None]
     axes = of(plots.draw(record._replace(summary={**record.summary, "steps": steps}), "max_stress"), "max_stress")
     np.testing.assert_allclose(spans(axes)[2][:, 1] * unit, [0.5 * value, value])
+    assert "may be from" in texts(axes.figure) and "to any" in texts(axes.figure)
 
 
 def test_modes_with_their_error(runs):
@@ -271,6 +287,8 @@ def test_what_is_drawn_where_nothing_is_asked_for(runs):
     first = {name: column[:1] for name, column in record.table()[1].items()}
     single = record._replace(table=lambda: (record.table()[0], first))
     assert [a.get_ylabel().split(" [")[0] for a in plots.draw(single).axes] == ["stress"]
+    (area,) = of(plots.draw(single, "energy"), "energy").collections
+    assert area.get_paths()[0].get_extents().width == 0.5
     for name in ("static", "dynamic", "modes"):
         record = of_folder(runs / name)
         for kind in plots.kinds(record):
