@@ -206,10 +206,11 @@ class Solution(SolutionData):
         InputError
             For a quantity that there is not, with the nearest, and a place or format that cannot be written.
         """
-        from .pictures.plots import draw, target, write
+        from .pictures.pictures import target
+        from .pictures.plots import ENDINGS, draw, write
         from .pictures.record import of_solution
 
-        path = None if out is None else target(out)
+        path = None if out is None else target(out, ENDINGS)
         figure = draw(of_solution(self, seen=False), quantity)
         if path is not None:
             write(figure, path)

@@ -69,6 +69,11 @@ MIRRORS = {
     "results/comparison": "results/test_comparison.py",
     "results/state": "results/test_results.py results/test_observable_contract.py",
     "results": "results/test_results.py test_faults.py",
+    "pictures/books": "pictures/test_plots.py",
+    "pictures/spectra": "pictures/test_plots.py",
+    "pictures/histories": "pictures/test_plots.py",
+    "pictures/sheet": "pictures/test_plots.py",
+    "pictures/distances": "pictures/test_plots.py",
     "studies/predictability": "studies/test_horizon.py",
     "studies/discretisation_error": "dynamics/test_accuracy.py",
     "studies/spectrum": "studies/test_modes.py",
@@ -282,6 +287,14 @@ MUTANTS = [
     Mutant("results/folder", "int(number[1]) <= row", "int(number[1]) < row"),
     Mutant("results/folder", "self._listed += [(time, part,", "self._listed += [(row, part,"),
     Mutant("results/files", "return repr(float(value))", 'return f"{value:.9g}"'),
+    Mutant("pictures/books", "top[:1] + work - work[:1]", "top[:1] - work + work[:1]"),
+    Mutant("pictures/books", "area = axes.fill_between(at, below, above,", "area = axes.fill_between(at, 0.0, above,"),
+    Mutant("pictures/spectra", "2.0 * np.abs(np.fft.rfft(", "np.abs(np.fft.rfft("),
+    Mutant("pictures/sheet", "np.where(np.isnan(parts), np.inf, -parts)", "np.where(np.isnan(parts), np.inf, parts)"),
+    Mutant(
+        "pictures/distances", 'key=lambda body: touched[body]["overlap"]', 'key=lambda body: -touched[body]["overlap"]'
+    ),
+    Mutant("pictures/histories", "error = bar(result, factor)", "error = bar(result)"),
     # Results and observables
     Mutant(
         "results/observables/nodal",

@@ -298,5 +298,6 @@ def _momentum_drifts(shown, books, second, clock):
         label(axes, "drift", unit)
         legend(axes, entries, columns=3)
 
-    said = tuple(s.said(_share(s, "momentum_drift", "momentum")) for s in shown)
+    shares = [(s, _share(s, "momentum_drift", "momentum")) for s in shown]
+    said = tuple(s.said(words if s.name else words.capitalize()) for s, words in shares if words)
     return Panel(draw, f"time [{clock}]", LOW, said)

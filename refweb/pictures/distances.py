@@ -10,6 +10,7 @@ from ..errors import InputError
 from ..net.web import Web
 from ..results.units import readable
 from .frames import Frame
+from .record import CLOCKS
 from .sheet import PALE, Panel, label, legend
 from .shown import unit_of
 
@@ -66,8 +67,11 @@ def largest(record, field):
     results = record.summary.get("results") or {}
     asked = {one.get("name"): one for one in record.scene.get("observe") or []}
     own = [name for name in results if asked.get(name, {}).get("quantity") == field]
-    times = [(name, results[name].get("time")) for name in [*own, *results]]
-    return next((one for one in times if one[1] is not None), ("", max(record.times.values())))
+    name = next((name for name in [*own, *results] if results[name].get("time") is not None), None)
+    if name is None:
+        return "", max(record.times.values())
+    steps = [one[name] for step in record.summary.get("steps") or [] if name in (one := step.get("results", {}))]
+    return name, max(steps or [results[name]], key=lambda one: abs(one["value"] or 0.0))["time"]
 
 
 def _place(record, frame, middles, values, field):
@@ -132,5 +136,5 @@ def distances(shown, field):
 
 
 def at(record, time):
-    """The time of a frame in words."""
-    return f"t = {time:.6g} s" if record.kind == "dynamic" else f"step {time:g}"
+    """A time, or load step, in words."""
+    return CLOCKS[record.kind].format(time)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import io
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from ..errors import InputError
 from ..messages import nearest, short
 from ..results.files import write_atomically
 from . import books, distances, histories, spectra
+from .pictures import png, target
 from .record import Record, of_folder
 from .sheet import Ink, sheet
 from .shown import Shown
@@ -98,7 +98,7 @@ def draw(records, what=None):
             missing.setdefault(s.name, []).extend([name] if s not in having else [])
     notes += [f"{who} has no {', '.join(names)}" for who, names in missing.items() if names]
     figure = sheet(panels, _title(shown), notes)
-    setattr(figure, "_repr_png_", functools.partial(_as_png, figure))  # noqa: B010  # what notebooks look for
+    setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
     return figure
 
 
@@ -192,22 +192,9 @@ def plot(folders, quantity=None, out=None):
     records = [of_folder(folder, seen=False) for folder in folders]
     if len({record.name for record in records}) < len(records):
         records = [r._replace(name=str(folder)) for r, folder in zip(records, folders, strict=True)]
-    path = target(folders[0] / "plot.png" if out is None else out)
+    path = target(folders[0] / "plot.png" if out is None else out, ENDINGS)
     write(draw(records, quantity), path)
     return path
-
-
-def target(out):
-    """The path of a plot that can be written; `InputError` for others."""
-    out = Path(out)
-    ending = out.suffix[1:].lower()
-    if ending not in ENDINGS:
-        raise InputError(f'out = "{out}": unknown format "{ending}", {nearest(ending, ENDINGS)}')
-    if not out.parent.is_dir():
-        raise InputError(f'out = "{out}": there is no folder "{out.parent}"')
-    if out.is_dir() or not all(os.access(path, os.W_OK) for path in (out, out.parent) if path.exists()):
-        raise InputError(f'out = "{out}": cannot be written, choose another place')
-    return out
 
 
 def write(figure, path):
@@ -229,10 +216,3 @@ def as_svg(figure):
     with rc_context(LETTERS_STAY):
         figure.savefig(text, format="svg", metadata=BESIDE["svg"])
     return text.getvalue()
-
-
-def _as_png(figure):
-    """A figure as a notebook shows it."""
-    image = io.BytesIO()
-    figure.savefig(image, format="png", dpi="figure")
-    return image.getvalue()

@@ -201,7 +201,11 @@ def test_stress_over_distance(runs):
 
 def test_distances_are_from_where_a_body_touches(runs):
     record = of_folder(runs / "static")
-    bodies = {"ball": {"overlap": 1e-4, "line": 5}, "far": {"overlap": 0.0, "line": None}}
+    bodies = {
+        "ball": {"overlap": 1e-4, "line": 5},
+        "plate": {"overlap": 1e-6, "line": 2},
+        "far": {"overlap": 0.0, "line": None},
+    }
     found = distances.spread(record._replace(summary={**record.summary, "bodies": bodies}), "tension")
     assert found.distance[5] == 0.0 and '"ball"' in found.origin
     bare = distances.spread(record._replace(scene={}), "strain")
