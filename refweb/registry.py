@@ -132,6 +132,8 @@ COMMANDS = {
     "compare": "refweb.commands.compare",
     "picture": "refweb.commands.picture",
     "plot": "refweb.commands.plot",
+    "report": "refweb.commands.report",
+    "view": "refweb.commands.view",
     "modes": "refweb.commands.modes",
     "cost": "refweb.commands.cost",
 }

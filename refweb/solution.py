@@ -216,6 +216,30 @@ class Solution(SolutionData):
             write(figure, path)
         return figure
 
+    def report(self, out, frames: int | None = None) -> pathlib.Path:
+        """Write one page of the run, HTML that needs nothing else, with the web in space to turn and play.
+
+        Parameters
+        ----------
+        out : path-like
+            The file, which ends in ``.html``.
+        frames : int, optional
+            Number of frames to turn and play; by default as many as leave the page small.
+
+        Returns
+        -------
+        pathlib.Path
+            The file written.
+
+        Raises
+        ------
+        InputError
+            Where the file cannot be written or ``frames`` is below 1.
+        """
+        from .pages.page import report_of
+
+        return report_of(self, out, frames)
+
     def save(self, folder, force=False):
         """Write the result folder.
 

@@ -47,6 +47,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     ),
     ("pictures", "*", "A result folder drawn; it knows folders, and nothing of what made them."),
     (
+        "pages",
+        "*",
+        "One page of a run: what was simulated, found and drawn; it knows records, and nothing of what made them.",
+    ),
+    (
         "reference",
         "*",
         "What a scene file may say: values by path, its tables in words and as a schema; it knows no scene.",

@@ -14,7 +14,17 @@ from ..errors import InputError
 from ..messages import shown
 from ..registry import EFFECTS, INTEGRATORS, name_of
 from ..results.provenance import web_of
-from ..results.units import other_errors, place, readable, scale_of, with_error
+from ..results.units import readable
+from ..results.words import (
+    between,
+    on_cost,
+    on_results,
+    on_run,
+    on_solver,
+    rows_of_modes,
+    rows_of_results,
+    rows_of_steps,
+)
 
 
 def _console():
@@ -95,61 +105,22 @@ def _stiffness(scene, system):
             yield "contact", text + readable(allowed(body), None, "m")
 
 
-def _place(result):
-    return place(result["where"], result.get("at", "at"))
-
-
 def _results_of_steps(steps):
     """A row for each load step, of results in columns of one unit each, and last where they stand."""
+    found = rows_of_steps(steps)
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    grid.add_column("step", justify="right")
-    loads = "load" in steps[-1]
-    if loads:
-        grid.add_column("load [N]", justify="right")
-    columns = {name: [step["results"][name] for step in steps] for name in steps[-1]["results"]}
-    factors = {}
-    for name, column in columns.items():
-        factors[name], unit = scale_of(max(abs(result["value"]) for result in column), column[-1]["unit"])
-        grid.add_column(Text(f"{name} [{unit}]" if unit else name), justify="right")
-    for n, step in enumerate(steps):
-        row: list = [f"{step['step']:g}", *([f"{step['load']:.6g}"] if loads else [])]
-        for name, column in columns.items():
-            value, error = column[n]["value"], column[n]["error"]
-            row.append(with_error(value / factors[name], error and error / factors[name]))
-        grid.add_row(*row)
-    last = [_place(column[-1]) for column in columns.values()]
-    if any(last):
-        grid.add_row("", *[""] * loads, *(Text(f"at {text}" if text else "") for text in last))
+    for name in found.columns:
+        grid.add_column(Text(name), justify="right")
+    for row in (*found.rows, *([found.last] if found.last else [])):
+        grid.add_row(*map(Text, row))
     return grid
 
 
 def _results(results, dynamic):
     grid = Grid.grid(padding=(0, 2))
-    for name, result in results.items():
-        value = readable(result["value"], result["error"], result["unit"])
-        time = [Text(f"t = {result['time']:.6g} s")] if dynamic else []
-        grid.add_row(Text(name), Text(value), *time, Text(f"at {where}" if (where := _place(result)) else ""))
+    for row in rows_of_results(results, dynamic).rows:
+        grid.add_row(*map(Text, row))
     return grid
-
-
-def _between(interval, unit):
-    """An interval in words; an end of None is infinite."""
-    least, most = interval
-    if least is None or most is None:
-        ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", least), ("below", most)) if end is not None]
-        return "".join(ends) or "on its axis"
-    return f"from {least:.6g} to {most:.6g} {unit}"
-
-
-def _horizon(horizon):
-    """How long a motion is determined, in words."""
-    ended = [(k, time) for k, time in horizon["digits"] if time is not None]
-    text = f"a difference of {horizon['perturbation']:.0e} m"
-    text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"
-    text += "".join(f"; {k - 1} digit{'s' * (k != 2)} after {time:.4g} s" for k, time in ended[-3:])
-    left = max((k for k, time in horizon["digits"] if time is None), default=0)
-    text += f"; {'more than ' * (left == 12)}{left} digit{'s' * (left != 1)} at the end" if left else ""
-    return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
 
 
 def print_run(summary, more=()):
@@ -159,55 +130,16 @@ def print_run(summary, more=()):
         rows.append(("results", _results_of_steps(summary["steps"])))
     elif summary["results"]:
         rows.append(("results", _results(summary["results"], dynamic=not summary["steps"])))
-    if summary["results"]:
-        if any(r["error"] is None for r in summary["results"].values()):
-            rows.append(("", "a value without ± has no known error"))
-        for name, r in summary["results"].items():
-            if r.get("interval") is not None:
-                rows.append(("", f"{name} lies anywhere {_between(r['interval'], r['unit'])}"))
-        rows += [("", text) for text in other_errors(summary["results"])]
-    if horizon := summary.get("horizon"):
-        rows.append(("horizon", _horizon(horizon)))
-        for name, r in horizon.get("ensemble", {}).items():
-            unit = summary["results"][name]["unit"]
-            rows.append(
-                ("", f"{name} {readable(r['mean'], r['deviation'], unit)} over the ensemble, standard deviation")
-            )
-    for name, body in summary.get("bodies", {}).items():
-        text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
-        text += f" at line {body['line']}" if body["line"] is not None else ""
-        rows.append(("contact", f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]))
-    if worst := summary.get("utilisation"):
-        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
-        rows.append(("strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"))
+    rows += [("", text) for text in on_results(summary["results"])]
+    rows += on_run(summary)
     rows += more
-    if solver["residual"] is not None:
-        text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
-        text += f", residual {solver['residual']:.1e}"
-        if solver["duality_gap"] is not None:
-            text += f", duality gap {solver['duality_gap']:.1e} J"
-        if (above := solver.get("above_lowest")) is not None:
-            text += f", at most {above:.1e} J above the lowest state" if above else ", the lowest state, proven"
-        rows.append(("solver", text))
-    if solver["energy_drift"] is not None:
-        text = f"{solver['method']}: {solver['nsteps']} steps, energy drift {solver['energy_drift']:.1e}"
-        text += f", of momentum {solver['momentum_drift']:.1e}"
-        if integrated := solver.get("integrated_impulses"):
-            text += f" with {', '.join(integrated)} as integrated"
-        rows.append(("solver", text))
-    rows.append(("cost", _cost(cost)))
+    rows += [("solver", text) for text in on_solver(solver)]
+    rows.append(("cost", on_cost(cost)))
     rows += [("warning", text) for text in summary["warnings"]]
     if summary["status"] != "solved":
         resumed = "refweb resume continues from its last checkpoint" if solver["energy_drift"] is not None else ""
         rows.append((summary["status"], summary["message"] or resumed))
     _box(f"{summary['scene']}: {summary['status']}", rows)
-
-
-def _cost(cost):
-    """What a run cost, in words; compiling, which happens once, apart."""
-    text = f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"
-    compiling = cost.get("compile_s") or 0.0
-    return text + (f", of which compiling {compiling:.1f} s, once" if compiling >= 0.1 else "")
 
 
 def print_solution(solution, folder):
@@ -228,26 +160,13 @@ def print_modes(summary):
 
 
 def _modes(step):
+    found = rows_of_modes(step)
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in ("mode", "frequency", "along", "moving mass", "most at node", ""):
+    for name in found.columns:
         grid.add_column(Text(name), justify="right" if name else "left", no_wrap=bool(name))
-    results, squared = list(step["results"].values()), step["squared"]
-    for k, result in enumerate(results):
-        value, error = abs(result["value"]), result["error"]
-        text = readable(value, error, "Hz" if squared[k] >= 0.0 else "i Hz")
-        axes = " ".join(axis for axis, share in zip("xyz", step["shares"][k], strict=True) if share >= 0.1)
-        remarks = [f"unstable, grows e-fold in {0.15915 / value:.3g} s"] if squared[k] < 0.0 < value else []
-        remarks += ["zero within ±"] if error >= value else []
-        remarks += [f"equal to {k}"] if k and _equal(result, results[k - 1]) else []
-        remarks += ["local"] if step["moving"][k] < 0.1 else []
-        moving = f"{100.0 * step['moving'][k]:.2g} %"
-        grid.add_row(str(k + 1), Text(text), axes, moving, str(result["where"]), ", ".join(remarks))
+    for row in found.rows:
+        grid.add_row(*map(Text, row))
     return grid
-
-
-def _equal(one, other):
-    within = min(one["error"] + other["error"], 1e-6 * abs(one["value"]))  # in a turning frame ± says nothing of that
-    return abs(one["value"] - other["value"]) <= max(within, 1e-9 * abs(one["value"]))
 
 
 def print_cost(summary):
@@ -269,7 +188,7 @@ def print_cost(summary):
         which = "" if status == "refused" else f", {settings[0]}" + (" and finer" if len(settings) > 1 else "")
         rows.append(({"budget": "left out"}.get(status, status), f"{method}{which}: {message or 'there was no time'}"))
     rows.append(("price", summary["sentence"]))
-    rows.append(("cost", _cost(summary["cost"])))
+    rows.append(("cost", on_cost(summary["cost"])))
     _box(f"{summary['scene']}: what digits cost", rows)
 
 
@@ -310,5 +229,5 @@ def _compared(value):
     if value is None:
         return Text("")
     if value["interval"] is not None:
-        return Text(_between(value["interval"], value["unit"]))
+        return Text(between(value["interval"], value["unit"]))
     return Text(readable(value["value"], value["error"], value["unit"]))

@@ -29,7 +29,9 @@ def _folder(folder, as_json):
     try:
         summary = json.loads((folder / "run.json").read_text(encoding="utf-8"))
         if summary.get("status") == "running":
-            summary = _so_far(folder, summary)
+            from ..results.folder import so_far
+
+            summary = so_far(folder, summary)
         if as_json:
             print_json(summary)
         else:
@@ -42,23 +44,6 @@ def _folder(folder, as_json):
         raise InputError(f"{folder}/run.json: cannot be read: {error}") from None
     except (KeyError, TypeError, IndexError, AttributeError):
         raise InputError(f"{folder}/run.json: is not what a run of refweb writes") from None
-
-
-def _so_far(folder, summary):
-    """The summary of a run without an end: how far it came, and whether it is dead."""
-    from ..results.folder import is_alive, reached
-
-    alive, at = is_alive(folder), reached(folder)
-    text = f"it has reached {at}" if at else "it has written no row"
-    if alive is False:
-        return {**summary, "status": "killed", "message": f"its process is dead; {text}; {_remedy(folder)}"}
-    return {**summary, "message": f"{text}; {'its process is alive' if alive else 'whether it is alive is not known'}"}
-
-
-def _remedy(folder):
-    if (folder / "checkpoint.npz").exists():
-        return f"refweb resume {folder} continues it"
-    return "refweb run --force starts it again"
 
 
 def _scene(source, as_json):

@@ -25,7 +25,7 @@ from .vtu import meshes, write_mesh
 
 RESULT_FILES = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif"
-    r"|plot\.(png|svg|pdf)"
+    r"|plot\.(png|svg|pdf)|report\.html|paraview\.py"
     r"|frames/[^/]+_\d{6,}\.vtu|(frames/)?\.refweb-[^/]+"
 )
 """Files that a run writes, and that ``--force`` removes."""
@@ -76,6 +76,21 @@ def reached(folder):
             return f"{name.split(' [')[0].replace('time', 't')} = {float(rows[-1]):.6g}{' s' * name.startswith('time')}"
     except (OSError, ValueError, IndexError):
         return None
+
+
+def so_far(folder, summary):
+    """The summary of a run without an end: how far it came, and whether it is dead."""
+    alive, at = is_alive(folder), reached(folder)
+    text = f"it has reached {at}" if at else "it has written no row"
+    if alive is False:
+        return {**summary, "status": "killed", "message": f"its process is dead; {text}; {_remedy(folder)}"}
+    return {**summary, "message": f"{text}; {'its process is alive' if alive else 'whether it is alive is not known'}"}
+
+
+def _remedy(folder):
+    if (folder / "checkpoint.npz").exists():
+        return f"refweb resume {folder} continues it"
+    return "refweb run --force starts it again"
 
 
 def _lock(table):

@@ -1,0 +1,138 @@
+"""The parts of a page that are drawn: pictures, plots, and the web in space with its controls."""
+
+from __future__ import annotations
+
+import io
+
+from ..errors import InputError
+from ..pictures.pictures import Heading, drawn
+from ..pictures.stage import scaled_unit
+from ..results.units import readable
+from .markup import Html, data, figure, image, section, tag
+from .space import space_of
+
+HEAVIEST = 160_000
+"""Bytes above which a plot is a picture of pixels."""
+
+
+def labels(record, numbers):
+    """What each frame is, in words: its time, its load step, or its mode and frequency."""
+    times = [record.times[number] for number in numbers]
+    if record.kind == "static":
+        return [f"load step {time:g}" for time in times]
+    if record.kind != "modes":
+        return [f"t = {time:.6g} s" for time in times]
+    steps = record.summary.get("steps") or [{"results": {}}]
+    found = list(steps[-1]["results"].values())
+    frequencies = {k: readable(abs(one["value"]), one["error"], one["unit"]) for k, one in enumerate(found, 1)}
+    return [f"mode {time:g}" + (f": {frequencies[time]}" if time in frequencies else "") for time in times]
+
+
+def peak_of(record):
+    """Number of the frame nearest to the first result; of statics the last, of modes the first."""
+    numbers = list(record.times)
+    if record.kind != "dynamic":
+        return numbers[0 if record.kind == "modes" else -1]
+    results = record.summary.get("results") or {}
+    if not results:
+        return numbers[-1]
+    time = next(iter(results.values()))["time"]
+    return min(numbers, key=lambda number: abs(record.times[number] - time))
+
+
+def space(record, frames=None, progress=None):
+    """The web in space, and the data it needs."""
+    peak = peak_of(record)
+    found = space_of(record, peak, frames, progress)
+    if found is None:
+        return section("space", "In space", tag("p", "No frame of this run can be drawn."))
+    head = found.head
+    head["labels"] = labels(record, found.shown)
+    head["peak"] = found.shown.index(peak) if peak in found.shown else len(found.shown) - 1
+    for field in head["fields"]:
+        ends = [abs(end) for pair in field["taut"] if pair for end in pair]
+        field["factor"], field["shown"] = scaled_unit(field["name"], max(ends, default=0.0))
+    parts = [_view(head), tag("p", _on_frames(record, found, peak), class_="note")]
+    return section("space", "In space", *parts, data("head", head), data("data", found.text))
+
+
+def _on_frames(record, found, peak):
+    """What is shown of all frames, and how exactly."""
+    shown, total = len(found.shown), len(record.times)
+    words = [f"{shown} of {total} frames." if shown < total else f"All {total} frames." if total > 1 else "One frame."]
+    left = total - shown - len(found.missing)
+    if left:
+        kept = "the first, the last and that nearest to the first result are here" if peak in found.shown else ""
+        words.append(
+            f"{left} are left out to keep the page small{'; ' + kept if kept else ''}; "
+            "refweb report --frames N shows more."
+        )
+    if found.missing:
+        words.append(f"Not to be read: {', '.join(map(str, found.missing))}.")
+    words.append(
+        f"Points are within {found.error / found.extent:.0e} of the web's extent, values within 0.2 % of their range "
+        "in a frame."
+    )
+    return " ".join(words)
+
+
+def _view(head):
+    """The canvas and its controls."""
+    single = len(head["numbers"]) == 1 and head["kind"] != "modes"
+    marks = [tag("span", "slack", id="slack", class_="mark slack")]
+    marks += [tag("span", "support", class_="mark support")] if head["arrays"]["supports"]["length"] else []
+    for body in head["bodies"]:
+        colour = ",".join(str(round(255 * share)) for share in body["colour"])
+        marks.append(Html(f'<span class="mark" style="--mark:rgb({colour})">{tag("span", body["name"])}</span>'))
+    off = " hidden" if single else ""
+    factors = "".join(f'<option value="{n}">{n}</option>' for n in (1, 2, 5, 10, 20, 50, 100, 1000))
+    frame = {"modes": "mode", "static": "load step"}.get(head["kind"], "time")
+    label = (
+        "The web in space, its lines coloured. Arrow keys to the left and right choose a frame, with Shift all four "
+        "turn it."
+    )
+    return Html(
+        f'<figure id="view"><canvas id="canvas" tabindex="0" role="img" aria-label="{label}"></canvas>'
+        '<p id="without" hidden>This browser is too old for it: the pictures below show the run.</p>'
+        f'<div class="legend"><span id="scale"></span><div id="bar" role="img"></div><div id="ticks"></div>'
+        f'<div class="marks">{"".join(marks)}</div></div>'
+        f'<div class="controls"{off}><button type="button" id="play">Play</button>'
+        f'<label class="long">{frame} <input type="range" id="frame" min="0" max="0" step="1" value="0"></label>'
+        '<output id="time" for="frame"></output></div>'
+        '<div class="controls"><label>colours <select id="field"></select></label>'
+        '<label><input type="checkbox" id="own"> range of this frame alone</label>'
+        '<label><input type="checkbox" id="before"> undeformed</label>'
+        f'<label>displacements × <select id="factor">{factors}</select></label>'
+        '<button type="button" id="reset">Reset view</button></div>'
+        "<figcaption>Drag to turn; Shift and drag, or two fingers, to move; wheel or pinch to enlarge. "
+        "Keys: space plays, "
+        "← → frames, ↑ ↓ size, Shift and arrows turn, R resets. "
+        '<span id="by" hidden>Drawn without WebGL, for which this browser has no hardware.</span></figcaption>'
+        "<noscript><p>Without JavaScript the pictures below show the run.</p></noscript></figure>"
+    )
+
+
+def pictures(record):
+    """Pictures of the frame nearest to the first result, and of the last."""
+    heading, parts = Heading.of(record.title, record.kind, record.status), []
+    peak, last = peak_of(record), list(record.times)[-1]
+    for number in dict.fromkeys([peak, last] if record.kind == "dynamic" else [peak]):
+        (label,) = labels(record, [number])
+        try:
+            page = drawn(record.frame(number), heading)
+        except InputError as error:
+            parts.append(tag("p", f"Frame {number}: {error}"))
+            continue
+        which = "the last frame" if number == last else "the frame nearest to the first result"
+        parts.append(figure(image("png", _png(page), f"The web at {label}, its lines coloured"), f"{label}, {which}."))
+    return section("pictures", "Pictures", *parts)
+
+
+def _png(page):
+    """A page of matplotlib in 256 colours."""
+    from PIL import Image
+
+    drawn, small = io.BytesIO(), io.BytesIO()
+    page.savefig(drawn, format="png")
+    Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(small, format="png", optimize=True)
+    return small.getvalue()

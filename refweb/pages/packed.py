@@ -1,0 +1,86 @@
+"""Arrays as one text: bytes one after the other, deflated and in base64, and a table that says what is where.
+
+Floats become integers where this is exact enough: `levels` of 16 bits for places, of 8 bits for what becomes a colour.
+The page unpacks them with the browser's own ``DecompressionStream``; `unpack` is the same in Python.
+"""
+
+from __future__ import annotations
+
+import base64
+import zlib
+
+import numpy as np
+
+PLACES, VALUES, UNKNOWN = 65534, 254, 255
+"""Steps of the range of a place and of a value, and the level of a value that is not finite."""
+
+
+def levels(values, steps):
+    """Values as whole numbers of steps of their range.
+
+    Parameters
+    ----------
+    values : ndarray
+        What is written; entries that are not finite get the level ``steps + 1``.
+    steps : int
+        How many steps the range has.
+
+    Returns
+    -------
+    levels : ndarray of int, shape of the values
+        ``low + (high - low) * levels / steps`` is at most half a step away from a value.
+    low, high : float
+        The range; 0 and 0 where nothing is finite.
+    """
+    finite = np.isfinite(values)
+    low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
+    size = high / 2 - low / 2  # half, which is finite
+    share = np.where(finite, values, low) / 2 - low / 2
+    found = np.rint(steps * (share / size)) if size > 0 else np.zeros(np.shape(values))
+    return np.where(finite, found, steps + 1).astype(int), low, high
+
+
+def differences(frames):
+    """Levels of frames as bytes that deflate well: changes from frame to frame, the high bytes before the low ones.
+
+    Parameters
+    ----------
+    frames : ndarray of int, shape (frames, ...)
+        0 … 65535.
+    """
+    changes = np.diff(frames, axis=0, prepend=np.zeros_like(frames[:1])) & 0xFFFF
+    return np.stack([changes >> 8, changes & 0xFF]).astype(np.uint8)
+
+
+def pack(arrays):
+    """Arrays by name as one text.
+
+    Returns
+    -------
+    text : str
+        Base64 of the deflated bytes (zlib's format).
+    table : dict
+        Of each name its ``type``, "uint8", "uint32" or "float32", and its first byte and number of entries.
+    """
+    table, parts, end = {}, [], 0
+    for name, array in arrays.items():
+        written = np.ascontiguousarray(array)
+        written = written.astype(written.dtype.newbyteorder("<"))
+        table[name] = {"type": array.dtype.name, "start": end, "length": int(written.size)}
+        size = written.nbytes + -written.nbytes % 4  # entries of four bytes begin at a multiple of four
+        parts.append(written.tobytes().ljust(size, b"\0"))
+        end += size
+    return base64.b64encode(zlib.compress(b"".join(parts), 9)).decode(), table
+
+
+def unpack(text, table):
+    """The arrays that `pack` has written, each in one row."""
+    raw = zlib.decompress(base64.b64decode(text))
+    kind = {name: np.dtype(entry["type"]).newbyteorder("<") for name, entry in table.items()}
+    return {n: np.frombuffer(raw, kind[n], entry["length"], entry["start"]) for n, entry in table.items()}
+
+
+def summed(changes, shape):
+    """The levels that `differences` has written, of a shape (frames, ...)."""
+    high, low = np.asarray(changes, dtype=int).reshape(2, *shape)
+    return np.cumsum((high << 8) + low, axis=0) & 0xFFFF

@@ -1,0 +1,173 @@
+"""The parts of a page that are words and tables: results, warnings, what was simulated, cost, scene and versions."""
+
+from __future__ import annotations
+
+from ..messages import shown
+from ..registry import EFFECTS
+from ..results.files import as_toml
+from ..results.words import on_cost, on_results, on_run, on_solver, rows_of_modes, rows_of_results, rows_of_steps
+from .markup import Html, html, listing, pairs, section, table, tag
+
+LONGEST = 1000
+"""Characters of a line of the scene that are shown."""
+KINDS = {"dynamic": "dynamics", "static": "statics", "modes": "modes"}
+
+
+def results(record):
+    """Results with their ±, and what is known of them."""
+    summary, said = record.summary, []
+    steps, found = summary.get("steps") or [], summary.get("results") or {}
+    if record.kind == "modes" and steps:
+        shown = [table(*rows_of_modes(steps[-1]))]
+        if len(steps) > 1:
+            said.append(f"of load step {steps[-1]['step']:g}, the last of {len(steps)}")
+    elif len(steps) > 1:
+        shown = [table(*rows_of_steps(steps))]
+    elif found:
+        shown = [table(*rows_of_results(found, dynamic=record.kind == "dynamic"))]
+    else:
+        shown = [tag("p", "There are no results.")]
+    said += [] if record.kind == "modes" else on_results(found)
+    events = [
+        [event["name"], "did not happen" if event["time"] is None else f"t = {event['time']:.6g} s"]
+        for event in summary.get("events") or []
+    ]
+    more = [*on_run(summary), *(("solver", text) for text in (on_solver(summary["solver"]) if found else ()))]
+    parts = [*shown, listing(said) if said else "", table(["event", "time"], events) if events else ""]
+    return section("results", "Results", *parts, pairs(more) if more else "")
+
+
+def warnings(record):
+    """What a reader of the results has to know."""
+    found = [*record.summary.get("warnings", [])]
+    body = listing(found) if found else tag("p", "None.")
+    return section("warnings", "Warnings", tag("div", body, class_="warned") if found else body)
+
+
+def simulated(record):
+    """What was simulated: sizes, cable, effects that are there and that are not, solver."""
+    scene = record.scene
+    if not scene:
+        return section("simulated", "What was simulated", tag("p", "This folder holds no scene.toml that can be read."))
+    present = [name for name in EFFECTS if scene.get(name)]
+    absent = [name for name in EFFECTS if name not in present]
+    rows = [("web", [_keys(scene.get("web", {})), _sizes(record.summary.get("web") or {})])]
+    rows.append(("cable", _cable(scene.get("cable", {}))))
+    supports = [_keys(one) for name in ("supports", "support") for one in _several(scene.get(name))]
+    rows.append(("supports", [tag("div", one) for one in supports] or "the web's own"))
+    for name in present:
+        several = isinstance(scene[name], list)
+        rows.append(
+            (f"[[{name}]]" if several else f"[{name}]", [tag("div", _keys(one)) for one in _several(scene[name])])
+        )
+    effects = ", ".join(present) or "none but the tension of its lines"
+    rows.insert(
+        3, ("effects", [tag("div", ["present: ", tag("b", effects)]), tag("div", f"absent: {', '.join(absent)}")])
+    )
+    rows += [(name, _keys(scene[name])) for name in ("solve", "accuracy", "output") if scene.get(name)]
+    for name in ("observe", "event"):
+        if scene.get(name):
+            rows.append((f"[[{name}]]", [tag("div", _keys(one)) for one in scene[name]]))
+    return section("simulated", "What was simulated", pairs(rows))
+
+
+def cost(record):
+    """What the run cost, by effect."""
+    spent = record.summary.get("cost")
+    if not spent:
+        return ""
+    effects = sorted(spent.get("by_effect", {}).items(), key=lambda item: -item[1])
+    most = max((seconds for _, seconds in effects), default=0.0) or 1.0
+    bars = [
+        [name, Html(f'<span class="share" style="width:{8 * seconds / most:.2f}em"></span> {seconds:.3g} s')]
+        for name, seconds in effects
+    ]
+    note = "Kernels of an effect, each timed alone at the end and multiplied by its calls: an estimate."
+    parts = [tag("p", on_cost(spent))] + ([table(["effect", "CPU time"], bars), tag("p", note)] if bars else [])
+    return section("cost", "Cost", *parts)
+
+
+def scene(record):
+    """The scene file, all defaults filled in."""
+    if not record.scene:
+        return ""
+    lines = [
+        line if len(line) <= LONGEST else f"{line[:LONGEST]} … ({len(line) - LONGEST} characters more in scene.toml)"
+        for line in _together(as_toml(record.scene)).splitlines()
+    ]
+    what = tag("summary", "The scene file, with all defaults filled in")
+    return section("scene", "Scene", tag("details", [what, tag("pre", "\n".join(lines), tabindex="0")]))
+
+
+def versions(record):
+    """Versions of what solved it."""
+    found = record.summary.get("versions") or {}
+    seed = record.summary.get("seed")
+    rows = [*found.items(), *([("seed", seed)] if seed is not None else [])]
+    return section("versions", "Versions", pairs(rows)) if rows else ""
+
+
+def _several(given):
+    """Tables of a name, which stands once or several times."""
+    return given if isinstance(given, list) else [given] if given else []
+
+
+def _keys(given):
+    """Keys of a table with their values, in one line."""
+    words = [(key, _value(value)) for key, value in given.items() if value not in ({}, [])]
+    return html(
+        [[", " if i else "", tag("span", f"{key} = {value}", class_="key")] for i, (key, value) in enumerate(words)]
+    )
+
+
+def _value(value):
+    if isinstance(value, list) and len(value) > 12:
+        return f"{len(value)} entries"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+    return shown(value)
+
+
+def _sizes(web):
+    """Sizes of a web, in words."""
+    if not web:
+        return ""
+    area = f"{web['area']:.4g} m², " if web.get("cells") else ""
+    text = f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells; "
+    return tag("div", f"{text}{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg")
+
+
+def _cable(cable):
+    units = {"modulus": "Pa", "area": "m²", "density": "kg/m³", "strength": "Pa"}
+    groups = [tag("div", [f"group {name}: ", _keys(one)]) for name, one in cable.get("groups", {}).items()]
+    own = {
+        key: f"{value:g} {units[key]}" if key in units else _value(value)
+        for key, value in cable.items()
+        if key != "groups"
+    }
+    return [
+        tag(
+            "div",
+            html(
+                [[", " if i else "", tag("span", f"{k} = {v}", class_="key")] for i, (k, v) in enumerate(own.items())]
+            ),
+        ),
+        *groups,
+    ]
+
+
+def _together(text):
+    """TOML with each list of numbers on one line."""
+    lines, inside = [], False
+    for line in text.splitlines():
+        if inside:
+            lines[-1] += line.strip() + (" " if line.strip().endswith(",") else "")
+            inside = line.rstrip() != "]"
+            if not inside:
+                lines[-1] = lines[-1].replace(", ]", "]")
+        else:
+            lines.append(line)
+            inside = line.endswith("= [")
+    return "\n".join(lines)

@@ -1,0 +1,279 @@
+"""The web in space as a page holds it: some frames of a record, in few bytes, with how far they are from the record.
+
+Points that are at the same place undeformed and in all frames are one. A point is where it is undeformed, in single
+precision, plus its displacement in 65 534 steps of the range that each axis has over all frames. Values are 254 steps
+of the range of their field in their frame, as many as a scale of colours shows. A body is its surface once, and how it
+has moved and turned since in each frame.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..pictures.camera import choose
+from ..pictures.stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, UNITS, colour_map
+from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
+
+LARGEST = 2_400_000
+"""Bytes that the frames may take as text where their number is not asked for."""
+MOST = 400
+"""Frames that a page has at most where their number is not asked for."""
+HIDDEN = ("slack", "support", "line", "natural_length", "mass")
+"""Fields that do not change much, or are marked anyway; they stand last among the fields to choose from."""
+LEFT_OUT = ("support", "line")
+FIRST = ("shape", "stress", "tension", "strain", "displacement", "velocity", "reaction")
+
+
+class Space(NamedTuple):
+    """Frames in few bytes.
+
+    Attributes
+    ----------
+    head : dict
+        What the page is told of them, plain values for JSON; its key ``arrays`` says what is where in `text`.
+    text : str
+        Arrays in the form of `refweb.pages.packed.pack`.
+    error : float
+        Largest distance of a point from where it is in the record [m].
+    extent : float
+        Diagonal of the box around the web in all frames [m].
+    shown, missing : list of int
+        Numbers of the frames that are there, and of those that cannot be read.
+    """
+
+    head: dict
+    text: str
+    error: float
+    extent: float
+    shown: list
+    missing: list
+
+
+def space_of(record, peak=None, most=None, progress=None):
+    """The frames of a record.
+
+    Parameters
+    ----------
+    record : refweb.pictures.record.Record
+        What is shown.
+    peak : int, optional
+        Number of a frame that is shown in any case, as are the first and the last.
+    most : int, optional
+        Largest number of frames, ≥ 1; by default as many as stay below `LARGEST` bytes, and `MOST`.
+    progress : callable, optional
+        Called with a line of text and the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Space or None
+        None where no frame can be read.
+    """
+    if most is not None and most < 1:
+        raise InputError(f"frames = {most} must be ≥ 1 [1]")
+    numbers, kept, missing = list(record.times), {}, []
+    count = min(most or MOST, len(numbers))
+    while True:
+        chosen = chosen_of(numbers, count, peak)
+        for i, number in enumerate(chosen):
+            if number not in kept and number not in missing:
+                try:
+                    kept[number] = record.frame(number)
+                except InputError:
+                    missing.append(number)
+            if progress is not None:
+                progress("reading frames", 0.8 * (i + 1) / len(chosen))
+        shown = [kept[number] for number in chosen if number in kept]
+        if not shown:
+            return None
+        space = _space(record, shown, missing)
+        if most is not None or len(space.text) <= LARGEST or len(shown) <= 3:
+            return space
+        count = max(3, min(count - 1, int(0.95 * count * LARGEST / len(space.text))))
+
+
+def chosen_of(numbers, count, peak=None):
+    """The first, the last, the frame ``peak`` and, evenly between them, others; ``count`` in all where there are so
+    many, and not fewer than these three unless fewer are asked for: then the peak comes before the first, and the first
+    before the last."""
+    if count >= len(numbers):
+        return list(numbers)
+    if count < 3:
+        wanted = dict.fromkeys([*([peak] if peak in numbers else []), numbers[0], numbers[-1]])
+        return sorted(list(wanted)[:count], key=numbers.index)
+    places = set(np.rint(np.linspace(0, len(numbers) - 1, count)).astype(int).tolist())
+    if peak in numbers and (at := numbers.index(peak)) not in places:
+        places.discard(min(places - {0, len(numbers) - 1}, key=lambda place: abs(place - at)))
+        places.add(at)
+    return [numbers[place] for place in sorted(places)]
+
+
+def _space(record, frames, missing):
+    """Some frames, packed."""
+    first = frames[0]
+    if any(frame.paths.shape != first.paths.shape for frame in frames):
+        raise InputError(f"{record.name}: its frames have webs of different lines, which one page cannot show")
+    origin, along = first.origin.reshape(-1, 3), first.paths.shape[1]
+    moved = np.array([frame.paths.reshape(-1, 3) for frame in frames]) - origin
+    extent = float(np.linalg.norm(np.ptp((origin + moved).reshape(-1, 3), axis=0))) or 1.0
+    steps, ranges = np.empty(moved.shape, dtype=int), []
+    for axis in range(3):
+        steps[..., axis], low, high = levels(moved[..., axis], PLACES)
+        ranges.append((low, (high - low) / PLACES))
+    single = origin.astype(np.float32)
+    points, place = _once(single, steps)
+    written = single.astype(float) + [low for low, _ in ranges] + steps * [step for _, step in ranges]
+    error = float(np.linalg.norm(written - (origin + moved), axis=-1).max())
+    segments = place.reshape(-1, along)
+    segments = np.stack([segments[:, :-1], segments[:, 1:]], axis=-1).reshape(-1, 2)
+    arrays = {
+        "origin": single[points],
+        "moves": differences(steps[:, points].transpose(0, 2, 1)),
+        "segments": segments.astype(np.uint32),
+        "slack": np.array([frame.slack for frame in frames]).astype(np.uint8),
+        "supports": place[_supports(frames)].astype(np.uint32),
+        "colours": np.rint(255 * colour_map()(np.linspace(0, 1, 256))[:, :3]).astype(np.uint8),
+    }
+    head = {
+        "kind": record.kind,
+        "numbers": [frame.number for frame in frames],
+        "times": [frame.time for frame in frames],
+        "along": along - 1,
+        "moves": ranges,
+        "fields": _fields(frames, arrays),
+        "bodies": _bodies(frames, arrays),
+        "grey": [round(255 * share) for share in SLACK],
+        "support": [round(255 * share) for share in SUPPORT],
+        **_camera(frames, origin, moved),
+    }
+    text, head["arrays"] = pack(arrays)
+    return Space(head, text, error, extent, [frame.number for frame in frames], sorted(missing))
+
+
+def _once(origin, steps):
+    """Points that differ: (their numbers, the place of each point among them), in the order of the lines."""
+    rows = np.concatenate(
+        [origin.view(np.int32).astype(int), steps.transpose(1, 0, 2).reshape(len(origin), -1)], axis=1
+    )
+    _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(order), dtype=int)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[place.ravel()]
+
+
+def _supports(frames):
+    """Numbers of the path points nearest to the supports, of the frame that knows most of them."""
+    from scipy.spatial import cKDTree
+
+    frame = max(frames, key=lambda frame: len(frame.supports))
+    if not len(frame.supports):
+        return np.zeros(0, dtype=int)
+    return np.atleast_1d(cKDTree(frame.paths.reshape(-1, 3)).query(frame.supports)[1])
+
+
+def _fields(frames, arrays):
+    """What is known of each field, in the order in which it is offered; its levels become one of the arrays."""
+    names = [name for name in frames[0].fields if name not in LEFT_OUT and all(name in f.fields for f in frames)]
+    order = [name for name in FIRST if name in names]
+    order += [name for name in names if name not in FIRST and name not in HIDDEN]
+    order += [name for name in HIDDEN if name in names]
+    fields, known = [], {}
+    for name in order:
+        found = [levels(frame.fields[name], VALUES) for frame in frames]
+        ranges = [[low, high] for _, low, high in found]
+        values = np.array([level for level, *_ in found]).astype(np.uint8)
+        constant = bool((values == values[0]).all()) and all(one == ranges[0] for one in ranges)
+        values = values[:1] if constant else values
+        array = known.setdefault(values.tobytes(), f"field {name}")
+        arrays.setdefault(array, values)
+        grey = name in GREY_WHERE_SLACK
+        taut = [_range(frame.fields[name][~(frame.slack & grey)]) for frame in frames]
+        fields.append(
+            {
+                "name": name,
+                "unit": {"strain": "1"}.get(name, UNITS.get(name, "")),
+                "array": array,
+                "constant": constant,
+                "ranges": ranges,
+                "taut": taut,
+                "grey": grey,
+                "two": name == "slack",
+            }
+        )
+    return fields
+
+
+def _range(values):
+    """Least and largest finite value, None where there is none."""
+    values = values[np.isfinite(values)]
+    return [float(values.min()), float(values.max())] if len(values) else None
+
+
+def _bodies(frames, arrays):
+    """What is known of each body: its name, its colour and where it is in each frame, as a rotation and a place."""
+    found = []
+    for i, (name, body) in enumerate(frames[0].bodies.items()):
+        there = [frame.bodies[name].points for frame in frames if name in frame.bodies]
+        if len(there) < len(frames) or any(points.shape != body.points.shape for points in there) or not len(body[1]):
+            continue
+        middle = body.points.mean(axis=0)
+        arrays[f"points of body {i}"] = (body.points - middle).astype(np.float32)
+        arrays[f"triangles of body {i}"] = body.triangles.astype(np.uint32)
+        turns = [_rotation(body.points - middle, points - points.mean(axis=0)) for points in there]
+        found.append(
+            {
+                "name": name,
+                "colour": list(BODIES[i % len(BODIES)]),
+                "number": i,
+                "places": [points.mean(axis=0).tolist() for points in there],
+                "turns": [turn.ravel().tolist() for turn in turns],
+            }
+        )
+    return found
+
+
+def _rotation(before, after):
+    """The rotation that takes points, shape (n, 3), best from one place to another, both around the origin.
+
+    W. Kabsch, Acta Crystallographica A32 (1976) 922.
+    """
+    left, _, right = np.linalg.svd(before.T @ after)
+    sign = np.sign(np.linalg.det(left @ right)) or 1.0
+    return (right.T * [1.0, 1.0, sign]) @ left.T
+
+
+def _camera(frames, origin, moved):
+    """Axes of the first view, those of a picture; what it has to show; and the thickness of lines [m]."""
+    points = (origin + moved).reshape(-1, 3)
+    solid = np.concatenate([np.zeros((0, 3)), *(body.points for f in frames for body in f.bodies.values())])
+    views, _ = choose(origin, points, solid, float(np.abs(moved).max()), frames[0].tree, 1.6)
+    extent = np.linalg.norm(np.ptp(points, axis=0))
+    low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
+    near = np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
+    length = np.median(np.linalg.norm(np.diff(frames[0].origin, axis=1), axis=2).sum(axis=1))
+    radius = np.clip(0.06 * length, 0.0006 * extent, 0.002 * extent)
+    box = [near.min(axis=0).tolist(), near.max(axis=0).tolist()]
+    return {"axes": views[0].axes.tolist(), "box": box, "radius": float(radius)}
+
+
+def places(arrays, head, frame):
+    """Points of a frame as the page has them [m], shape (points, 3)."""
+    from .packed import summed
+
+    points = arrays["origin"].reshape(-1, 3)
+    steps = summed(arrays["moves"], (len(head["numbers"]), 3, len(points)))[frame]
+    low, step = np.array(head["moves"]).T
+    return points + low + steps.T * step
+
+
+def values(arrays, field, frame):
+    """Values of a field in a frame as the page has them [SI], shape (lines,); NaN where they are not finite."""
+    low, high = field["ranges"][frame]
+    found = arrays[field["array"]].reshape(
+        -1 if field["constant"] else len(field["ranges"]), len(arrays["slack"]) // len(field["ranges"])
+    )
+    found = found[0 if field["constant"] else frame]
+    return np.where(found == UNKNOWN, np.nan, low + (high - low) * found / VALUES)

@@ -1,0 +1,145 @@
+"""What the summary of a run says, in words: rows of results, load steps and modes, and sentences on the rest.
+
+A summary is the content of ``run.json``. The console and the page of a run show the same.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .units import other_errors, place, readable, scale_of, with_error
+
+
+class Rows(NamedTuple):
+    """Rows of text below names of columns; the `last` row, where there is one, is a remark on the columns."""
+
+    columns: list
+    rows: list
+    last: list
+
+
+def rows_of_results(results, dynamic):
+    """Results with their ±, where and, in dynamics, when they are."""
+    rows = []
+    for name, result in results.items():
+        value = readable(result["value"], result["error"], result["unit"])
+        time = [f"t = {result['time']:.6g} s"] if dynamic else []
+        rows.append([name, value, *time, f"at {where}" if (where := _place(result)) else ""])
+    return Rows(["result", "value", *(["time"] if dynamic else []), "place"], rows, [])
+
+
+def rows_of_steps(steps):
+    """A row for each load step, of results in columns of one unit each, and last where they stand."""
+    loads = "load" in steps[-1]
+    names = ["step", *(["load [N]"] if loads else [])]
+    columns = {name: [step["results"][name] for step in steps] for name in steps[-1]["results"]}
+    factors = {}
+    for name, column in columns.items():
+        factors[name], unit = scale_of(max(abs(result["value"]) for result in column), column[-1]["unit"])
+        names.append(f"{name} [{unit}]" if unit else name)
+    rows = []
+    for n, step in enumerate(steps):
+        row = [f"{step['step']:g}", *([f"{step['load']:.6g}"] if loads else [])]
+        for name, column in columns.items():
+            value, error = column[n]["value"], column[n]["error"]
+            row.append(with_error(value / factors[name], error and error / factors[name]))
+        rows.append(row)
+    where = [_place(column[-1]) for column in columns.values()]
+    last = ["", *[""] * loads, *(f"at {text}" if text else "" for text in where)] if any(where) else []
+    return Rows(names, rows, last)
+
+
+def rows_of_modes(step):
+    """A row for each mode: frequency with its ±, where it moves and what is to be known of it."""
+    rows, results, squared = [], list(step["results"].values()), step["squared"]
+    for k, result in enumerate(results):
+        value, error = abs(result["value"]), result["error"]
+        text = readable(value, error, "Hz" if squared[k] >= 0.0 else "i Hz")
+        axes = " ".join(axis for axis, share in zip("xyz", step["shares"][k], strict=True) if share >= 0.1)
+        remarks = [f"unstable, grows e-fold in {0.15915 / value:.3g} s"] if squared[k] < 0.0 < value else []
+        remarks += ["zero within ±"] if error >= value else []
+        remarks += [f"equal to {k}"] if k and _equal(result, results[k - 1]) else []
+        remarks += ["local"] if step["moving"][k] < 0.1 else []
+        moving = f"{100.0 * step['moving'][k]:.2g} %"
+        rows.append([str(k + 1), text, axes, moving, str(result["where"]), ", ".join(remarks)])
+    return Rows(["mode", "frequency", "along", "moving mass", "most at node", ""], rows, [])
+
+
+def on_results(results):
+    """Sentences on results: errors that are not known, intervals, errors besides ±."""
+    if results and any(result["error"] is None for result in results.values()):
+        yield "a value without ± has no known error"
+    for name, result in results.items():
+        if result.get("interval") is not None:
+            yield f"{name} lies anywhere {between(result['interval'], result['unit'])}"
+    yield from other_errors(results)
+
+
+def on_run(summary):
+    """(Name, sentence) of what else is known: horizon, contact, strength."""
+    if horizon := summary.get("horizon"):
+        yield "horizon", _horizon(horizon)
+        for name, r in horizon.get("ensemble", {}).items():
+            text = readable(r["mean"], r["deviation"], summary["results"][name]["unit"])
+            yield "", f"{name} {text} over the ensemble, standard deviation"
+    for name, body in summary.get("bodies", {}).items():
+        text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
+        text += f" at line {body['line']}" if body["line"] is not None else ""
+        yield "contact", f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]
+    if worst := summary.get("utilisation"):
+        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
+        yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"
+
+
+def on_solver(solver):
+    """Sentences on what a solver did, and how far its books close."""
+    if solver["residual"] is not None:
+        text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
+        text += f", residual {solver['residual']:.1e}"
+        if solver["duality_gap"] is not None:
+            text += f", duality gap {solver['duality_gap']:.1e} J"
+        if (above := solver.get("above_lowest")) is not None:
+            text += f", at most {above:.1e} J above the lowest state" if above else ", the lowest state, proven"
+        yield text
+    if solver["energy_drift"] is not None:
+        text = f"{solver['method']}: {solver['nsteps']} steps, energy drift {solver['energy_drift']:.1e}"
+        text += f", of momentum {solver['momentum_drift']:.1e}"
+        if integrated := solver.get("integrated_impulses"):
+            text += f" with {', '.join(integrated)} as integrated"
+        yield text
+
+
+def on_cost(cost):
+    """What a run cost; compiling, which happens once, apart."""
+    text = f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"
+    compiling = cost.get("compile_s") or 0.0
+    return text + (f", of which compiling {compiling:.1f} s, once" if compiling >= 0.1 else "")
+
+
+def between(interval, unit):
+    """An interval in words; an end of None is infinite."""
+    least, most = interval
+    if least is None or most is None:
+        ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", least), ("below", most)) if end is not None]
+        return "".join(ends) or "on its axis"
+    return f"from {least:.6g} to {most:.6g} {unit}"
+
+
+def _place(result):
+    return place(result["where"], result.get("at") or "number")
+
+
+def _horizon(horizon):
+    """How long a motion is determined."""
+    ended = [(k, time) for k, time in horizon["digits"] if time is not None]
+    text = f"a difference of {horizon['perturbation']:.0e} m"
+    text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"
+    text += "".join(f"; {k - 1} digit{'s' * (k != 2)} after {time:.4g} s" for k, time in ended[-3:])
+    left = max((k for k, time in horizon["digits"] if time is None), default=0)
+    text += f"; {'more than ' * (left == 12)}{left} digit{'s' * (left != 1)} at the end" if left else ""
+    return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
+
+
+def _equal(one, other):
+    within = min(one["error"] + other["error"], 1e-6 * abs(one["value"]))  # in a turning frame ± says nothing of that
+    return abs(one["value"] - other["value"]) <= max(within, 1e-9 * abs(one["value"]))
