@@ -11,8 +11,12 @@ from ..results.units import readable
 from .markup import Html, data, figure, image, section, tag
 from .space import space_of
 
-HEAVIEST = 160_000
+HEAVIEST = 150_000
 """Bytes above which a plot is a picture of pixels."""
+LIKE_STRESS = ("tension-distance", "strain-distance")
+"""Plots that look like that of the stress."""
+MOST_PLOTS = 16
+"""Plots that a page has at most."""
 
 
 def labels(record, numbers):
@@ -29,10 +33,10 @@ def labels(record, numbers):
 
 
 def peak_of(record):
-    """Number of the frame nearest to the first result; of statics the last, of modes the first."""
+    """Number of the frame nearest to the first result; of statics the last, of modes the first; None without frames."""
     numbers = list(record.times)
-    if record.kind != "dynamic":
-        return numbers[0 if record.kind == "modes" else -1]
+    if not numbers or record.kind != "dynamic":
+        return numbers[0 if record.kind == "modes" else -1] if numbers else None
     results = record.summary.get("results") or {}
     if not results:
         return numbers[-1]
@@ -43,7 +47,7 @@ def peak_of(record):
 def space(record, frames=None, progress=None):
     """The web in space, and the data it needs."""
     peak = peak_of(record)
-    found = space_of(record, peak, frames, progress)
+    found = space_of(record, peak, frames, progress) if record.times else None
     if found is None:
         return section("space", "In space", tag("p", "No frame of this run can be drawn."))
     head = found.head
@@ -114,6 +118,8 @@ def _view(head):
 
 def pictures(record):
     """Pictures of the frame nearest to the first result, and of the last."""
+    if not record.times:
+        return ""
     heading, parts = Heading.of(record.title, record.kind, record.status), []
     peak, last = peak_of(record), list(record.times)[-1]
     for number in dict.fromkeys([peak, last] if record.kind == "dynamic" else [peak]):
@@ -128,11 +134,40 @@ def pictures(record):
     return section("pictures", "Pictures", *parts)
 
 
+def plots(record):
+    """Histories, books and what else there is to plot."""
+    from ..pictures.plots import draw, kinds
+
+    try:
+        found = {name: line for name, line in kinds(record).items() if name not in LIKE_STRESS}
+    except InputError as error:
+        return section("plots", "Plots", tag("p", str(error)))
+    few = dict(list(found.items())[-MOST_PLOTS:]) if len(found) > MOST_PLOTS else found
+    parts = []
+    for name, line in few.items():
+        try:
+            parts.append(figure(_plot(draw(record, name), line), line))
+        except InputError as error:
+            parts.append(tag("p", f"{name}: {error}"))
+    left = [name for name in found if name not in few]
+    more = tag("p", f"By refweb plot --quantity also: {', '.join(left)}.", class_="note") if left else ""
+    nothing = "" if parts else tag("p", "There is nothing to plot.")
+    return section("plots", "Plots", tag("div", parts, class_="plots"), more, nothing)
+
+
+def _plot(figure, words):
+    """A plot as strokes, or as pixels where that is smaller."""
+    from ..pictures.plots import as_svg
+
+    text = as_svg(figure).encode()
+    return image("svg+xml", text, words) if len(text) <= HEAVIEST else image("png", _png(figure), words)
+
+
 def _png(page):
     """A page of matplotlib in 256 colours."""
     from PIL import Image
 
     drawn, small = io.BytesIO(), io.BytesIO()
-    page.savefig(drawn, format="png")
+    page.savefig(drawn, format="png", dpi="figure")
     Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(small, format="png", optimize=True)
     return small.getvalue()

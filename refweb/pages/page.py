@@ -47,7 +47,7 @@ def report(folder, out=None, frames=None, progress=None):
         Where the folder is no result folder, the file cannot be written, or ``frames`` is below 1.
     """
     folder = Path(folder)
-    record = of_folder(folder)
+    record = of_folder(folder, seen=False)
     if record.status == "running":
         record = record._replace(summary=so_far(folder, read_summary(folder)))
     return _write(record, folder / NAME if out is None else out, frames, progress)
@@ -55,7 +55,7 @@ def report(folder, out=None, frames=None, progress=None):
 
 def report_of(solution, out, frames=None):
     """Write the page of a solution, wherever it is; see `report`."""
-    return _write(of_solution(solution), out, frames, None)
+    return _write(of_solution(solution, seen=False), out, frames, None)
 
 
 def _write(record, out, frames, progress):
@@ -73,7 +73,7 @@ def _write(record, out, frames, progress):
 def page_of(record, frames=None, progress=None):
     """The page of a record, as text."""
     parts = [sections.results(record), sections.warnings(record), drawings.space(record, frames, progress)]
-    parts += [sections.simulated(record), drawings.pictures(record)]
+    parts += [sections.simulated(record), drawings.plots(record), drawings.pictures(record)]
     parts += [make(record) for make in (sections.cost, sections.scene, sections.versions)]
     parts = [part for part in parts if part]
     contents = [re.match(r'<section id="([^"]*)"><h2>(.*?)</h2>', part) for part in parts]

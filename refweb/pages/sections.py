@@ -24,7 +24,8 @@ def results(record):
     elif len(steps) > 1:
         shown = [table(*rows_of_steps(steps))]
     elif found:
-        shown = [table(*rows_of_results(found, dynamic=record.kind == "dynamic"))]
+        columns, rows, _ = rows_of_results(found, dynamic=record.kind == "dynamic")
+        shown = [table(columns, [[cell.removeprefix("t = ").removeprefix("at ") for cell in row] for row in rows])]
     else:
         shown = [tag("p", "There are no results.")]
     said += [] if record.kind == "modes" else on_results(found)
@@ -114,7 +115,7 @@ def _several(given):
 
 def _keys(given):
     """Keys of a table with their values, in one line."""
-    words = [(key, _value(value)) for key, value in given.items() if value not in ({}, [])]
+    words = [(key, _value(value)) for key, value in given.items() if value != {}]
     return html(
         [[", " if i else "", tag("span", f"{key} = {value}", class_="key")] for i, (key, value) in enumerate(words)]
     )
