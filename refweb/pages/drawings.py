@@ -5,12 +5,12 @@ from __future__ import annotations
 import io
 
 from ..errors import InputError
-from ..pictures.pictures import Heading, drawn
+from ..pictures.pictures import drawn, png
 from ..pictures.stage import scaled_unit
-from ..results.units import readable
 from .markup import Html, data, figure, image, section, tag
 from .space import space_of
 
+PEAK = "the frame nearest to the largest value of the first result"
 HEAVIEST = 150_000
 """Bytes above which a plot is a picture of pixels."""
 LIKE_STRESS = ("tension-distance", "strain-distance")
@@ -19,39 +19,14 @@ MOST_PLOTS = 16
 """Plots that a page has at most."""
 
 
-def labels(record, numbers):
-    """What each frame is, in words: its time, its load step, or its mode and frequency."""
-    times = [record.times[number] for number in numbers]
-    if record.kind == "static":
-        return [f"load step {time:g}" for time in times]
-    if record.kind != "modes":
-        return [f"t = {time:.6g} s" for time in times]
-    steps = record.summary.get("steps") or [{"results": {}}]
-    found = list(steps[-1]["results"].values())
-    frequencies = {k: readable(abs(one["value"]), one["error"], one["unit"]) for k, one in enumerate(found, 1)}
-    return [f"mode {time:g}" + (f": {frequencies[time]}" if time in frequencies else "") for time in times]
-
-
-def peak_of(record):
-    """Number of the frame nearest to the first result; of statics the last, of modes the first; None without frames."""
-    numbers = list(record.times)
-    if not numbers or record.kind != "dynamic":
-        return numbers[0 if record.kind == "modes" else -1] if numbers else None
-    results = record.summary.get("results") or {}
-    if not results:
-        return numbers[-1]
-    time = next(iter(results.values()))["time"]
-    return min(numbers, key=lambda number: abs(record.times[number] - time))
-
-
 def space(record, frames=None, progress=None):
     """The web in space, and the data it needs."""
-    peak = peak_of(record)
+    peak = record.chosen() if record.times else None
     found = space_of(record, peak, frames, progress) if record.times else None
     if found is None:
         return section("space", "In space", tag("p", "No frame of this run can be drawn."))
     head = found.head
-    head["labels"] = labels(record, found.shown)
+    head["labels"] = [record.clock(number) for number in found.shown]
     head["peak"] = found.shown.index(peak) if peak in found.shown else len(found.shown) - 1
     for field in head["fields"]:
         ends = [abs(end) for pair in field["taut"] if pair for end in pair]
@@ -66,7 +41,7 @@ def _on_frames(record, found, peak):
     words = [f"{shown} of {total} frames." if shown < total else f"All {total} frames." if total > 1 else "One frame."]
     left = total - shown - len(found.missing)
     if left:
-        kept = "the first, the last and that nearest to the first result are here" if peak in found.shown else ""
+        kept = f"the first, the last and {PEAK} are here" if peak in found.shown else ""
         words.append(
             f"{left} are left out to keep the page small{'; ' + kept if kept else ''}; "
             "refweb report --frames N shows more."
@@ -88,6 +63,7 @@ def _view(head):
     for body in head["bodies"]:
         colour = ",".join(str(round(255 * share)) for share in body["colour"])
         marks.append(Html(f'<span class="mark" style="--mark:rgb({colour})">{tag("span", body["name"])}</span>'))
+    before = "at rest" if head["kind"] == "modes" else "undeformed"
     off = " hidden" if single else ""
     factors = "".join(f'<option value="{n}">{n}</option>' for n in (1, 2, 5, 10, 20, 50, 100, 1000))
     frame = {"modes": "mode", "static": "load step"}.get(head["kind"], "time")
@@ -105,7 +81,7 @@ def _view(head):
         '<output id="time" for="frame"></output></div>'
         '<div class="controls"><label>colours <select id="field"></select></label>'
         '<label><input type="checkbox" id="own"> range of this frame alone</label>'
-        '<label><input type="checkbox" id="before"> undeformed</label>'
+        f'<label><input type="checkbox" id="before"> {before}</label>'
         f'<label>displacements × <select id="factor">{factors}</select></label>'
         '<button type="button" id="reset">Reset view</button></div>'
         "<figcaption>Drag to turn; Shift and drag, or two fingers, to move; wheel or pinch to enlarge. "
@@ -117,20 +93,19 @@ def _view(head):
 
 
 def pictures(record):
-    """Pictures of the frame nearest to the first result, and of the last."""
+    """Pictures of the frame nearest to the largest value of the first result, and of the last."""
     if not record.times:
         return ""
-    heading, parts = Heading.of(record.title, record.kind, record.status), []
-    peak, last = peak_of(record), list(record.times)[-1]
+    parts, peak, last = [], record.chosen(), list(record.times)[-1]
     for number in dict.fromkeys([peak, last] if record.kind == "dynamic" else [peak]):
-        (label,) = labels(record, [number])
+        when = record.clock(number)
         try:
-            page = drawn(record.frame(number), heading)
+            picture = image("png", _png(drawn(record, number)), f"The web at {when}, its lines coloured")
         except InputError as error:
             parts.append(tag("p", f"Frame {number}: {error}"))
             continue
-        which = "the last frame" if number == last else "the frame nearest to the first result"
-        parts.append(figure(image("png", _png(page), f"The web at {label}, its lines coloured"), f"{label}, {which}."))
+        which = PEAK if number == peak and record.kind != "modes" else "the last frame" if number == last else ""
+        parts.append(figure(picture, f"{when}, {which}." if which else f"{when}."))
     return section("pictures", "Pictures", *parts)
 
 
@@ -167,7 +142,8 @@ def _png(page):
     """A page of matplotlib in 256 colours."""
     from PIL import Image
 
-    drawn, small = io.BytesIO(), io.BytesIO()
-    page.savefig(drawn, format="png", dpi="figure")
-    Image.open(drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(small, format="png", optimize=True)
+    small = io.BytesIO()
+    Image.open(io.BytesIO(png(page))).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(
+        small, format="png", optimize=True
+    )
     return small.getvalue()

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..pictures.camera import choose
-from ..pictures.stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, UNITS, colour_map
+from ..pictures.stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, UNITS, colour_map
 from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
 
 LARGEST = 2_400_000
@@ -115,7 +115,8 @@ def _space(record, frames, missing):
     first = frames[0]
     if any(frame.paths.shape != first.paths.shape for frame in frames):
         raise InputError(f"{record.name}: its frames have webs of different lines, which one page cannot show")
-    origin, along = first.origin.reshape(-1, 3), first.paths.shape[1]
+    rest = first.origin if first.swing is None else first.paths - first.swing
+    origin, along = rest.reshape(-1, 3), first.paths.shape[1]
     moved = np.array([frame.paths.reshape(-1, 3) for frame in frames]) - origin
     extent = float(np.linalg.norm(np.ptp((origin + moved).reshape(-1, 3), axis=0))) or 1.0
     steps, ranges = np.empty(moved.shape, dtype=int), []
@@ -144,6 +145,7 @@ def _space(record, frames, missing):
         "moves": ranges,
         "fields": _fields(frames, arrays),
         "bodies": _bodies(frames, arrays),
+        "two": [[round(255 * share) for share in colour] for colour in TWO.values()],
         "grey": [round(255 * share) for share in SLACK],
         "support": [round(255 * share) for share in SUPPORT],
         **_camera(frames, origin, moved),
@@ -251,6 +253,8 @@ def _camera(frames, origin, moved):
     solid = np.concatenate([np.zeros((0, 3)), *(body.points for f in frames for body in f.bodies.values())])
     views, _ = choose(origin, points, solid, float(np.abs(moved).max()), frames[0].tree, 1.6)
     extent = np.linalg.norm(np.ptp(points, axis=0))
+    if frames[0].swing is not None:
+        points = np.concatenate([points, (origin - moved).reshape(-1, 3)])
     low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
     near = np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
     length = np.median(np.linalg.norm(np.diff(frames[0].origin, axis=1), axis=2).sum(axis=1))

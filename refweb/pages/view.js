@@ -93,6 +93,13 @@ class View {
     return high - low > 1e-9 * Math.abs(high) ? [low, high] : [Math.min(0, high), Math.max(0, high) || 1];
   }
 
+  // Colours of the bar from left to right: of values, or of the two that there are.
+  shades(field) {
+    const { head, arrays: { colours } } = this.model, css = (rgb) => `rgb(${rgb.join()})`;
+    if (field.two) return [`${css(head.two[0])} 50%`, `${css(head.two[1])} 50%`];
+    return [0, 32, 64, 96, 128, 160, 192, 224, 255].map((i) => css([...colours.subarray(3 * i, 3 * i + 3)]));
+  }
+
   // The colour bar and what stands beside it.
   legend(field, low, high) {
     const text = (value) => String(Number((value * field.factor).toPrecision(3)));
@@ -100,6 +107,7 @@ class View {
     part("scale").textContent = field.name.replaceAll("_", " ") + (field.shown ? ` [${field.shown}]` : "");
     part("ticks").replaceChildren(...ticks.map((tick) => Object.assign(document.createElement("span"), { textContent: tick })));
     part("slack").hidden = !field.grey;
+    part("bar").style.background = `linear-gradient(to right, ${this.shades(field).join()})`;
     const all = part("own").checked ? "range of this frame" : "one range for all frames";
     part("bar").setAttribute("aria-label", `Colours of ${field.name}: from ${ticks[0]} to ${ticks.at(-1)} ${field.shown}, ${all}`);
   }
@@ -236,8 +244,6 @@ async function begin() {
   if (typeof DecompressionStream === "undefined") return fail();
   const head = JSON.parse(part("head").textContent);
   const arrays = await unpacked(head, part("data").textContent.trim());
-  const shades = [0, 32, 64, 96, 128, 160, 192, 224, 255].map((i) => `rgb(${arrays.colours.subarray(3 * i, 3 * i + 3).join()})`);
-  part("bar").style.background = `linear-gradient(to right, ${shades.join()})`;
   const model = new Model(head, arrays), canvas = part("canvas");
   window.refweb = new View(model, painterOf(model, canvas), canvas);
 }

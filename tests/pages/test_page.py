@@ -335,11 +335,11 @@ def test_statics_modes_and_a_single_frame(quick, tmp_path):
     solution = refweb.run(scene)
     found = Reader(solution.report(tmp_path / "memory.html").read_text())
     head = json.loads(found.scripts["head"])
-    assert head["kind"] == "static" and head["labels"][-1] == "load step 1"
+    assert head["kind"] == "static" and head["labels"][-1] == "step 1"
     modes = refweb.modes(scene, out=tmp_path / "modes", number=2)
     found = Reader(page.report(tmp_path / "modes").read_text())
     head = json.loads(found.scripts["head"])
-    assert head["kind"] == "modes" and head["labels"][0].startswith("mode 1: ") and head["labels"][0].endswith("Hz")
+    assert head["kind"] == "modes" and head["labels"][0].startswith("mode 1, ") and head["labels"][0].endswith("Hz")
     assert f"{modes.frequency[0]:.3g}"[:3] in head["labels"][0]
 
 
