@@ -18,7 +18,7 @@ def html(content):
     return content if isinstance(content, Html) else Html(escape(str(content)))
 
 
-def tag(name, content="", **attributes):
+def tag(name, content: str | list | tuple = "", **attributes):
     """An element around its content; ``class_`` is the attribute class, and _ in a name of others stands for -."""
     given = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(str(value))}"' for key, value in attributes.items())
     return Html(f"<{name}{given}>{html(content)}</{name}>")
