@@ -7,6 +7,7 @@ import base64
 import hashlib
 import html.parser
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -374,8 +375,8 @@ def test_the_verbs(hit, quick, tmp_path, monkeypatch, capsys):
     assert main(["view", str(folder)]) == 0
     written = (folder / "report.html").stat().st_mtime_ns
     assert main(["view", str(folder)]) == 0 and (folder / "report.html").stat().st_mtime_ns == written
-    (folder / "run.json").touch()
-    assert main(["view", str(folder)]) == 0 and (folder / "report.html").stat().st_mtime_ns > written
+    os.utime(folder / "report.html", (1, 1))
+    assert main(["view", str(folder)]) == 0 and (folder / "report.html").stat().st_mtime > 1
     assert opened == [(folder / "report.html").as_uri()] * 3
     monkeypatch.setattr("webbrowser.open", lambda address: False)
     assert main(["view", str(folder)]) == 2
