@@ -52,7 +52,7 @@ def simulated(record):
         return section("simulated", "What was simulated", tag("p", "This folder holds no scene.toml that can be read."))
     present = [name for name in EFFECTS if scene.get(name)]
     absent = [name for name in EFFECTS if name not in present]
-    rows = [("web", [_keys(scene.get("web", {})), _sizes(record.summary.get("web") or {})])]
+    rows: list = [("web", [_keys(scene.get("web", {})), _sizes(record.summary.get("web") or {})])]
     rows.append(("cable", _cable(scene.get("cable", {}))))
     supports = [_keys(one) for name in ("supports", "support") for one in _several(scene.get(name))]
     rows.append(("supports", [tag("div", one) for one in supports] or "the web's own"))
