@@ -1,5 +1,7 @@
 """Plot result folders: histories with ±, books, spectra; several over each other."""
 
+import sys
+
 
 def add_arguments(parser):
     """The folders, what is drawn of them, and where."""
@@ -14,7 +16,10 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Draw, and print where the plot is."""
+    """Draw, and print where the plot is; which folders lack what goes to the error stream."""
     from ..pictures.plots import plot
 
-    print(plot(arguments.folders, quantity=arguments.quantity, out=arguments.out))
+    found = plot(arguments.folders, quantity=arguments.quantity, out=arguments.out)
+    print(found.path)
+    for words in found.lacking:
+        print(f"refweb: {words}", file=sys.stderr)

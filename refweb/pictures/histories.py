@@ -56,14 +56,12 @@ def _time(value, factor, name):
 def marks(axes, shown, second):
     """Mark events by lines across, with their names where one run is shown."""
     for s in shown:
-        for event in s.record.summary.get("events") or []:
-            if event.get("time") is None:
-                continue
-            axes.axvline(event["time"] / second, color=s.ink.colour if s.name else PALE, linestyle=":", linewidth=1.2)
+        for name, time in s.events:
+            axes.axvline(time / second, color=s.ink.colour if s.name else PALE, linestyle=":", linewidth=1.2)
             if not s.name:
-                place = {"xy": (event["time"] / second, 0.97), "xycoords": axes.get_xaxis_transform()}
+                place = {"xy": (time / second, 0.97), "xycoords": axes.get_xaxis_transform()}
                 look = {"rotation": 90, "ha": "right", "va": "top", "fontsize": LETTERS - 2, "color": DARK}
-                axes.annotate(str(event["name"]), **place, **look, parse_math=False)
+                axes.annotate(name, **place, **look, parse_math=False)
 
 
 def steps(shown, name):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import io
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest, short
@@ -83,10 +83,15 @@ def draw(records, what=None):
     InputError
         For a name that no record has, with the nearest; records of several kinds, or without rows.
     """
-    shown, notes = _beside([records] if isinstance(records, Record) else list(records))
+    return _drawn([records] if isinstance(records, Record) else list(records), what)[0]
+
+
+def _drawn(records, what):
+    """The figure of some records, and which of them lack what, in words."""
+    shown, notes = _beside(records)
     names = [what] if isinstance(what, str) else list(what or _usual_of_all(shown))
     panels, missing = [], {}
-    for name in dict.fromkeys(names):
+    for name in dict.fromkeys(_meant(shown, name) for name in names):
         having = [s for s in shown if _has(s, name)]
         if not having:
             known = dict.fromkeys(k for s in shown for k in (*kinds(s.record), *s.units))
@@ -96,10 +101,17 @@ def draw(records, what=None):
         panels += _panels(having, name)
         for s in shown:
             missing.setdefault(s.name, []).extend([name] if s not in having else [])
-    notes += [f"{who} has no {', '.join(names)}" for who, names in missing.items() if names]
-    figure = sheet(panels, _title(shown), notes)
+    lacking = tuple(f"{who} has no {', '.join(names)}" for who, names in missing.items() if names)
+    figure = sheet(panels, _title(shown), [*notes, *lacking])
     setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
-    return figure
+    return figure, lacking
+
+
+def _meant(shown, name):
+    """What a name stands for in full: a spectrum alone is that of the first observable that there is."""
+    if name == "spectrum" and not any(name in s.units for s in shown):
+        return next((SPECTRUM + s.observables[0] for s in shown if s.observables), name)
+    return name
 
 
 def _usual_of_all(shown):
@@ -145,9 +157,7 @@ def _has(s, name):
     """Whether a record has what a name stands for."""
     if name.startswith(SPECTRUM) and name not in s.units:
         return s.record.kind == "dynamic" and name.removeprefix(SPECTRUM) in list(s.units)[1:]
-    if name == "spectrum":
-        return s.record.kind == "dynamic" and bool(s.observables)
-    return name in s.units or name in kinds(s.record)
+    return name in s.units or (name in kinds(s.record) and name != "spectrum")
 
 
 def _panels(shown, name):
@@ -159,11 +169,18 @@ def _panels(shown, name):
         return histories.steps(shown, name) if kind == "static" else histories.of_modes(shown, name)
     if name == "frequencies":
         return histories.frequencies(shown)
-    if name.startswith(SPECTRUM) or name == "spectrum":
-        return spectra.spectrum(shown, name.removeprefix(SPECTRUM) if ":" in name else shown[0].observables[0])
+    if name.startswith(SPECTRUM):
+        return spectra.spectrum(shown, name.removeprefix(SPECTRUM))
     if name.endswith(DISTANCE):
         return distances.distances(shown, name.removesuffix(DISTANCE))
     return books.energy(shown) if name == "energy" else books.momentum(shown)
+
+
+class Plotted(NamedTuple):
+    """The file that holds a plot, and which folders lack what was asked for, in words."""
+
+    path: Path
+    lacking: tuple[str, ...]
 
 
 def plot(folders, quantity=None, out=None):
@@ -180,8 +197,7 @@ def plot(folders, quantity=None, out=None):
 
     Returns
     -------
-    pathlib.Path
-        The file written.
+    Plotted
 
     Raises
     ------
@@ -193,8 +209,9 @@ def plot(folders, quantity=None, out=None):
     if len({record.name for record in records}) < len(records):
         records = [r._replace(name=str(folder)) for r, folder in zip(records, folders, strict=True)]
     path = target(folders[0] / "plot.png" if out is None else out, ENDINGS)
-    write(draw(records, quantity), path)
-    return path
+    figure, lacking = _drawn(records, quantity)
+    write(figure, path)
+    return Plotted(path, lacking)
 
 
 def write(figure, path):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InputError
 from ..results.solution import Result, read_results
 from ..results.units import other_errors, readable, scale_of
 from .record import Record
@@ -37,7 +38,10 @@ class Shown:
     @functools.cached_property
     def units(self):
         """Unit of each column of the history by name, "1" of numbers; the first is time, load step or mode."""
-        return dict(column.removesuffix("]").rsplit(" [", 1) for column in self.record.table()[0] if " [" in column)
+        columns = self.record.table()[0]
+        if not all(column.endswith("]") and " [" in column for column in columns):
+            raise InputError(f"{self.record.name}: the columns of its history have no names with units")
+        return dict(column.removesuffix("]").rsplit(" [", 1) for column in columns)
 
     @property
     def history(self):
@@ -66,6 +70,12 @@ class Shown:
     def results(self):
         """Results by name, each a `refweb.results.solution.Result`; none while the run goes on."""
         return _results(self.record.summary)
+
+    @property
+    def events(self):
+        """Names and times [s] of the events that happened."""
+        found = [event for event in self.record.summary.get("events") or [] if event.get("time") is not None]
+        return [(str(event.get("name")), float(event["time"])) for event in found]
 
     @functools.cached_property
     def steps(self):

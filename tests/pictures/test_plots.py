@@ -330,6 +330,9 @@ def test_what_a_run_that_failed_has(runs, tmp_path):
     figure = plots.draw(of_folder(folder, seen=False))
     assert "run failed" in texts(figure) and "it broke" in texts(figure)
     assert len(of(figure, "deflection").get_lines()[0].get_xdata()) == 19
+    (folder / "history.csv").write_text("\n")
+    with pytest.raises(InputError, match="no names with units"):
+        plots.plot([folder])
     (folder / "history.csv").write_text(lines[0] + "\n")
     with pytest.raises(InputError, match="no rows"):
         plots.plot([folder])
@@ -340,7 +343,7 @@ def test_files_whose_text_is_text(runs, tmp_path):
     """Of an SVG in full, twice the same; a PDF and a PNG begin as such, and nothing else is left."""
     for ending, head in {"svg": b"<?xml", "pdf": b"%PDF", "png": b"\x89PNG"}.items():
         out = tmp_path / f"plot.{ending}"
-        assert plots.plot([runs / "static"], out=out) == out and out.read_bytes().startswith(head)
+        assert plots.plot([runs / "static"], out=out) == (out, ()) and out.read_bytes().startswith(head)
     text = (tmp_path / "plot.svg").read_text(encoding="utf-8")
     assert ">max_stress [" in text and ">load step<" in text
     plots.plot([runs / "static"], out=tmp_path / "again.svg")
@@ -418,3 +421,10 @@ def test_the_verb(runs, tmp_path, monkeypatch, capsys):
     assert 'did you mean "deflection"?' in capsys.readouterr().err
     assert main(["run", str(runs / "static.toml"), "--out", "a", "--force"]) == 0
     assert not list((tmp_path / "a").glob("plot.*"))
+    lines = (runs / "again" / "history.csv").read_text().splitlines()
+    shutil.copytree(runs / "again", "b")
+    (tmp_path / "b" / "history.csv").write_text("\n".join(",".join(line.split(",")[:2]) for line in lines) + "\n")
+    both = ["plot", "b", str(runs / "dynamic"), "--quantity"]
+    assert main([*both, "speed"]) == main([*both, "spectrum", "--quantity", "energy"]) == 0
+    said = capsys.readouterr()
+    assert said.err == "refweb: b has no speed\nrefweb: b has no energy\n" and "b/plot.png\nb/plot.png" in said.out
