@@ -141,8 +141,8 @@ def _drifts(shown, what, second, clock):
 
 
 def _share(s, key, what):
-    """How far a book is open, as ``run.json`` says it."""
-    found = (s.record.summary.get("solver") or {}).get(key)
+    """How far a book is open, as ``run.json`` says it of a run that has ended."""
+    found = None if s.record.status == "running" else (s.record.summary.get("solver") or {}).get(key)
     return "" if found is None else f"{what} drift {found:.1e} of the largest {what}"
 
 

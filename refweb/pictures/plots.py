@@ -132,7 +132,7 @@ def _beside(records):
         raise InputError(f"{' and '.join(found)} runs have no axis in common: plot them one by one")
     single = len(records) == 1
     shown = [Shown(r, "" if single else r.name, Ink.of(n)) for n, r in enumerate(records)]
-    notes = [s.said(_ended(s.record)) for s in shown if s.record.status != "solved"]
+    notes = [_remark(s) for s in shown if _status(s.record)]
     empty = [s for s in shown if not len(s.along)]
     if len(empty) == len(shown):
         raise InputError(f"{records[0].name}: its history has no rows, so there is nothing to plot")
@@ -140,16 +140,21 @@ def _beside(records):
     return [s for s in shown if s not in empty], notes
 
 
-def _ended(record):
-    """How a run ended that is not solved."""
-    message = str(record.summary.get("message") or "")
-    return f"run {record.status}" + (f": {message[:200]}" if message else "")
+def _status(record):
+    """How a run ended that is not solved, in words; empty of one that is."""
+    return {"solved": "", "running": "run not ended"}.get(record.status, f"run {record.status}")
+
+
+def _remark(s):
+    """What is to be said below of a run that is not solved: its message, and its status where others are shown."""
+    message = str(s.record.summary.get("message") or "")[:200] if _status(s.record) else ""
+    return s.said(": ".join(filter(None, [_status(s.record) if s.name else "", message])))
 
 
 def _title(shown):
     titles = list(dict.fromkeys(s.record.title[:100] for s in shown))
-    status = shown[0].record.status
-    note = f" — run {status}" if len(shown) == 1 and status != "solved" else ""
+    words = _status(shown[0].record) if len(shown) == 1 else ""
+    note = f" — {words}" if words else ""
     return (", ".join(titles) if len(titles) <= 3 else f"{len(shown)} runs") + note
 
 

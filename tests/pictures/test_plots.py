@@ -329,6 +329,11 @@ def test_what_a_run_that_failed_has(runs, tmp_path):
     (folder / "web.pvd").unlink()
     figure = plots.draw(of_folder(folder, seen=False))
     assert "run failed" in texts(figure) and "it broke" in texts(figure)
+    assert "half: run failed: it broke" in texts(plots.draw([of_folder(folder, seen=False), of_folder(runs / "again")]))
+    alive = json.dumps({**run, "status": "running", "results": {}})
+    (folder / "run.json").write_text(alive)
+    words = texts(plots.draw(of_folder(folder, seen=False)))
+    assert "run not ended" in words and "of the largest energy" not in words
     assert len(of(figure, "deflection").get_lines()[0].get_xdata()) == 19
     (folder / "history.csv").write_text("\n")
     with pytest.raises(InputError, match="no names with units"):
