@@ -99,7 +99,9 @@ def _loaded(record, frame):
     if not loads or not 0 < count <= len(nodes) or "line" in frame.fields:
         return None
     try:
-        web = Web(points=nodes[:count], lines=frame.ends, kind=str(record.scene.get("web", {}).get("kind", "inline")))
+        web = Web(
+            points=nodes[:count], lines=frame.ends, kind=str((record.scene.get("web") or {}).get("kind", "inline"))
+        )
         found = np.unique(np.concatenate([web.find(load["node"]) for load in loads]))
     except (InputError, KeyError, ValueError):  # a name that the scene alone knows
         return None

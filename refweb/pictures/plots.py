@@ -17,7 +17,7 @@ from . import books, distances, histories, spectra
 from .pictures import png, target
 from .record import Record, of_folder
 from .sheet import Ink, sheet
-from .shown import Shown
+from .shown import Shown, refuse_spoilt
 
 ENDINGS = ("png", "svg", "pdf")
 """Formats of plots."""
@@ -34,6 +34,7 @@ def kinds(record):
 
     Besides these any column of its table can be drawn, and ``spectrum:`` before one of a dynamic run.
     """
+    refuse_spoilt(record)
     shown = Shown(record, "", Ink.of(0))
     if record.kind == "modes":
         return {"frequencies": "Natural frequencies with ±"}
@@ -125,6 +126,7 @@ def _beside(records):
     if not records:
         raise InputError("there is nothing to plot: name a result folder")
     for record in records:
+        refuse_spoilt(record)
         if (kind := record.summary.get("kind")) not in (None, "modes"):
             words = NOT_OURS.get(kind, "plots are of runs and of modes")
             raise InputError(f"{record.name}: holds {short(str(kind))}, not a run: {words}")

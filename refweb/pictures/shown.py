@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,8 +57,7 @@ class Shown:
     @property
     def observables(self):
         """Names of the observables among the columns."""
-        asked = self.record.scene.get("observe")
-        names = [one.get("name") for one in asked] if isinstance(asked, list) else list(self.results)
+        names = [one.get("name") for one in self.record.scene.get("observe") or []] or list(self.results)
         return [name for name in names if name in self.units]
 
     @property
@@ -80,8 +80,7 @@ class Shown:
     @functools.cached_property
     def steps(self):
         """Results of each load step: pairs of the step and its results by name."""
-        found = self.record.summary.get("steps")
-        return [(step["step"], _results(step)) for step in found if "step" in step] if isinstance(found, list) else []
+        return [(step["step"], _results(step)) for step in self.record.summary.get("steps") or []]
 
     def other_errors(self, name):
         """Errors of a result besides ±, in words."""
@@ -94,10 +93,25 @@ class Shown:
 
 
 def _results(summary):
+    return read_results(summary.get("results") or {})
+
+
+def refuse_spoilt(record):
+    """Refuse a record whose ``run.json`` or ``scene.toml`` is not what a run writes."""
+    run, scene = record.summary, record.scene
+    lists = [run.get("steps"), run.get("events"), scene.get("observe"), scene.get("load")]
+    tables = [run.get("web"), run.get("solver"), run.get("bodies"), scene.get("web")]
     try:
-        return read_results(summary.get("results") or {})
-    except (TypeError, ValueError, AttributeError):  # not what a run writes
-        return {}
+        found = [isinstance(one, dict) for several in lists for one in several or []]
+        found += [isinstance(one or {}, dict) for one in tables] + [isinstance(run.get("kind"), str | None)]
+        results = [_results(given) for given in (run, *(run.get("steps") or []))]
+        found += [math.isfinite(one.time) for given in results for one in given.values()]
+        found += [math.isfinite(step["step"]) for step in run.get("steps") or []]
+        found += [math.isfinite(body["overlap"]) and "line" in body for body in (run.get("bodies") or {}).values()]
+    except (TypeError, ValueError, AttributeError, KeyError):
+        found = [False]
+    if not all(found):
+        raise InputError(f"{record.name}: its run.json or scene.toml is not what a run of refweb writes")
 
 
 def unit_of(unit, *values):

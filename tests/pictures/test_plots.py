@@ -401,6 +401,29 @@ def test_places_and_folders_that_cannot_be(runs, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
 
 
+SPOILT = {
+    "web": [3, ["a"]],
+    "results": [3, "x", [3], {"a": 3}, {"a": {"value": "x", "error": None, "unit": "m", "time": 0.0, "where": None}}],
+    "steps": [3, "x", [3], [{}], [{"step": "x"}]],
+    "events": [3, "x", ["a"]],
+    "solver": ["x", [3]],
+    "bodies": ["x", {"a": 3}, {"a": {"line": 3}}],
+    "kind": [3, ["modes"]],
+}
+
+
+@pytest.mark.parametrize("key", SPOILT)
+def test_a_summary_that_no_run_has_written(runs, key):
+    """Is refused in one line; one that says nothing of it is drawn."""
+    record = of_folder(runs / "dynamic")
+    for given in SPOILT[key]:
+        for look in (plots.kinds, plots.draw):
+            with pytest.raises(InputError, match="is not what a run of refweb writes"):
+                look(record._replace(summary={**record.summary, key: given}))
+    bare = {name: value for name, value in record.summary.items() if name != key}
+    assert plots.draw(record._replace(summary=bare), "deflection").axes
+
+
 def test_from_memory_and_loaded_alike(runs, tmp_path):
     """With and without a folder, a run gives the same figure, which a notebook shows."""
     scene = refweb.Scene.load(runs / "dynamic.toml")
