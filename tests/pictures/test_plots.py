@@ -11,9 +11,8 @@ from nets import SMALL
 import refweb
 from refweb.__main__ import main
 from refweb.errors import InputError
-from refweb.pictures import books, distances, plots
+from refweb.pictures import books, distances, plots, sheet
 from refweb.pictures.record import of_folder
-from refweb.pictures.sheet import Ink, telling
 from refweb.pictures.shown import Shown
 from refweb.pictures.spectra import FEWEST, spectrum_of
 
@@ -64,8 +63,13 @@ def runs(tmp_path_factory):
     return place
 
 
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    monkeypatch.setattr(sheet, "RESOLUTION", 40)
+
+
 def shown(folder, name=""):
-    return Shown(of_folder(folder), name, Ink.of(0))
+    return Shown(of_folder(folder), name, sheet.Ink.of(0))
 
 
 def texts(figure):
@@ -308,14 +312,14 @@ def test_a_long_history_keeps_its_extremes(rows):
     values = np.sin(np.arange(rows) * 1e-3)
     values[[rows // 3, rows // 2]] = 7.0, -7.0
     values[1234] = np.nan
-    assert 1234 not in telling(values)
-    keep = telling(values, values[::-1])
+    assert 1234 not in sheet.telling(values)
+    keep = sheet.telling(values, values[::-1])
     assert len(keep) < 4100 and {0, rows - 1, rows // 3, rows // 2, rows - 1 - rows // 3} <= set(keep.tolist())
     parts = np.array_split(values, 500)
     drawn = np.interp(np.arange(rows), keep, np.nan_to_num(values[keep]))
     for part, there in zip(parts, np.array_split(drawn, 500), strict=True):
         assert np.nanmax(part) == pytest.approx(there.max(), abs=2e-3 * rows / 1000)
-    assert np.array_equal(telling(values[:100]), np.arange(100))
+    assert np.array_equal(sheet.telling(values[:100]), np.arange(100))
 
 
 def test_what_a_run_that_failed_has(runs, tmp_path):
