@@ -2,8 +2,6 @@
 
 import pathlib
 
-from ..errors import InputError
-
 
 def add_arguments(parser):
     """The folder, what is drawn of it, how and where."""
@@ -34,10 +32,7 @@ def run(arguments):
         if arguments.animate:
             from ..pictures.film import animate
 
-            if arguments.frame is not None:
-                raise InputError(f"--frame {arguments.frame} and --animate exclude each other: leave one out")
             out = folder / "web.gif" if out is None else out
-            del options["frame"], options["time"]
             animate(folder, out, **options, progress=tell)
         else:
             out = folder / "web.png" if out is None else out

@@ -66,6 +66,10 @@ class View:
         flat = np.array([x, y]) * self.half * (-depth if self.perspective else 1.0)
         return self.centre + np.array([*flat, depth]) @ self.axes
 
+    def wider(self, factor):
+        """The view that shows more, by a factor; itself where that is less than 1."""
+        return replace(self, half=tuple(half * factor for half in self.half)) if factor > 1 else self
+
     def shows(self, points):
         """Whether some of what spans these points [m], shape (points, 3), lies within the frame."""
         if not len(points):
@@ -165,9 +169,7 @@ def _pair(oblique, side, near, points, aspect):
     widths = [min(v.share(points) * r[2] for v, r in zip(views, where, strict=True)) for where, *views in found]
     (first, second), large, small = found[int(widths[1] > 1.15 * widths[0])]
     wider = small.share(points) * second[2] / (large.share(points) * first[2])
-    if wider > 1:
-        small = replace(small, half=(small.half[0] * wider, small.half[1] * wider))
-    return [large, small], [first, second]
+    return [large.wider(1 / wider), small.wider(wider)], [first, second]
 
 
 def _fitted(oblique, side, near, aspect, rectangles):

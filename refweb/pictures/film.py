@@ -1,53 +1,171 @@
-"""Films of a run: all its frames, with one camera and one range of colours; of a mode its swing."""
+"""Films of a run: all its frames, with one camera and one range of colours; of a mode a period of its swing.
+
+One renderer is kept for all frames. What stands around the web is drawn once; of a frame only the web and its time are.
+Frames are read, drawn and written one after the other.
+"""
 
 from __future__ import annotations
 
-import io
+import functools
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from ..errors import InputError
 from ..results.files import write_atomically
-from . import render
+from . import moving, render
 from .pictures import blank_page, clock_line, look_of, record_of, target, with_supports
-from .stage import DARK, PALE, Seen, Stage
+from .polygons import flat_images
+from .stage import DARK, PALE, Seen, Stage, colour_map
 
 SIZE = (1200, 750)
 """Of a film [pixel]."""
+PHASES, SWINGS = 24, 12.0
+"""Images of a period of a mode, and of them in a second [1/s]."""
+SAMPLES = 6
+"""Images that a GIF has its colours of."""
 
 
-def animate(source, out, field=None, range=None, scale=1.0, view=None, fps=10.0, progress=None):
-    """Draw all frames of a run as a GIF."""
-    from PIL import Image
+def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.0, view=None, fps=10.0, progress=None):
+    """Draw all frames of a run as a film, or one of its modes as it swings.
 
-    out = target(out, ["gif"])
+    Parameters
+    ----------
+    source, field, range, scale, view
+        As for `refweb.picture`.
+    out : path-like
+        A ``.gif``, or where ffmpeg is found an ``.mp4``.
+    frame : int, optional
+        The number of a mode.
+    time : float, optional
+        The same; neither means anything for what is no mode.
+    fps : float
+        Frames per second [1/s], > 0 and ≤ 50; the last one stays for a second. A mode swings once in two seconds.
+    progress : callable, optional
+        Called with a line of text and the share that is done, 0 to 1.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        As for `refweb.picture`; for an ``.mp4`` without ffmpeg.
+    """
+    record = record_of(source)
+    out = target(out, moving.ENDINGS)
+    if out.suffix.lower() == ".mp4":
+        moving.ffmpeg()
     if not 0 < fps <= 50:
         raise InputError(f"fps = {fps} must be > 0 and ≤ 50 [1/s]")
-    record = record_of(source)
-    frames = [with_supports(record, record.frame(number)) for number in record.times]
-    look = look_of(record, frames[-1], field, range, scale, view)
-    frames = [frame.posed(look.scale) for frame in frames]
-    seen = Seen.of(frames[0], look.field).spanned()
-    for frame in frames[1:]:
-        seen = seen.joined(Seen.of(frame, look.field).spanned())
-    stage = Stage.of(seen, look, SIZE[0] / SIZE[1])
-    models, film = [stage.model(frame) for frame in frames], []
-    drawn = render.images(models, stage.views, stage.pixels(SIZE))
-    for i, frame in enumerate(frames):
-        page = blank_page(stage, record.title, SIZE)
-        images = render.unpack(drawn[i]) if drawn else [None] * len(stage.views)
-        for axes, view, one, (_, height) in zip(page.axes, stage.views, images, stage.pixels(SIZE), strict=False):
-            if one is not None:
-                axes.imshow(one, extent=view.extent, aspect="auto", interpolation="none", zorder=0)
-            else:
-                render.polygons(axes, models[i], view, height)
-            axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
-        page.text(0.03, 0.905, clock_line(record, frame.number, look), size=16, color=DARK, parse_math=False)
-        page.text(0.985, 0.015, f"frame {frame.number}", size=11, color=PALE, ha="right")
-        image = io.BytesIO()
-        page.savefig(image, format="png")
-        film.append(Image.open(image).convert("RGB").quantize())
-        if progress is not None:
-            progress("drawing frames", len(film) / len(frames))
-    duration = [round(1000 / fps)] * (len(film) - 1) + [1000]
-    rest = dict(save_all=True, append_images=film[1:], duration=duration, loop=0)
-    write_atomically(out, lambda name: film[0].save(name, **rest))
+    if record.kind != "modes" and (frame is not None or time is not None):
+        name, value = ("time", f"{time:g}") if frame is None else ("frame", frame)
+        raise InputError(f"{name} = {value}: a film has all frames, leave it out")
+    poses = _poses(record, frame, time)
+    first = record.frame(poses[0].number)
+    look = look_of(record, first, field, range, scale, view)
+    film = _Film(record, poses, look, fps)
+    write_atomically(out, lambda name: film.write(Path(name), progress or (lambda text, share: None)))
     return out
+
+
+class Pose(NamedTuple):
+    """An image of a film: the number of its frame, and −1…1 of the swing of a mode."""
+
+    number: int
+    phase: float
+
+
+def _poses(record, frame, time):
+    if record.kind != "modes":
+        record.chosen(-1)
+        return [Pose(number, 1.0) for number in record.times]
+    number = record.chosen(frame, time)
+    return [Pose(number, float(phase)) for phase in np.cos(2 * np.pi * np.arange(PHASES) / PHASES)]
+
+
+class _Film:
+    """The images of a film, and how they are written."""
+
+    def __init__(self, record, poses, look, fps):
+        self._record, self._poses, self._look = record, poses, look
+        self._swings = record.kind == "modes"
+        self._fps = SWINGS if self._swings else fps
+        self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
+
+    def write(self, path, progress):
+        """Write it; ``progress`` is told how far it is."""
+        self._stage = self._survey(progress)
+        self._sizes = self._stage.pixels(SIZE)
+        self._around = self._page()
+        count = len(self._poses)
+        ahead = sorted({round(i) for i in np.linspace(0, count - 1, min(count, SAMPLES))})
+        gif = path.suffix.lower() == ".gif"
+        with render.Renderer(self._stage.views, self._sizes, render.COARSE) as renderer:
+            drawn = {i: self._image(renderer, self._poses[i]) for i in ahead} if gif else {}
+            film = moving.writer(
+                path, SIZE, self._fps, list(drawn.values()), colour_map()(np.linspace(0, 1, 64))[:, :3]
+            )
+            try:
+                for i, pose in enumerate(self._poses):
+                    image = drawn.pop(i) if i in drawn else self._image(renderer, pose)
+                    film.add(image, moving.LAST if i == count - 1 and not self._swings else 0.0)
+                    progress("drawing frames", (i + 1) / count)
+                film.close()
+            except BaseException:
+                film.abandon()
+                raise
+
+    def _frame(self, pose):
+        return with_supports(self._record, self._record.frame(pose.number)).posed(self._look.scale, pose.phase)
+
+    def _survey(self, progress):
+        """The stage that shows all images; of a swing its two ends and its middle do."""
+        ends = {max, min}
+        poses = [end(self._poses, key=lambda pose: pose.phase) for end in ends] if self._swings else self._poses
+        seen = None
+        for pose in poses:
+            progress("reading frames", 0.0)
+            here = Seen.of(self._frame(pose), self._look.field).spanned()
+            seen = here if seen is None else seen.joined(here)
+        return Stage.of(seen, self._look, SIZE[0] / SIZE[1])
+
+    def _page(self):
+        """What stands around the web, with transparency: an image, RGBA."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from PIL import Image
+
+        page = blank_page(self._stage, self._record.title, SIZE)
+        for patch in (page.patch, *(axes.patch for axes in page.axes)):
+            patch.set_alpha(0.0)
+        canvas = FigureCanvasAgg(page)
+        canvas.draw()
+        return Image.fromarray(np.asarray(canvas.buffer_rgba()).copy())
+
+    def _image(self, renderer, pose):
+        """The whole page of a frame, an image, RGB."""
+        from PIL import Image, ImageDraw
+
+        model = self._stage.model(self._frame(pose))
+        views = renderer.images(model) or flat_images(model, self._stage.views, self._sizes)
+        page = Image.new("RGB", SIZE, "white")
+        for view, (left, bottom, _, height) in zip(views, self._stage.rectangles, strict=True):
+            page.paste(Image.fromarray(view), (round(left * SIZE[0]), round((1 - bottom - height) * SIZE[1])))
+        page.paste(self._around, mask=self._around)
+        pen = ImageDraw.Draw(page)
+        clock = clock_line(self._record, pose.number, self._look, self._decimals)
+        pen.text((0.03 * SIZE[0], 0.095 * SIZE[1]), clock, DARK, _letters(16), "ls")
+        pen.text((0.985 * SIZE[0], 0.985 * SIZE[1]), f"frame {pose.number}", PALE, _letters(11), "rs")
+        return page
+
+
+@functools.cache
+def _letters(points):
+    """The letters of matplotlib, in points on a page of 16 inches."""
+    from matplotlib.font_manager import findfont
+    from PIL import ImageFont
+
+    return ImageFont.truetype(findfont("DejaVu Sans"), points / 72 * SIZE[0] / 16)

@@ -106,7 +106,7 @@ def listed(folder):
         Where ``web.pvd`` cannot be read or lists no web.
     """
     if not Path(folder).is_dir():
-        raise InputError(f'"{folder}" is not a folder')
+        raise InputError(f"{folder} is not a folder")
     try:
         sets = list(ElementTree.parse(Path(folder) / "web.pvd").iter("DataSet"))
     except FileNotFoundError:

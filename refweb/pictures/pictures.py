@@ -3,7 +3,8 @@
 A web is seen twice: in perspective, and from the side with metres along the axes. What lies in a plane, such as a
 hanging cable, is seen once, along the normal of the plane. Colours have one range in all frames of a run, so that two
 pictures of it can be held against each other. Slack lines are grey where the field is a tension, stress or strain.
-Nothing needs a display: `refweb.pictures.render` renders by OpenGL off screen, and by matplotlib where it cannot.
+Nothing needs a display: `refweb.pictures.render` renders by OpenGL off screen, and `refweb.pictures.polygons` where it
+cannot.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ..messages import nearest, shown
 from ..results.files import write_atomically
 from . import render
 from .camera import VIEWS
+from .polygons import polygons
 from .record import of_folder, of_solution
 from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
@@ -62,8 +64,9 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
     InputError
         No result folder, no such frame, field, view or format; names the nearest valid one.
     """
+    record = record_of(source)
     out = None if out is None else target(out)
-    page = drawn(record_of(source), frame, time, field, range, scale, view)
+    page = drawn(record, frame, time, field, range, scale, view)
     if out is not None:
         write_atomically(out, functools.partial(page.savefig, dpi="figure"))
     return page
@@ -79,12 +82,12 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
     model = stage.model(posed)
     images = render.images([model], stage.views, stage.pixels(SIZE))
     page = blank_page(stage, record.title, SIZE)
-    rest = render.unpack(images[0]) if images else [None] * len(stage.views)
+    rest = images[0] if images and images[0] else [None] * len(stage.views)
     for axes, view, image, (_, height) in zip(page.axes, stage.views, rest, stage.pixels(SIZE), strict=False):
         if image is not None:
             axes.imshow(image, extent=view.extent, aspect="auto", interpolation="none", zorder=0)
         else:
-            render.polygons(axes, model, view, height)
+            polygons(axes, model, view, height)
         axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
     page.text(0.03, 0.905, clock_line(record, number, look), size=16, color=DARK, parse_math=False)
     page.text(0.985, 0.015, f"frame {number}", size=11, color=PALE, ha="right")
@@ -112,9 +115,9 @@ def with_supports(record, frame):
     return frame._replace(supports=last.supports, lifted=last.lifted)
 
 
-def clock_line(record, number, look):
+def clock_line(record, number, look, decimals=None):
     """What stands below the title: when it is, what is exaggerated, and how a run that is not solved ended."""
-    parts = [record.clock(number)]
+    parts = [record.clock(number, decimals)]
     if look.scale != 1:
         parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {look.scale:g}")
     if record.status != "solved":

@@ -72,9 +72,14 @@ class Record(NamedTuple):
         """How it ended."""
         return str(self.summary.get("status", "solved"))
 
-    def clock(self, number):
-        """When a frame is, in words: its time or load step, of a mode its number and frequency with ±."""
+    def clock(self, number, decimals=None):
+        """When a frame is, in words: its time or load step, of a mode its number and frequency with ±.
+
+        ``decimals`` of a time are six digits less those before the point, or as many as are asked for.
+        """
         text = CLOCKS.get(self.kind, CLOCKS["dynamic"]).format(self.times[number])
+        if self.kind == "dynamic" and decimals is not None and decimals <= 6:
+            text = f"t = {self.times[number]:.{decimals}f} s"
         if self.kind == "modes":
             found = (self._steps or [{}])[-1].get("results", {}).get(f"frequency_{number}")
             text += f", {readable(found['value'], found['error'], found['unit'])}" if found else ""

@@ -88,7 +88,7 @@ class Seen(NamedTuple):
         return cls(points, frame.supports, bodies, frame.origin, moved, frame.tree, slack, least, most)
 
     def spanned(self):
-        """The same with only those points that span the others, to a hundredth of their extent."""
+        """The same with only those points that span the others, to two hundredths of their extent."""
         bodies = {name: _outermost(points) for name, points in self.bodies.items()}
         return self._replace(points=_outermost(self.points), supports=_outermost(self.supports), bodies=bodies)
 
@@ -151,8 +151,9 @@ class Stage:
         else:
             grey, (low, high) = _grey(frame, self.look.field), self.look.limits
             colours = colour_map()(np.clip((frame.fields[self.look.field] - low) / (high - low), 0, 1))[:, :3]
-        model: list[Tubes | Surface | Balls] = [Tubes(frame.paths[~grey], colours[~grey], self.radius)]
-        model.append(Tubes(frame.paths[grey], np.tile(SLACK, (grey.sum(), 1)), 0.8 * self.radius))
+        colours[grey] = SLACK
+        radius = np.where(grey, 0.8, 1.0) * self.radius
+        model: list[Tubes | Surface | Balls] = [Tubes(frame.paths, colours, radius)]
         if len(frame.supports):
             model.append(Balls(frame.supports, SUPPORT, 2.2 * self.radius))
         for i, body in enumerate(frame.bodies.values()):
@@ -166,7 +167,8 @@ class Stage:
         if view.perspective:
             axes.axis("off")
             depth = view.project(self.middle)[1]
-            _triad(axes, view, view.point(-0.88, -0.72, depth), _round(-0.12 * view.half[0] * depth))
+            length = _round(-0.1 / axes.get_position().width * view.half[0] * depth)
+            _triad(axes, view, view.point(-0.88, -0.72, depth), length)
             return
         axes.add_collection(LineCollection(view.project(self.origin)[0], colors=BEFORE, linewidths=0.8))
         axes.spines[["top", "right"]].set_visible(False)
@@ -192,7 +194,7 @@ class Stage:
             if self._seen_in(self.views, points):
                 marks.append(Line2D([], [], color=BODIES[i % len(BODIES)], marker="o", ls="", ms=13, label=_cut(name)))
         look = {"frameon": False, "fontsize": 13, "labelcolor": DARK, "handlelength": 1.6}
-        figure.legend(handles=marks, loc="upper left", bbox_to_anchor=(0.885, 0.32), **look)
+        figure.legend(handles=marks, loc="upper left", bbox_to_anchor=(0.876, 0.32), **look)
 
     @staticmethod
     def _seen_in(views, points):
@@ -228,13 +230,13 @@ def _outermost(points):
     """Those of points [m], shape (n, 3), that lie farthest in one of many directions."""
     if len(points) <= 300:
         return points
-    count = 400
+    count = 150
     height = 1 - 2 * (np.arange(count) + 0.5) / count
     turn = np.pi * (1 + 5**0.5) * np.arange(count)
     ring = np.sqrt(1 - height**2)
     directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
     directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
-    return points[np.unique((points @ directions.T).argmax(axis=0))]
+    return points[np.unique((directions.astype("f4") @ points.T.astype("f4")).argmax(axis=1))]
 
 
 def _triad(axes, view, corner, length):

@@ -1,5 +1,7 @@
 """Pictures of small result folders, by OpenGL where there is some and by matplotlib alone; their refusals; films."""
 
+import re
+import shutil
 import subprocess
 import sys
 
@@ -9,14 +11,17 @@ import pytest
 from PIL import Image
 
 import refweb
+from refweb.__main__ import main
 from refweb.errors import InputError
 from refweb.pictures import film as films
-from refweb.pictures import pictures
+from refweb.pictures import moving, pictures
 from refweb.pictures import render as drawing
-from refweb.pictures.camera import View
+from refweb.pictures.arrays import cell_arrays
+from refweb.pictures.camera import View, choose
 from refweb.pictures.frames import read
 from refweb.pictures.record import of_folder, of_solution
-from refweb.pictures.stage import Look, Seen, Stage, limits_of, scaled_unit
+from refweb.pictures.stage import SLACK, TWO, Look, Seen, Stage, colour_map, limits_of, scaled_unit
+from refweb.results.units import readable
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 FACES = np.array([[i, j, k] for i in (0, 1) for j in (2, 3) for k in (4, 5)])
@@ -101,8 +106,8 @@ def staged(frame, field="stress"):
     return Stage.of(Seen.of(frame, field), Look(field, (0.0, 1.0)), 1.6)
 
 
-def test_picture(film, monkeypatch):
-    monkeypatch.undo()
+def test_picture(film, monkeypatch, no_opengl):
+    monkeypatch.setattr(pictures, "SIZE", (1600, 1000))
     out = drawn(film)
     assert Image.open(out).size == (1600, 1000)
     count, share = colours(out)
@@ -125,10 +130,32 @@ def test_both_ways_of_drawing_show_the_same(film, monkeypatch, tmp_path):
 def test_a_window_that_kills_the_child_is_survived(film, monkeypatch, tmp_path, capfd):
     monkeypatch.setattr(drawing, "windows", lambda: [("vtkEGLRenderWindow", False)])
     code = "import os; os.write(2, b'bad X server'); os.kill(os.getpid(), 11)"
-    run = subprocess.run
-    monkeypatch.setattr(drawing.subprocess, "run", lambda c, **options: run([c[0], "-c", code], **options))
+    start = subprocess.Popen
+    monkeypatch.setattr(drawing.subprocess, "Popen", lambda c, **options: start([c[0], "-c", code], **options))
     assert colours(drawn(film, out=tmp_path / "web.png"))[0] > 500
     assert capfd.readouterr().err == ""
+
+
+def test_one_renderer_is_kept_for_a_film(film, monkeypatch, tmp_path):
+    """One child for all frames, which is gone at the end; its images are those of a child of their own."""
+    children, start = [], subprocess.Popen
+    monkeypatch.setattr(
+        drawing.subprocess, "Popen", lambda *a, **options: children.append(start(*a, **options)) or children[-1]
+    )
+    first = drawing.windows()[:1]
+    monkeypatch.setattr(drawing, "windows", lambda: list(first))
+    films.animate(film, tmp_path / "web.gif")
+    assert len(children) == 1 and children[0].returncode is not None
+    record = of_folder(film)
+    stage = staged(record.frame(10))
+    models = [stage.model(record.frame(number)) for number in record.times]
+    together = drawing.images(models, stage.views, [(300, 200), (300, 100)])
+    if together is None:
+        pytest.skip("no OpenGL here")
+    for model, images in zip(models, together, strict=True):
+        (alone,) = drawing.images([model], stage.views, [(300, 200), (300, 100)])
+        for a, b in zip(images, alone, strict=True):
+            np.testing.assert_array_equal(a, b)
 
 
 def test_cable_is_seen_along_the_normal_of_its_plane(no_opengl, tmp_path):
@@ -211,7 +238,9 @@ def test_slack_lines_are_grey_and_no_part_of_the_range(film):
     stage = staged(frame)
     assert frame.slack.any() and not frame.slack.all()
     assert limits_of(of_folder(film), "stress", [20])[0] == frame.fields["stress"][~frame.slack].min()
-    assert len(stage.model(frame)[1].paths) == frame.slack.sum()
+    tubes = stage.model(frame)[0]
+    grey = (tubes.colours == SLACK).all(axis=1)
+    assert (grey == frame.slack).all() and (tubes.radius[grey] < tubes.radius[~grey].min()).all()
 
 
 @pytest.mark.parametrize(
@@ -230,20 +259,224 @@ def test_units(field, largest, expected):
     assert (pytest.approx(factor), unit) == expected
 
 
-def test_refusals(film, tmp_path):
-    for options, words in (
+def words(page):
+    """All that is written on a page, and in its legend."""
+    entries = [text.get_text() for legend in page.legends for text in legend.get_texts()]
+    return [text.get_text() for text in page.texts], entries
+
+
+@pytest.fixture(scope="module")
+def hit():
+    """A net hit by a ball, in memory; the deflection is largest before the end."""
+    return refweb.run(
+        refweb.Scene(
+            title="Net hit by a ball",
+            web=refweb.Window(mesh="square", rows=4, columns=4, side=0.25),
+            cable=refweb.Cable(law="tension-only", modulus=7e6, area=1e-5, density=1000.0),
+            effects=[
+                refweb.Body(name="ball", radius=0.2, mass=0.2, position=(0.02, 0.03, -0.21), velocity=(0, 0, 3)),
+                refweb.Contact(stiffness=1e4),
+            ],
+            solve=refweb.Dynamic(duration=0.18),
+            output=refweb.Output(interval=2e-3, frames=5),
+            observe=[refweb.Observe(name="deflection", quantity="displacement", reduce="max")],
+        )
+    )
+
+
+def test_the_frame_of_the_largest_value_is_shown(hit, no_opengl):
+    """Of the first observable; the heading says when."""
+    record, largest = of_solution(hit), hit.results["deflection"].time
+    number = record.chosen()
+    assert largest < 0.8 * hit.state.time and number != max(record.times)
+    assert abs(record.times[number] - largest) == min(abs(time - largest) for time in record.times.values())
+    assert f"t = {record.times[number]:.6g} s" in words(hit.picture())[0]
+    assert record.chosen(time=0.031) == 15 and record.chosen(time=1e9) == max(record.times) == record.chosen(-1)
+
+
+def test_the_step_of_the_largest_value_is_shown():
+    """Of a sag that springs push back, which is largest at the step in the middle."""
+    cable = refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1e4)
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2])
+    scene = refweb.Scene(
+        web=web,
+        cable=cable,
+        effects=[refweb.Load(node=1, force=(0, 0, -5))],
+        solve=refweb.Static(load_steps=[1.0, 3.0, 2.0]),
+        observe=[refweb.Observe(name="sag", quantity="displacement", reduce="max")],
+    )
+    record = of_solution(refweb.run(scene))
+    assert record.times[record.chosen()] == 3.0 and record.clock(record.chosen()) == "step 3"
+
+
+def test_one_range_for_all_frames_of_a_run(film, hit, no_opengl, tmp_path):
+    """That of all their values, from single arrays of files as from whole frames; and others that are asked for."""
+    for record in (of_folder(film), of_solution(hit)):
+        values = [record.frame(number) for number in record.times]
+        taut = np.concatenate([frame.fields["stress"][~frame.slack] for frame in values])
+        least = taut.min() if taut.min() > 0.5 * taut.max() else 0.0
+        for frame in values:
+            assert pictures.look_of(record, frame, None, None, 1.0, None).limits == (least, taut.max())
+            auto = pictures.look_of(record, frame, None, "auto", 1.0, None).limits
+            assert auto == limits_of(record, "stress", [frame.number])
+        assert pictures.look_of(record, values[0], None, (1, 2e3), 1.0, None).limits == (1.0, 2e3)
+    hit.save(tmp_path / "hit")
+    record = of_folder(tmp_path / "hit")
+    for name in ("stress", "velocity"):
+        for number in record.times:
+            np.testing.assert_array_equal(record.values(number, name).field, record.frame(number).fields[name])
+    assert cell_arrays(tmp_path / "hit" / "frames" / "web_000000.vtu", ("velocity",)) is None
+    assert cell_arrays(tmp_path / "hit" / "frames" / "ball_000000.vtu", ("stress",)) is None
+
+
+def test_a_range_that_is_left_is_seen_at_the_bar(hit, no_opengl):
+    """As a tip of the colour bar at the end that values leave."""
+    frame = of_solution(hit).frame(of_solution(hit).chosen())
+    taut = frame.fields["stress"][~frame.slack]
+    a, b = taut.min() + 0.3 * np.ptp(taut), taut.min() + 0.6 * np.ptp(taut)
+    for limits, beyond in ((None, "neither"), ((a, 1e9), "min"), ((0.0, b), "max"), ((a, b), "both")):
+        (bar,) = [axes._colorbar for axes in hit.picture(range=limits).axes if hasattr(axes, "_colorbar")]
+        assert bar.extend == beyond
+
+
+def test_displacements_times_a_factor(hit, no_opengl):
+    """Lines, supports and bodies alike, about where they were; the page says so."""
+    frame = of_solution(hit).frame(30)
+    large = frame.posed(4.0)
+    assert frame.posed(1.0) is frame
+    np.testing.assert_allclose(large.paths - frame.origin, 4.0 * (frame.paths - frame.origin), atol=1e-15)
+    before = np.array([0.02, 0.03, -0.21])
+    middles = [one.bodies["ball"].points.mean(axis=0) - before for one in (frame, large)]
+    np.testing.assert_allclose(middles[1], 4.0 * middles[0], atol=1e-12)
+    np.testing.assert_array_equal(large.supports, frame.supports)
+    assert any("displacements × 4" in text for text in words(hit.picture(scale=4))[0])
+    assert not any("×" in text for text in words(hit.picture())[0])
+
+
+@pytest.mark.parametrize("tall", [0.3, 1.0, 4.0])
+def test_the_web_is_as_wide_from_the_side(tall):
+    """As in the view beside it or above it, whatever its shape; all of it is within both."""
+    points, flat, _ = tent(height=tall)
+    for aspect in (1.6, 1.0):
+        views, rectangles = choose(flat, points, np.zeros((0, 3)), tall, False, aspect)
+        widths = [view.share(points) * rectangle[2] for view, rectangle in zip(views, rectangles, strict=True)]
+        assert widths[1] == pytest.approx(widths[0], rel=0.02)
+        for view in views:
+            assert np.abs((view.project(points)[0] - view.offset) / view.half).max() < 1.0
+        (a, b, w, h), (c, d, _, k) = rectangles
+        assert b >= d + k or a + w <= c, "they do not overlap"
+
+
+def test_views_by_name_and_direction(film):
+    frame = read(film, 20)
+    seen = Seen.of(frame, "stress")
+    towards = {"side": (0, -1, 0), "front": (1, 0, 0), "top": (0, 0, 1)}
+    for name, direction in towards.items():
+        for view in (name, 3.0 * np.array(direction)):
+            (found,) = Stage.of(seen, Look("stress", (0.0, 1.0), 1.0, view), 1.6).views
+            assert found.axes[2] == pytest.approx(direction) and not found.perspective
+            assert (
+                np.linalg.det(found.axes) == pytest.approx(1.0) and (found.axes @ found.axes.T).round(12).trace() == 3
+            )
+    (oblique,) = Stage.of(seen, Look("stress", (0.0, 1.0), 1.0, "oblique"), 1.6).views
+    assert oblique.perspective
+
+
+def test_slack_has_two_colours(film, no_opengl):
+    frame, page = read(film, 20), pictures.picture(film, field="slack", frame=20)
+    tubes = staged(frame, "slack").model(frame)[0]
+    assert (tubes.colours[frame.slack] == TWO["slack"]).all() and (tubes.colours[~frame.slack] == TWO["taut"]).all()
+    assert words(page)[1][:2] == ["taut", "slack"] and not any(hasattr(axes, "_colorbar") for axes in page.axes)
+
+
+def test_the_legend_names_what_is_drawn(film, no_opengl):
+    """The undeformed web only where a view has it and it has moved, a body and supports only where they are seen."""
+    assert words(pictures.picture(film, frame=20))[1] == ["slack", "support", "undeformed", "ball"]
+    assert "undeformed" not in words(pictures.picture(film, frame=20, view="oblique"))[1]
+    assert "undeformed" not in words(pictures.picture(film, frame=0))[1]
+    frame = read(film, 20)
+    far = frame.bodies["ball"]._replace(points=frame.bodies["ball"].points + 50.0)
+    stage = staged(frame._replace(bodies={"ball": far}, supports=frame.supports[:0]))
+    page = pictures.blank_page(stage, "", (800, 500))
+    assert words(page)[1] == ["slack", "undeformed"]
+
+
+@pytest.fixture(scope="module")
+def modes():
+    return refweb.modes("catenary", 2)
+
+
+def test_a_mode_says_its_frequency(modes, no_opengl, tmp_path):
+    """With ± and unit; a folder of modes is drawn as they are in memory."""
+    found = modes.results["frequency_2"]
+    texts = words(modes.picture(frame=2))[0]
+    assert f"mode 2, {readable(found.value, found.error, 'Hz')}" in texts and "Hz" in "".join(texts)
+    assert of_solution(modes).chosen() == 1
+    modes.save(tmp_path / "modes")
+    assert modes.picture()._repr_png_() == pictures.picture(tmp_path / "modes")._repr_png_()
+
+
+def test_a_mode_swings_about_the_equilibrium(modes):
+    """A whole period; half a period on, it is as far on the other side. It is seen, and it is where a folder has it."""
+    record = of_solution(modes)
+    frame, poses = record.frame(1), films._poses(record, None, None)
+    rest = frame.posed(phase=0.0).paths
+    nodes = modes.state.position[modes.state.system.net.cells]
+    assert np.abs(rest[:, [0, -1]] - nodes[:, :2]).max() < 1e-12
+    assert poses[0].phase == 1.0 and frame.posed(phase=1.0).paths == pytest.approx(frame.paths, abs=1e-15)
+    half = len(poses) // 2
+    for k, pose in enumerate(poses):
+        mirrored = frame.posed(phase=poses[(k + half) % len(poses)].phase).paths
+        np.testing.assert_allclose(frame.posed(phase=pose.phase).paths - rest, rest - mirrored, atol=1e-12)
+    assert poses[-1].phase == pytest.approx(poses[1].phase), "it loops"
+    size = np.linalg.norm(np.ptp(rest.reshape(-1, 3), axis=0))
+    assert np.linalg.norm(frame.paths - rest, axis=2).max() > 0.04 * size
+    assert np.abs(frame.posed(3.0).paths - rest).max() == pytest.approx(3.0 * np.abs(frame.swing).max())
+
+
+def test_a_film_of_a_mode(modes, no_opengl, monkeypatch, tmp_path):
+    monkeypatch.setattr(films, "PHASES", 8)
+    with Image.open(films.animate(modes, tmp_path / "mode.gif", frame=2)) as gif:
+        images = [gif.seek(k) or np.asarray(gif.convert("L"), dtype=float) for k in range(gif.n_frames)]
+    assert len(images) == 8
+    for k in range(1, 4):
+        np.testing.assert_array_equal(images[k], images[8 - k])
+    assert np.any(images[0] != images[4])
+
+
+def test_refusals(film, modes, tmp_path):
+    for options, said in (
         ({"field": "stres"}, ('field = "stres"', '"stress"')),
         ({"frame": 12}, ("frame = 12", "nearest is 10", "last 20")),
+        ({"frame": 10, "time": 0.1}, ("frame = 10 and time = 0.1", "leave one out")),
+        ({"time": np.nan}, ("time = nan", "finite")),
+        ({"scale": 0.0}, ("scale = 0.0", "> 0")),
+        ({"range": (2, 1)}, ("range = 2 1", "low must be less")),
+        ({"range": "aut"}, ('range = "aut"', '"auto"')),
+        ({"range": (1, 2, 3)}, ("range", "two numbers")),
+        ({"range": (0, 1), "field": "slack"}, ("two colours", "leave it out")),
+        ({"view": "sidee"}, ('view = "sidee"', '"side"')),
+        ({"view": (0, 0, 0)}, ("view = [0, 0, 0]", "oblique", "not all 0")),
+        ({"view": (1, 0)}, ("view = [1, 0]", "three numbers")),
         ({"out": film / "web.pgn"}, ('"pgn"', '"png"')),
         ({"out": film / "none" / "web.png"}, ("no folder",)),
     ):
         with pytest.raises(InputError) as error:
             pictures.picture(film, **options)
-        assert all(word in str(error.value) for word in words) and "\n" not in str(error.value)
+        assert all(word in str(error.value) for word in said) and "\n" not in str(error.value)
     with pytest.raises(InputError, match="not a result folder"):
-        drawn(tmp_path)
-    with pytest.raises(InputError, match='unknown format "png"'):
-        films.animate(film, out=film / "web.png")
+        pictures.picture(tmp_path)
+    for options, said in (
+        ({"out": film / "web.png"}, 'unknown format "png"'),
+        ({"out": film / "web.gif", "fps": 60}, "fps = 60"),
+        ({"out": film / "web.gif", "frame": 10}, "frame = 10: a film has all frames"),
+        ({"out": film / "web.gif", "time": 0.1}, "time = 0.1: a film has all frames"),
+    ):
+        with pytest.raises(InputError, match=said):
+            films.animate(film, **options)
+    with pytest.raises(InputError, match="frame = 7: there is no such frame, the nearest is 2"):
+        films.animate(modes, tmp_path / "mode.gif", frame=7)
+    assert not list(tmp_path.iterdir())
 
 
 def test_field_of_points(film, no_opengl, tmp_path):
@@ -251,10 +484,88 @@ def test_field_of_points(film, no_opengl, tmp_path):
 
 
 def test_film_has_all_frames(film):
-    out = films.animate(film, out=film / "web.gif")
+    """At a time each, in one palette; what is kept from image to image is white where nothing is drawn."""
+    out = films.animate(film, film / "web.gif")
+    assert out == film / "web.gif"
     with Image.open(out) as gif:
-        assert gif.n_frames == 3
+        assert gif.n_frames == 3 and gif.info["loop"] == 0
         assert gif.size == films.SIZE
+        images, waits = [], []
+        for k in range(3):
+            gif.seek(k)
+            waits.append(gif.info["duration"])
+            images.append(np.asarray(gif.convert("RGB")))
+    assert waits == [100, 100, 1000]
+    assert all(image[-1, 0].tolist() == [255, 255, 255] for image in images) and (images[0] != images[2]).any()
+
+
+def test_a_film_by_polygons_shows_the_same(film, monkeypatch, tmp_path):
+    """As by OpenGL, where there is some; and its images are those that stand on pictures."""
+    films.animate(film, tmp_path / "a.gif")
+    monkeypatch.setattr(drawing, "windows", lambda: [])
+    films.animate(film, tmp_path / "b.gif")
+    with Image.open(tmp_path / "a.gif") as a, Image.open(tmp_path / "b.gif") as b:
+        for k in range(3):
+            a.seek(k), b.seek(k)
+            here, there = (np.asarray(gif.convert("L")) < 235 for gif in (a, b))
+            assert np.sum(here & there) > 0.75 * np.sum(here | there)
+
+
+def test_colours_of_a_gif_are_those_of_its_images(tmp_path):
+    """To a few of 255, also those of thin lines on a white page, from the last of the images to the bar."""
+    bar = colour_map()(np.linspace(0, 1, 64))[:, :3]
+    images = []
+    for turn in range(4):
+        pixels = np.full((64, 90, 3), 255, dtype=np.uint8)
+        pixels[np.arange(64), 20 + turn] = np.roll(np.round(255 * bar), 16 * turn, axis=0)
+        pixels[10:30, 40:60] = np.linspace(60, 200, 20, dtype=np.uint8)[:, None, None] * np.ones((1, 1, 3), np.uint8)
+        images.append(Image.fromarray(pixels))
+    gif = moving.Gif(tmp_path / "a.gif", (90, 64), 10.0, images[:2], bar)
+    for image in images:
+        gif.add(image)
+    gif.close()
+    with Image.open(tmp_path / "a.gif") as found:
+        for k, image in enumerate(images):
+            found.seek(k)
+            far = np.abs(np.asarray(found.convert("RGB"), dtype=int) - np.asarray(image, dtype=int))
+            assert far.max() <= 8 and (far[:, 70:] == 0).all()
+
+
+def test_an_interruption_leaves_nothing(film, no_opengl, monkeypatch, tmp_path):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        films.animate(film, tmp_path / "web.gif", progress=lambda text, share: share > 0.5 and interrupted())
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_mp4_needs_ffmpeg(film, monkeypatch, tmp_path):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(InputError, match=r"needs ffmpeg, .* install it, or name a \.gif"):
+        films.animate(film, tmp_path / "web.mp4")
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg on PATH")
+def test_an_mp4_by_ffmpeg(film, no_opengl, tmp_path):
+    """All frames, and the last for a second."""
+    out = films.animate(film, tmp_path / "web.mp4")
+    done = subprocess.run(["ffmpeg", "-i", out, "-f", "null", "-"], capture_output=True, text=True)
+    assert re.findall(r"frame= *(\d+)", done.stderr)[-1] == "12" and "{}x{}".format(*films.SIZE) in done.stderr
+    assert list(tmp_path.iterdir()) == [out]
+
+
+def test_options_of_the_command(film, no_opengl, tmp_path, capsys):
+    """Names, numbers with spaces or commas between them; where it is, is printed."""
+    out = tmp_path / "web.png"
+    asked = ["--time", "0.1", "--range", "-1e3", "2e7"] if sys.version_info >= (3, 14) else ["--range=-1e3,2e7"]
+    assert main(["picture", str(film), *asked, "--scale", "2", "--view", "1", "-2", "0.5", "--out", str(out)]) == 0
+    assert capsys.readouterr().out.strip() == str(out) and out.exists()
+    assert main(["picture", str(film), "--view", "sied"]) == 2 and 'did you mean "side"' in capsys.readouterr().err
+    assert main(["picture", str(film), "--range", "auto", "--frame", "1", "--time", "2"]) == 2
+    assert main(["picture", str(film), "--animate", "--frame", "10"]) == 2
+    assert main(["picture", str(film), "--animate", "--field", "slack"]) == 0
+    assert capsys.readouterr().out.strip() == str(film / "web.gif")
 
 
 def test_import_stays_light():

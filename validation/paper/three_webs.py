@@ -8,6 +8,7 @@ import numpy as np
 
 from refweb.pictures import render as drawing
 from refweb.pictures.camera import View
+from refweb.pictures.polygons import polygons
 
 from ..harness import plots
 
@@ -101,9 +102,9 @@ def perspective(shown):
     for number, (one, web) in enumerate(zip(plot, shown, strict=True)):
         one.axis("off")
         if images:
-            one.imshow(drawing.unpack(images[number])[0], extent=view.extent, interpolation="antialiased")
+            one.imshow(images[number][0], extent=view.extent, interpolation="antialiased")
         else:
-            drawing.polygons(one, models[number], view, HEIGHT)
+            polygons(one, models[number], view, HEIGHT)
             one.set(xlim=view.extent[:2], ylim=view.extent[2:], aspect="equal")
         one.set_title(web.title, fontsize="medium", loc="left")
     _ruler(plot[0], view)
