@@ -9,7 +9,7 @@ def add_arguments(parser):
     text = (
         "an observable or another column of history.csv; energy or momentum, their books; spectrum or spectrum:NAME; "
     )
-    text += "stress-distance, tension-distance or strain-distance; frequencies, of modes. Repeatable (default: the "
+    text += "stress, tension or strain of lines, over distance; frequencies, of modes. Repeatable (default: the "
     text += "observables and the book of energies; in statics results over load steps, of one stress over distance)"
     parser.add_argument("--quantity", action="append", metavar="NAME", help=text)
     parser.add_argument("--out", metavar="FILE", help="a .png, .svg or .pdf (default: plot.png in the first DIR)")

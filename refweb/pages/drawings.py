@@ -121,7 +121,7 @@ def plots(record):
     parts = []
     for name, line in few.items():
         try:
-            parts.append(figure(_plot(draw(record, name), line), line))
+            parts.append(figure(_plot(draw(record, name, title=""), line), line))
         except InputError as error:
             parts.append(tag("p", f"{name}: {error}"))
     left = [name for name in found if name not in few]

@@ -63,7 +63,7 @@ def usual(record):
     return shown.observables if len(shown.along) > 1 or not record.times else [f"stress{DISTANCE}"]
 
 
-def draw(records, what=None):
+def draw(records, what=None, title=None):
     """Draw some of the `kinds` of one record, or of several over each other.
 
     Parameters
@@ -72,7 +72,10 @@ def draw(records, what=None):
         Runs of one kind.
     what : str or sequence of str, optional
         Names of `kinds`, or of columns of their tables; by default observables and the book of energies, in statics the
-        results over load steps, of one load step stress over distance, of modes their frequencies.
+        results over load steps, of one load step stress over distance, of modes their frequencies. A spectrum alone is
+        that of the first observable, a field of lines alone that over distance.
+    title : str, optional
+        What stands above; by default the titles of the scenes, and how a run ended that is not solved.
 
     Returns
     -------
@@ -84,10 +87,10 @@ def draw(records, what=None):
     InputError
         For a name that no record has, with the nearest; records of several kinds, or without rows.
     """
-    return _drawn([records] if isinstance(records, Record) else list(records), what)[0]
+    return _drawn([records] if isinstance(records, Record) else list(records), what, title)[0]
 
 
-def _drawn(records, what):
+def _drawn(records, what, title=None):
     """The figure of some records, and which of them lack what, in words."""
     shown, notes = _beside(records)
     names = [what] if isinstance(what, str) else list(what or _usual_of_all(shown))
@@ -103,16 +106,18 @@ def _drawn(records, what):
         for s in shown:
             missing.setdefault(s.name, []).extend([name] if s not in having else [])
     lacking = tuple(f"{who} has no {', '.join(names)}" for who, names in missing.items() if names)
-    figure = sheet(panels, _title(shown), [*notes, *lacking])
+    figure = sheet(panels, _title(shown) if title is None else title, [*notes, *lacking])
     setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
     return figure, lacking
 
 
 def _meant(shown, name):
-    """What a name stands for in full: a spectrum alone is that of the first observable that there is."""
-    if name == "spectrum" and not any(name in s.units for s in shown):
+    """What a name stands for in full: a spectrum is of the first observable there is, a field is over distance."""
+    if any(name in s.units for s in shown):
+        return name
+    if name == "spectrum":
         return next((SPECTRUM + s.observables[0] for s in shown if s.observables), name)
-    return name
+    return f"{name}{DISTANCE}" if name in distances.FIELDS else name
 
 
 def _usual_of_all(shown):

@@ -81,7 +81,8 @@ def sheet(panels, title, notes=()):
         axes.set_xlabel(panel.along, size=LETTERS, color=DARK)
         panel.draw(axes)
     look = {"x": 0.02, "ha": "left", "parse_math": False}
-    figure.suptitle("\n".join(words), size=LETTERS + 2, weight="bold", color=DARK, **look)
+    if words:
+        figure.suptitle("\n".join(words), size=LETTERS + 2, weight="bold", color=DARK, **look)
     if below:
         figure.supxlabel("\n".join(below), size=LETTERS - 1, color=DARK, **look)
     return figure

@@ -204,6 +204,7 @@ def test_stress_over_distance(runs):
     axes = of(plots.draw(record, "stress-distance"), "stress")
     points = sum(len(line.get_xdata()) for line in axes.get_lines())
     assert points == len(web.lines)
+    assert plots.draw(record, "strain", title="").get_suptitle() == ""
 
 
 def test_distances_are_from_where_a_body_touches(runs):
