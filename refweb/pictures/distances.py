@@ -83,25 +83,25 @@ def _place(record, frame, middles, values, field):
     if touched:
         name = max(touched, key=lambda body: touched[body]["overlap"])
         return middles[numbers == touched[name]["line"]].mean(axis=0), f'where "{name}" touches deepest'
-    loaded = _loaded(record, frame)
+    loaded = _loaded(record, frame, numbers)
     if loaded is not None:
         return loaded
     line = int(np.nanargmax(values))
     return middles[line], f"line {int(numbers[line])}, where {field} is largest"
 
 
-def _loaded(record, frame):
+def _loaded(record, frame, numbers):
     """Where the one node that is loaded stands, and its name; None where there is no such node."""
     loads = record.scene.get("load") or []
     count = (record.summary.get("web") or {}).get("nodes", 0)
     nodes = np.zeros((int(frame.ends.max()) + 1, 3))
     nodes[frame.ends] = frame.origin[:, [0, -1]]
-    if not loads or not 0 < count <= len(nodes) or "line" in frame.fields:
+    if not loads or not 0 < count <= len(nodes):
         return None
+    first = np.unique(numbers, return_index=True)[1]  # the elements of a line follow each other
+    lines = np.column_stack([frame.ends[first, 0], frame.ends[np.append(first[1:], len(numbers)) - 1, 1]])
     try:
-        web = Web(
-            points=nodes[:count], lines=frame.ends, kind=str((record.scene.get("web") or {}).get("kind", "inline"))
-        )
+        web = Web(points=nodes[:count], lines=lines, kind=str((record.scene.get("web") or {}).get("kind", "inline")))
         found = np.unique(np.concatenate([web.find(load["node"]) for load in loads]))
     except (InputError, KeyError, ValueError):  # a name that the scene alone knows
         return None

@@ -12,7 +12,7 @@ import refweb
 from refweb.__main__ import main
 from refweb.errors import InputError
 from refweb.pictures import books, distances, plots, sheet
-from refweb.pictures.record import of_folder
+from refweb.pictures.record import of_folder, of_solution
 from refweb.pictures.shown import Shown
 from refweb.pictures.spectra import FEWEST, spectrum_of
 
@@ -205,6 +205,16 @@ def test_stress_over_distance(runs):
     points = sum(len(line.get_xdata()) for line in axes.get_lines())
     assert points == len(web.lines)
     assert plots.draw(record, "strain", title="").get_suptitle() == ""
+
+
+@pytest.mark.parametrize("key", ["subdivide", "order"])
+def test_distances_of_divided_lines(runs, key):
+    """Of elements, from the same node: the web's nodes keep their numbers."""
+    scene = refweb.Scene.load(runs / "static.toml", {f"cable.{key}": 2, "solve.load_steps": [1]})
+    found = distances.spread(of_solution(refweb.run(scene, progress=False)), "stress")
+    assert found.origin == distances.spread(of_folder(runs / "static"), "stress").origin
+    side = 0.5 / (2 if key == "subdivide" else 1)
+    assert found.distance.min() == pytest.approx(0.5 * side)
 
 
 def test_distances_are_from_where_a_body_touches(runs):
