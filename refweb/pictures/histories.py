@@ -110,7 +110,8 @@ def _columns(shown, name, along, pairs):
     def draw(axes):
         entries = []
         for s, (at, values) in zip(shown, pairs, strict=True):
-            style = {"color": s.ink.colour, "linestyle": s.ink.style, "marker": s.ink.marker}
+            style = {"color": s.ink.colour, "marker": s.ink.marker}
+            style["linestyle"] = "" if along == "mode" else s.ink.style  # between modes there is nothing
             (line,) = axes.plot(at, values / factor, **style)
             entries += [(line, s.name)] if s.name else []
         label(axes, name, called)
@@ -138,7 +139,7 @@ def frequencies(shown):
             unstable = own["frequency"] < 0
             if unstable.any():
                 at = own["step" if several else "mode"][unstable]
-                look = {"color": COLOURS[1], "marker": "x", "linestyle": "", "markersize": 10, "markeredgewidth": 2.5}
+                look = {"color": DARK, "marker": "x", "linestyle": "", "markersize": 10, "markeredgewidth": 2.5}
                 (cross,) = axes.plot(at, own["frequency"][unstable], **look, zorder=4)
                 entries.append((cross, "below zero: imaginary, unstable"))
             if several and not s.name:
