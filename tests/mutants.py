@@ -69,6 +69,10 @@ MIRRORS = {
     "results/comparison": "results/test_comparison.py",
     "results/state": "results/test_results.py results/test_observable_contract.py",
     "results": "results/test_results.py test_faults.py",
+    "pictures/camera": "pictures/test_pictures.py",
+    "pictures/frames": "pictures/test_pictures.py",
+    "pictures/record": "pictures/test_pictures.py",
+    "pictures/moving": "pictures/test_pictures.py",
     "pictures/books": "pictures/test_plots.py",
     "pictures/spectra": "pictures/test_plots.py",
     "pictures/histories": "pictures/test_plots.py",
@@ -287,6 +291,12 @@ MUTANTS = [
     Mutant("results/folder", "int(number[1]) <= row", "int(number[1]) < row"),
     Mutant("results/folder", "self._listed += [(time, part,", "self._listed += [(row, part,"),
     Mutant("results/files", "return repr(float(value))", 'return f"{value:.9g}"'),
+    Mutant("pictures/frames", "paths=self.paths + (scale * phase - 1.0)", "paths=self.paths + (scale * phase + 1.0)"),
+    Mutant("pictures/record", "max(found, key=lambda pair: pair[0])[1]", "found[-1][1]"),
+    Mutant(
+        "pictures/moving", "part = np.where(differs, numbers, COLOURS)", "part = np.where(differs, self._last, COLOURS)"
+    ),
+    Mutant("pictures/camera", "large.wider(1 / wider), small.wider(wider)", "large, small"),
     Mutant("pictures/books", "top[:1] + work - work[:1]", "top[:1] - work + work[:1]"),
     Mutant("pictures/books", "area = axes.fill_between(at, below, above,", "area = axes.fill_between(at, 0.0, above,"),
     Mutant("pictures/spectra", "2.0 * np.abs(np.fft.rfft(", "np.abs(np.fft.rfft("),

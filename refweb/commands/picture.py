@@ -1,23 +1,43 @@
 """Draw a result folder: one instant, or all of them as a film."""
 
+import argparse
 import pathlib
 
 
 def add_arguments(parser):
     """The folder, what is drawn of it, how and where."""
-    parser.add_argument("folder", metavar="DIR")
+    folder = parser.add_argument("folder", metavar="DIR")
     parser.add_argument("--frame", type=int, metavar="N", help="number of the frame; -1 is the last")
     text = "the frame nearest this time [s] or load step (default: that of the largest value of the first observable)"
     parser.add_argument("--time", type=float, metavar="T", help=text)
     parser.add_argument("--field", metavar="NAME", help="what the colours show (default: stress)")
-    text = "range of the colours [SI], or auto for that of the one frame (default: that of all frames)"
-    parser.add_argument("--range", nargs="+", metavar=("LOW", "HIGH"), help=text)
+    text = "range of the colours [SI], --range=-1e3,2e3 where it begins with a minus, or auto: that of the one frame "
+    text += "(default: that of all frames)"
+    parser.add_argument("--range", nargs="+", action=_Words, most=2, folder=folder, metavar=("LOW", "HIGH"), help=text)
     parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="what displacements are drawn times")
     text = "one view: oblique, side, front, top, or a direction to the viewer such as 1 0 0.5 (default: two views)"
-    parser.add_argument("--view", nargs="+", metavar=("NAME", "X"), help=text)
+    parser.add_argument("--view", nargs="+", action=_Words, most=3, folder=folder, metavar=("NAME", "X"), help=text)
     parser.add_argument("--out", metavar="FILE", help="picture to write (default: DIR/web.png)")
     text = "a film of all frames, of a mode its swing: a GIF (default: DIR/web.gif), or where ffmpeg is found an MP4"
     parser.add_argument("--animate", action="store_true", help=text)
+
+
+class _Words(argparse.Action):
+    """A name, or up to some numbers; a word that follows them is the folder, which usage has at the end."""
+
+    def __init__(self, *args, most, folder, **options):
+        super().__init__(*args, **options)
+        self._most, self._folder = most, folder
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        words = list(values or ())
+        count = self._most if _number(words[0]) else 1
+        setattr(namespace, self.dest, words[:count])
+        if words[count:] and namespace.folder is None:
+            namespace.folder, self._folder.required = words[count], False
+            count += 1
+        if words[count:]:
+            parser.error(f"argument {option_string}: too many words: {' '.join(words[count:])}")
 
 
 def run(arguments):
@@ -45,7 +65,12 @@ def _values(words):
     if words is None:
         return None
     words = [part for word in words for part in word.split(",") if part]
+    return [float(word) for word in words] if all(map(_number, words)) else " ".join(words)
+
+
+def _number(word):
+    """Whether a word is a number."""
     try:
-        return [float(word) for word in words]
+        return float(word) is not None
     except ValueError:
-        return " ".join(words)
+        return False

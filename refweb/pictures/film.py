@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.files import write_atomically
 from . import moving, render
-from .pictures import blank_page, clock_line, look_of, record_of, target, with_supports
+from .pictures import blank_page, clock_line, look_of, record_of, target
 from .polygons import flat_images
 from .stage import DARK, PALE, Seen, Stage, colour_map
 
@@ -94,6 +94,7 @@ class _Film:
         self._record, self._poses, self._look = record, poses, look
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
+        self._last = record.frame(poses[-1].number)
         self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
 
     def write(self, path, progress):
@@ -120,7 +121,7 @@ class _Film:
                 raise
 
     def _frame(self, pose):
-        return with_supports(self._record, self._record.frame(pose.number)).posed(self._look.scale, pose.phase)
+        return self._record.frame(pose.number).held_as(self._last).posed(self._look.scale, pose.phase)
 
     def _survey(self, progress):
         """The stage that shows all images; of a swing its two ends and its middle do."""

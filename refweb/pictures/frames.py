@@ -63,6 +63,10 @@ class Frame(NamedTuple):
     lifted: np.ndarray
     swing: np.ndarray | None
 
+    def held_as(self, last):
+        """The frame with the supports of the last one, where it knows none of its own."""
+        return self if len(self.supports) else self._replace(supports=last.supports, lifted=last.lifted)
+
     def posed(self, scale=1.0, phase=1.0):
         """The frame with displacements times a factor; of a mode, its shape times that and −1…1 of a swing."""
         if self.swing is not None:

@@ -68,7 +68,10 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
     out = None if out is None else target(out)
     page = drawn(record, frame, time, field, range, scale, view)
     if out is not None:
-        write_atomically(out, functools.partial(page.savefig, dpi="figure"))
+        if out.suffix.lower() == ".png":
+            write_atomically(out, lambda name: Path(name).write_bytes(png(page)))
+        else:
+            write_atomically(out, functools.partial(page.savefig, dpi="figure"))
     return page
 
 
@@ -77,7 +80,9 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
     number = record.chosen(frame, time)
     found = record.frame(number)
     look = look_of(record, found, field, range, scale, view)
-    posed = with_supports(record, found).posed(look.scale)
+    if not len(found.supports) and number != max(record.times):
+        found = found.held_as(record.frame(max(record.times)))
+    posed = found.posed(look.scale)
     stage = Stage.of(Seen.of(posed, look.field), look, SIZE[0] / SIZE[1])
     model = stage.model(posed)
     images = render.images([model], stage.views, stage.pixels(SIZE))
@@ -105,14 +110,6 @@ def look_of(record, frame, field, limits, scale, view):
     if not (np.isfinite(scale) and scale > 0):
         raise InputError(f"scale = {scale} must be > 0")
     return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
-
-
-def with_supports(record, frame):
-    """The frame, with the supports of the last one where it knows none."""
-    if len(frame.supports):
-        return frame
-    last = record.frame(max(record.times))
-    return frame._replace(supports=last.supports, lifted=last.lifted)
 
 
 def clock_line(record, number, look, decimals=None):
@@ -143,9 +140,13 @@ def blank_page(stage, title, size):
 
 
 def png(figure):
-    """The bytes of a figure as PNG."""
-    page = io.BytesIO()
-    figure.savefig(page, format="png", dpi="figure")
+    """The bytes of a figure as PNG, in full colour and without transparency."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    canvas, page = FigureCanvasAgg(figure), io.BytesIO()
+    canvas.draw()
+    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(page, "PNG")
     return page.getvalue()
 
 

@@ -561,6 +561,9 @@ def test_options_of_the_command(film, no_opengl, tmp_path, capsys):
     asked = ["--time", "0.1", "--range", "-1e3", "2e7"] if sys.version_info >= (3, 14) else ["--range=-1e3,2e7"]
     assert main(["picture", str(film), *asked, "--scale", "2", "--view", "1", "-2", "0.5", "--out", str(out)]) == 0
     assert capsys.readouterr().out.strip() == str(out) and out.exists()
+    assert main(["picture", "--view", "side", str(film)]) == main(["picture", "--range", "auto", str(film)]) == 0
+    assert main(["picture", "--view", "0", "1", "0", str(film), "--range", "0", "1e7"]) == 0
+    assert capsys.readouterr().out.splitlines() == 3 * [str(film / "web.png")]
     assert main(["picture", str(film), "--view", "sied"]) == 2 and 'did you mean "side"' in capsys.readouterr().err
     assert main(["picture", str(film), "--range", "auto", "--frame", "1", "--time", "2"]) == 2
     assert main(["picture", str(film), "--animate", "--frame", "10"]) == 2
