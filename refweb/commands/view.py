@@ -1,4 +1,4 @@
-"""Look at a result folder: its page in a browser."""
+"""Look at a result folder: its page in a browser, a window, or a script for ParaView."""
 
 import pathlib
 
@@ -6,13 +6,32 @@ from ..errors import InputError
 
 
 def add_arguments(parser):
-    """The folder."""
+    """The folder, and what shows it."""
     parser.add_argument("folder", metavar="DIR")
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--window", action="store_true", help="a window of pyvista, with a slider over the frames")
+    other.add_argument("--paraview", action="store_true", help="write a script for paraview --script=FILE")
+    parser.add_argument("--field", metavar="NAME", help="what the colours of --window and --paraview show")
+    parser.add_argument("--out", metavar="FILE", help="where --paraview writes it (default: DIR/web_in_paraview.py)")
 
 
 def run(arguments):
     """Show it."""
-    _browse(pathlib.Path(arguments.folder))
+    elsewhere = arguments.window or arguments.paraview
+    if arguments.out is not None and not arguments.paraview:
+        raise InputError(f"--out {arguments.out} belongs to --paraview; the page is written by refweb report --out")
+    if arguments.field is not None and not elsewhere:
+        raise InputError(f"--field {arguments.field} belongs to --window or --paraview; the page shows all fields")
+    if arguments.window:
+        from ..pictures.window import window
+
+        window(arguments.folder, arguments.field)
+    elif arguments.paraview:
+        from ..pictures.paraview import script
+
+        print(script(arguments.folder, arguments.field, arguments.out))
+    else:
+        _browse(pathlib.Path(arguments.folder))
 
 
 def _browse(folder):

@@ -1,0 +1,112 @@
+"""A script that sets ParaView up for a run: tubes, one range of colours, slack lines grey, bodies, time, camera."""
+
+from __future__ import annotations
+
+import pprint
+from pathlib import Path
+
+import numpy as np
+
+from ..results.files import write_text
+from .frames import listed
+from .pictures import look_of, target, with_supports
+from .record import of_folder
+from .stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, Seen, Stage, colour_map, scaled_unit
+
+NAME, TEMPLATE = "web_in_paraview.py", Path(__file__).with_name("for_paraview.template")
+CLOCKS = {"modes": "mode {time:g}", "static": "step {time:g}", "dynamic": "t = {time:.6g} s"}
+SIZE = (1600, 1000)
+"""Of the view [pixel]."""
+
+
+def script(folder, field=None, out=None):
+    """Write a script for ``paraview --script=FILE`` or ``pvpython FILE``.
+
+    Parameters
+    ----------
+    folder : path-like
+        A result folder.
+    field : str, optional
+        What the colours show, as of `refweb.picture`.
+    out : path-like, optional
+        A ``.py`` to write; default ``web_in_paraview.py`` in the folder. It finds the folder beside itself, or
+        else where it was when the script was written.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        Where the folder is no result folder or has no such field, and for a place that cannot be written.
+    """
+    folder = Path(folder)
+    record = of_folder(folder)
+    out = target(folder / NAME if out is None else out, ["py"])
+    number = record.chosen()
+    frame = with_supports(record, record.frame(number))
+    look = look_of(record, frame, field, None, 1.0, None)
+    stage = Stage.of(Seen.of(frame, look.field), look, SIZE[0] / SIZE[1])
+    factor, unit = scaled_unit(look.field, max(map(abs, look.limits)))
+    points, cells = _arrays(folder, number)
+    given = {
+        "folder": str(folder.resolve()),
+        "beside": out.resolve().parent == folder.resolve(),
+        "title": record.title,
+        "time": record.times[number],
+        "clock": CLOCKS.get(record.kind, CLOCKS["dynamic"]),
+        "size": list(SIZE),
+        "field": look.field,
+        "label": look.field.replace("_", " ") + (f" [{unit}]" if unit else ""),
+        "of_cells": look.field in cells,
+        "vector": points.get(look.field, 1) > 1,
+        "factor": factor,
+        "limits": list(look.limits),
+        "grey": look.field in GREY_WHERE_SLACK and "slack" in cells,
+        "colours": colour_map()(np.linspace(0, 1, 33))[:, :3].round(4).tolist(),
+        "two": [list(colour) for colour in TWO.values()] if look.field == "slack" else None,
+        "slack_colour": list(SLACK),
+        "support_colour": list(SUPPORT),
+        "body_colours": [list(colour) for colour in BODIES],
+        "bodies": list(frame.bodies),
+        "supports": "support" in points,
+        "radius": float(np.min(stage.radius)),
+        **camera_of(stage, SIZE),
+    }
+    text = TEMPLATE.read_text(encoding="utf-8")
+    write_text(out, text.replace("GIVEN = {}  # what is shown", f"GIVEN = {pprint.pformat(given, width=118)}", 1))
+    return out
+
+
+def _arrays(folder, number):
+    """Numbers of components of point data by name, and names of cell data, of a frame."""
+    import meshio
+
+    mesh = meshio.read(listed(folder)[number].paths["web"])
+    return {name: int(values[0].size) for name, values in mesh.point_data.items()}, set(mesh.cell_data)
+
+
+def camera_of(stage, size, room=1.0):
+    """The first view of a stage in a window of some size [pixel], as plain values.
+
+    Beside what it shows there is room for a colour bar, and ``room`` times its height.
+
+    Returns
+    -------
+    dict
+        ``eye``, ``focus`` and ``up``, each of shape (3,); the vertical ``angle`` [°], None in parallel projection; and
+        ``half_height`` [m] of parallel projection.
+    """
+    view = stage.views[0]
+    half = max(room * float(view.half[1]), 1.12 * float(view.half[0]) * size[1] / size[0])
+    eye = view.centre + (0.0 if view.perspective else 3.0 * sum(view.half)) * view.axes[2]
+    away = float((eye - stage.middle) @ view.axes[2])
+    return {
+        "eye": eye.tolist(),
+        "focus": (eye - away * view.axes[2]).tolist(),
+        "up": view.axes[1].tolist(),
+        "angle": 2.0 * float(np.degrees(np.arctan(half))) if view.perspective else None,
+        "half_height": half,
+    }
