@@ -69,6 +69,8 @@ MIRRORS = {
     "results/comparison": "results/test_comparison.py",
     "results/state": "results/test_results.py results/test_observable_contract.py",
     "results": "results/test_results.py test_faults.py",
+    "pages": "pages/test_page.py",
+    "pictures/paraview": "pictures/test_viewers.py",
     "pictures/camera": "pictures/test_pictures.py",
     "pictures/frames": "pictures/test_pictures.py",
     "pictures/record": "pictures/test_pictures.py",
@@ -347,6 +349,14 @@ MUTANTS = [
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),
     Mutant("commands/new", "os.path.relpath(folder / value, target)", "os.path.relpath(folder / value, folder)"),
+    Mutant("pages/packed", "[changes >> 8, changes & 0xFF]", "[changes & 0xFF, changes >> 8]"),
+    Mutant("pages/packed", "size = written.nbytes + -written.nbytes % 4", "size = written.nbytes"),
+    Mutant(
+        "pages/space", "return (right.T * [1.0, 1.0, sign]) @ left.T", "return left @ (right.T * [1.0, 1.0, sign]).T"
+    ),
+    Mutant("pages/markup", 'written.replace("<", "\\\\u003c")', "written"),
+    Mutant("pages/page", "hashlib.sha256(script.encode())", "hashlib.sha256(script[1:].encode())"),
+    Mutant("pictures/paraview", '"vector": points.get(look.field, 1) > 1', '"vector": look.field in points'),
     Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
     Mutant("reference/schema", "without=every - set(own)", "without=()"),
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),

@@ -115,7 +115,7 @@ class View {
   // Draw with the next picture of the screen, sharper once nothing moves any more.
   redraw() {
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => this.draw(Math.max(2, devicePixelRatio || 1)), 180);
+    this.still = false;
     if (this.waiting) return;
     this.waiting = true;
     requestAnimationFrame((now) => {
@@ -125,6 +125,10 @@ class View {
       if (this.slow > 24) [this.quality, this.slow] = [Math.max(0.5, 0.8 * this.quality), 16];
       this.last = now;
       this.draw(this.quality);
+      this.rest = setTimeout(() => {
+        this.draw(Math.max(2, devicePixelRatio || 1));
+        this.still = true;
+      }, 180);
     });
   }
 

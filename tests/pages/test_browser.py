@@ -87,7 +87,8 @@ def until(tab, expression):
 
 
 def settle(tab):
-    tab.wait_for_timeout(400)
+    """Wait until what is drawn is what stays."""
+    until(tab, "refweb.still")
 
 
 def pixels(tab):

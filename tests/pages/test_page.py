@@ -167,6 +167,7 @@ def test_packed_arrays_come_back(shape):
     frames = rng.integers(0, 65536, shape)
     arrays = {"a": rng.random(shape).astype(np.float32), "b": np.arange(5, dtype=np.uint8), "c": differences(frames)}
     text, table = pack(arrays)
+    assert all(entry["start"] % 4 == 0 for entry in table.values()), "browsers read numbers of four bytes there alone"
     found = unpack(text, json.loads(json.dumps(table)))
     for name, array in arrays.items():
         np.testing.assert_array_equal(found[name], array.ravel())
@@ -402,3 +403,12 @@ def test_the_package_brings_what_pages_are_made_of():
     there = {path.name for path in folder.iterdir() if path.suffix in (".js", ".css", ".html")}
     assert there == {path.name for pattern in patterns for path in folder.glob(pattern)}
     assert there == {*page.SCRIPTS, "page.css", "page.html"}
+
+
+@pytest.mark.slow
+def test_the_page_of_a_shipped_impact_is_light(tmp_path):
+    """All frames of 5 165 lines, with pictures and plots, in less than 4 MB."""
+    refweb.run("hexagon-impact", out=tmp_path / "hexagon")
+    out = page.report(tmp_path / "hexagon")
+    found = Reader(out.read_text())
+    assert out.stat().st_size < 4e6 and len(json.loads(found.scripts["head"])["numbers"]) == 26
