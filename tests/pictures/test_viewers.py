@@ -66,6 +66,7 @@ def test_a_script_says_what_is_shown(folder, tmp_path):
     assert known["bodies"] == ["the plate"] and known["grey"] and known["of_cells"] and known["supports"]
     known = given(script(folder, "displacement", tmp_path / "other.py"))
     assert known["vector"] and not known["of_cells"] and not known["beside"] and not known["grey"]
+    assert not given(script(folder, "support", tmp_path / "number.py"))["vector"]
 
 
 def test_the_verb(folder, tmp_path, capsys, monkeypatch):
