@@ -9,7 +9,7 @@ import numpy as np
 
 from ..results.files import write_text
 from .frames import listed
-from .pictures import look_of, target, with_supports
+from .pictures import look_of, target
 from .record import of_folder
 from .stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, Seen, Stage, colour_map, scaled_unit
 
@@ -46,7 +46,7 @@ def script(folder, field=None, out=None):
     record = of_folder(folder)
     out = target(folder / NAME if out is None else out, ["py"])
     number = record.chosen()
-    frame = with_supports(record, record.frame(number))
+    frame = record.frame(number)
     look = look_of(record, frame, field, None, 1.0, None)
     stage = Stage.of(Seen.of(frame, look.field), look, SIZE[0] / SIZE[1])
     factor, unit = scaled_unit(look.field, max(map(abs, look.limits)))

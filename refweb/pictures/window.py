@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from .paraview import camera_of
-from .pictures import look_of, with_supports
+from .pictures import look_of
 from .record import of_folder
 from .stage import BODIES, DARK, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, Seen, Stage, colour_map, scaled_unit
 
@@ -58,7 +58,7 @@ def prepared(record, field=None, off_screen=False):
 
     numbers = list(record.times)
     first = record.chosen()
-    frame = with_supports(record, record.frame(first))
+    frame = record.frame(first)
     look = look_of(record, frame, field, None, 1.0, None)
     stage = Stage.of(Seen.of(frame, look.field), look, SIZE[0] / SIZE[1])
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(SIZE))
