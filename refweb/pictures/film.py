@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.files import write_atomically
 from . import moving, render
-from .pictures import blank_page, clock_line, look_of, record_of, target
+from .pictures import blank_page, clock_line, look_of, record_of, target, with_clear_white
 from .polygons import flat_images
 from .stage import DARK, PALE, Seen, Stage, colour_map
 
@@ -152,10 +152,15 @@ class _Film:
 
         model = self._stage.model(self._frame(pose))
         views = renderer.images(model) or flat_images(model, self._stage.views, self._sizes)
-        page = Image.new("RGB", SIZE, "white")
+        page, beneath = Image.new("RGB", SIZE, "white"), self._stage.beneath
+        if beneath:
+            page.paste(self._around, mask=self._around)
         for view, (left, bottom, _, height) in zip(views, self._stage.rectangles, strict=True):
-            page.paste(Image.fromarray(view), (round(left * SIZE[0]), round((1 - bottom - height) * SIZE[1])))
-        page.paste(self._around, mask=self._around)
+            mask = Image.fromarray(with_clear_white(view)) if beneath else None
+            place = round(left * SIZE[0]), round((1 - bottom - height) * SIZE[1])
+            page.paste(Image.fromarray(view), place, mask)
+        if not beneath:
+            page.paste(self._around, mask=self._around)
         pen = ImageDraw.Draw(page)
         clock = clock_line(self._record, pose.number, self._look, self._decimals)
         pen.text((0.03 * SIZE[0], 0.095 * SIZE[1]), clock, DARK, _letters(16), "ls")

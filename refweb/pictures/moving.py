@@ -69,8 +69,7 @@ class Gif:
         """Add an image, that stays for longer than others [s] where that is said."""
         from PIL import GifImagePlugin, Image
 
-        numbers = np.array(image.quantize(palette=self._palette.image, dither=Image.Dither.NONE))
-        numbers[np.asarray(image.convert("L")) == 255] = 0  # what is looked for is a near colour, not the nearest
+        numbers = self._palette.nearest[_bin(np.asarray(image))]
         rows, columns = slice(0, 1), slice(0, 1)
         if self._last is None:
             part, (rows, columns) = numbers, (slice(0, None), slice(0, None))
@@ -155,10 +154,27 @@ def _span(where):
 
 
 class Palette(NamedTuple):
-    """The colours of a GIF: a `PIL.Image.Image` that has them, and their 768 bytes."""
+    """The colours of a GIF: 768 bytes, and the number of the nearest one by `_bin`, shape (64³,)."""
 
-    image: Any
     colours: bytes
+    nearest: np.ndarray
+
+
+def _bin(colours):
+    """Which of 64³ bins a colour, shape (…, 3), uint8, is in."""
+    red, green, blue = (colours[..., i].astype(np.int32) >> 2 for i in range(3))
+    return (red << 12) | (green << 6) | blue
+
+
+def _nearest(table):
+    """Number of the colour, of shape (colours, 3), that is nearest to the middle of each bin, shape (64³,)."""
+    table, levels = np.asarray(table, dtype=np.float32), np.arange(64, dtype=np.float32) * 255 / 63
+    green, blue = (x.ravel() for x in np.meshgrid(levels, levels, indexing="ij"))
+    found = np.empty((64, 64 * 64), dtype=np.uint8)
+    for red, numbers in zip(levels, found, strict=True):
+        bins = np.stack([np.full_like(green, red), green, blue], axis=1)
+        numbers[:] = ((table**2).sum(axis=1) - 2 * bins @ table.T).argmin(axis=1)
+    return found.ravel()
 
 
 def _palette(samples, certain):
@@ -168,20 +184,15 @@ def _palette(samples, certain):
     """
     from PIL import Image
 
-    bins: dict = {}
+    count = np.zeros(64**3, dtype=int)
     for image in samples:
         pixels = np.asarray(image).reshape(-1, 3)
-        key = (pixels.astype(np.uint32) >> 2) @ np.array([4096, 64, 1], dtype=np.uint32)
-        for one, count in zip(*np.unique(key, return_counts=True), strict=True):
-            bins[int(one)] = bins.get(int(one), 0) + int(count)
-    key, count = np.array(list(bins)), np.array(list(bins.values()))
+        count += np.bincount(_bin(pixels), minlength=len(count))
+    key = np.flatnonzero(count)
     colours = np.stack([key >> 12, key >> 6 & 63, key & 63], axis=1) * 255 // 63
-    spread = np.repeat(colours.astype(np.uint8), np.ceil(count**0.75 / 8).astype(int), axis=0)
+    spread = np.repeat(colours.astype(np.uint8), np.ceil(count[key] ** 0.75 / 8).astype(int), axis=0)
     table = [255, 255, 255, *np.round(255 * np.asarray(certain)).astype(int).ravel().tolist()]
     left = COLOURS - len(table) // 3
     found = Image.fromarray(spread[None]).quantize(left, method=Image.Quantize.MEDIANCUT, kmeans=1)
     table += (found.getpalette() or [])[: 3 * left]
-    colours = bytes(table + [255] * (768 - len(table)))
-    image = Image.new("P", (1, 1))
-    image.putpalette(colours)
-    return Palette(image, colours)
+    return Palette(bytes(table + [255] * (768 - len(table))), _nearest(np.reshape(table, (-1, 3))))

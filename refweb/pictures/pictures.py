@@ -80,9 +80,7 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
     number = record.chosen(frame, time)
     found = record.frame(number)
     look = look_of(record, found, field, range, scale, view)
-    if not len(found.supports) and number != max(record.times):
-        found = found.held_as(record.frame(max(record.times)))
-    posed = found.posed(look.scale)
+    posed = with_supports(record, found).posed(look.scale)
     stage = Stage.of(Seen.of(posed, look.field), look, SIZE[0] / SIZE[1])
     model = stage.model(posed)
     images = render.images([model], stage.views, stage.pixels(SIZE))
@@ -90,7 +88,10 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
     rest = images[0] if images and images[0] else [None] * len(stage.views)
     for axes, view, image, (_, height) in zip(page.axes, stage.views, rest, stage.pixels(SIZE), strict=False):
         if image is not None:
-            axes.imshow(image, extent=view.extent, aspect="auto", interpolation="none", zorder=0)
+            shown = with_clear_white(image) if stage.beneath else image
+            axes.imshow(
+                shown, extent=view.extent, aspect="auto", interpolation="none", zorder=1 if stage.beneath else 0
+            )
         else:
             polygons(axes, model, view, height)
         axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
@@ -110,6 +111,12 @@ def look_of(record, frame, field, limits, scale, view):
     if not (np.isfinite(scale) and scale > 0):
         raise InputError(f"scale = {scale} must be > 0")
     return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
+
+
+def with_supports(record, frame):
+    """The frame, with the supports of the last one where it knows none."""
+    last = max(record.times)
+    return frame if len(frame.supports) or frame.number == last else frame.held_as(record.frame(last))
 
 
 def clock_line(record, number, look, decimals=None):
@@ -137,6 +144,11 @@ def blank_page(stage, title, size):
     figure.text(0.03, 0.945, title, size=large, weight="bold", color="#111111", parse_math=False)
     setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
     return figure
+
+
+def with_clear_white(image):
+    """An image, shape (height, width, 3), whose white can be seen through, shape (height, width, 4)."""
+    return np.dstack([image, np.uint8(255) * (image < 255).any(axis=2)])
 
 
 def png(figure):

@@ -139,6 +139,11 @@ class Stage:
         origin = origin if seen.moved > 0 else origin[:0]
         return cls(look, *chosen, radius, origin, seen.points.mean(axis=0), seen)
 
+    @property
+    def beneath(self):
+        """Whether the undeformed web lies below the web: seen from above it would cover it."""
+        return self.look.view is not None
+
     def pixels(self, size):
         """(width, height) of each view on a page of this size [pixel]."""
         return [tuple(round(r * s) for r, s in zip(rect[2:], size, strict=True)) for rect in self.rectangles]
@@ -170,7 +175,8 @@ class Stage:
             length = _round(-0.1 / axes.get_position().width * view.half[0] * depth)
             _triad(axes, view, view.point(-0.88, -0.72, depth), length)
             return
-        axes.add_collection(LineCollection(view.project(self.origin)[0], colors=BEFORE, linewidths=0.8))
+        below = 0.5 if self.beneath else 2
+        axes.add_collection(LineCollection(view.project(self.origin)[0], colors=BEFORE, linewidths=0.8, zorder=below))
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=12, colors=DARK)
         axes.set_xlabel(f"{_axis_name(view.axes[0])} [m]", size=13, color=DARK)
@@ -293,4 +299,4 @@ def _round(length):
 
 def _axis_name(axis):
     close = np.argmax(axis)
-    return "xyz"[close] if axis[close] > 1 - 1e-6 else "along ({:.2g}, {:.2g}, {:.2g})".format(*axis)
+    return "xyz"[close] if axis[close] > 1 - 1e-6 else "along ({:.2g}, {:.2g}, {:.2g})".format(*axis.round(3) + 0.0)

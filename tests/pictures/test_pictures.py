@@ -382,6 +382,19 @@ def test_views_by_name_and_direction(film):
     assert oblique.perspective
 
 
+def test_the_undeformed_web_covers_nothing_from_above(film, no_opengl):
+    """From above it lies on the web, whose colours are to be seen; in the view from the side it is on top."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    for view, below in (("top", True), (None, False)):
+        axes = pictures.picture(film, frame=20, view=view).axes[0 if view else 1]
+        (lines,) = [one for one in axes.collections if isinstance(one, LineCollection)]
+        (web,) = [one for one in axes.collections if isinstance(one, PolyCollection)]
+        assert (lines.get_zorder() < web.get_zorder()) == below
+    image = np.array([[[255, 255, 255], [255, 255, 254]]], dtype=np.uint8)
+    assert pictures.with_clear_white(image)[0, :, 3].tolist() == [0, 255]
+
+
 def test_slack_has_two_colours(film, no_opengl):
     frame, page = read(film, 20), pictures.picture(film, field="slack", frame=20)
     tubes = staged(frame, "slack").model(frame)[0]
