@@ -23,6 +23,8 @@ SIZE = (1200, 750)
 """Of a film [pixel]."""
 PHASES, SWINGS = 24, 12.0
 """Images of a period of a mode, and of them in a second [1/s]."""
+KEPT = 64
+"""Frames that are held in memory, to be drawn after the camera has seen all."""
 SAMPLES = 6
 """Images that a GIF has its colours of."""
 
@@ -94,7 +96,8 @@ class _Film:
         self._record, self._poses, self._look = record, poses, look
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
-        self._last = record.frame(poses[-1].number)
+        self._read = functools.lru_cache(KEPT)(record.frame)
+        self._last = self._read(poses[-1].number)
         self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
 
     def write(self, path, progress):
@@ -121,7 +124,7 @@ class _Film:
                 raise
 
     def _frame(self, pose):
-        return self._record.frame(pose.number).held_as(self._last).posed(self._look.scale, pose.phase)
+        return self._read(pose.number).held_as(self._last).posed(self._look.scale, pose.phase)
 
     def _survey(self, progress):
         """The stage that shows all images; of a swing its two ends and its middle do."""
