@@ -63,7 +63,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     _check_history(solve, output, len(observables))
     net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
     supported = _supported(net, supports, support)
-    system = System(net, [Elasticity(), *_acting(effects)], supported)
+    system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
     _check_bare(system)
     _check_motions(system)
     if system.constraints:

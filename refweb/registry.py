@@ -37,6 +37,8 @@ EFFECTS = {
     "temperature": "refweb.effects.temperature:Temperature",
 }
 """Effects by the name of their table."""
+FACTORIZATIONS = ("qdldl", "rslab")
+"""Libraries that factorize symmetric matrices."""
 SOLVES = {"static": "refweb.settings:Static", "dynamic": "refweb.settings:Dynamic"}
 """Kinds of ``[solve]``."""
 PARTS = {

@@ -6,7 +6,7 @@ from typing import Literal
 
 from .errors import InputError
 from .messages import shown
-from .registry import INTEGRATORS, STATICS
+from .registry import FACTORIZATIONS, INTEGRATORS, STATICS
 from .tables import Several, Table, boolean, choice, components, integer, nodes, numbers_list, real, table, text
 
 START_STATES = ("web", "equilibrium")
@@ -80,6 +80,9 @@ class Static(Table):
         Values of t.
     mass : {"lumped", "consistent"}
         The weight is the same with either; the modes at the equilibrium and the centrifugal forces are not.
+    factorization : {"auto", "qdldl", "rslab"}
+        Library that factorizes the tangent, see `refweb.system.factorization`; "auto" takes rslab for large nets where
+        it is installed.
 
     Raises
     ------
@@ -97,6 +100,7 @@ class Static(Table):
     method: str = choice(STATICS, default="newton")
     load_steps: Several = numbers_list(default=(1.0,))
     mass: str = choice("lumped", "consistent", default="lumped")
+    factorization: str = choice("auto", *FACTORIZATIONS, default="auto")
 
     def check(self):
         """Refuse more load steps than 100 000."""
@@ -135,6 +139,8 @@ class Dynamic(Table):
         How linear systems are solved, see `refweb.dynamics.integrators.sundials`.
     mass : {"lumped", "consistent"}
         Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
+    factorization : {"auto", "qdldl", "rslab"}
+        Of CVODE, IDA and a start at an equilibrium: library that factorizes the tangent, as of `Static`.
     start : {"web", "equilibrium"} or path
         State at t = 0: the web as it is, its equilibrium under what acts at t = 0 (free bodies do not), or the last
         state in a result folder.
@@ -166,6 +172,7 @@ class Dynamic(Table):
     max_order: int | None = integer(default=None, at_least=1, at_most=12)
     linear_solver: str | None = choice("auto", "block", "sparse", "dense", "fixed-point", default=None)
     mass: str = choice("lumped", "consistent", default="lumped")
+    factorization: str = choice("auto", *FACTORIZATIONS, default="auto")
     start: str = text(default="web")
 
     def check(self):

@@ -4,6 +4,7 @@ Modules are those of a process of its own that runs one scene and nothing else. 
 the lines of the web and the pairs that an effect couples, kernels from what the compiled loop is called with.
 """
 
+import importlib.util
 import json
 import pathlib
 import subprocess
@@ -153,6 +154,8 @@ def called(given):
             modules.add("statics.residual_search")
     if modules >= TANGENT:
         outside.append("qdldl")
+        if given["web"].get("mesh") == "hexagon" and importlib.util.find_spec("rslab"):
+            outside.append("rslab")  # of more unknowns than any other
     if method in ("cvode", "ida"):
         outside.append("sksundae")
     if web == "cable":

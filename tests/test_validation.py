@@ -29,7 +29,7 @@ def test_case(name):
     case = cases.run(name, quick=True)
     assert case.failures == []
     for figure in case.figures:
-        assert figure.caption and plots.png(figure.draw()).startswith(b"\x89PNG")
+        assert figure.caption and plots.image(figure.draw()).png.startswith(b"\x89PNG")
 
 
 def sample():

@@ -255,7 +255,8 @@ class Simulation:
         if integrated := sorted({family.name for family in outer}):
             spent["integrated_impulses"] = integrated
         choice = {} if self._ways is None else self._ways.told()
-        solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
+        made = {"method": self.scene.solve.method, "factorization": self.system.factorized_by}
+        solution.solver = {**SOLVER, **made, **choice, **spent}
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 
     def _frame(self, number, folder, course):
@@ -279,6 +280,7 @@ class Simulation:
             yield from floor_remark(self.system.net, self._largest_stress)
         yield from strength_remark(self.solution.utilisation)
         yield from strain_remark(self._strain)
+        yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()
         for name in self._unfilled:

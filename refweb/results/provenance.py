@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import sys
 
@@ -27,4 +28,7 @@ def versions():
     """Versions of refweb, Python and the libraries that solve, by name."""
     names = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
     own = {"refweb": __version__, "python": sys.version.split()[0]}
-    return {**own, **{name: importlib.metadata.version(name) for name in names}}
+    found = {**own, **{name: importlib.metadata.version(name) for name in names}}
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        found["rslab"] = importlib.metadata.version("rslab")
+    return found

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from ..scene import Scene
 
 SOLVER = dict.fromkeys(
-    "method nsteps nfev njev nlu residual duality_gap above_lowest smallest_pivot slack_nodes energy_drift "
-    "momentum_drift angular_momentum_drift".split()
+    "method factorization nsteps nfev njev nlu residual duality_gap above_lowest smallest_pivot slack_nodes "
+    "energy_drift momentum_drift angular_momentum_drift".split()
 )
 """What a solver reports; None for what it does not know."""
 

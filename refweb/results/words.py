@@ -95,6 +95,7 @@ def on_solver(solver):
     """Sentences on what a solver did, and how far its books close."""
     if solver["residual"] is not None:
         text = f"{solver['method']}: {solver['nsteps']} iterations, {solver['nlu']} factorizations"
+        text += f" by {solver['factorization'].partition(',')[0]}" if solver.get("factorization") else ""
         text += f", residual {solver['residual']:.1e}"
         if solver["duality_gap"] is not None:
             text += f", duality gap {solver['duality_gap']:.1e} J"

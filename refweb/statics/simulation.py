@@ -68,6 +68,7 @@ class Simulation:
     def remarks(self):
         """What a reader of the results has to know."""
         yield from self._remarks.texts()
+        yield from self.system.remarks()
         if self._passage is not None and self.rows:
             yield from self._passage.overlaps.remarks()
 
@@ -95,6 +96,7 @@ class Simulation:
             raise SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
         stats = {key: found.stats.get(key) for key in SOLVER} | {
             "method": scene.solve.method,
+            "factorization": self.system.factorized_by,
             "duality_gap": found.duality_bound.gap if found.duality_bound else None,
             "slack_nodes": len(open_rows(state, found)),
         }

@@ -176,6 +176,7 @@ def _follow(found, rest, number, tell):
         found.spectra.append(here)
         stats = {key: equilibrium.stats.get(key) for key in SOLVER} | {
             "method": method,
+            "factorization": rest.factorized_by,
             "duality_gap": equilibrium.duality_bound.gap if equilibrium.duality_bound else None,
             "smallest_pivot": -1 if here.unstable else 0 if here.zero else 1,
             "slack_nodes": len(open_rows(found.state, equilibrium)),
@@ -184,7 +185,7 @@ def _follow(found, rest, number, tell):
         found.solver = {**stats, **totals}
         found.steps.append({"step": here.step, "results": _results(here), "solver": stats, **_described(here)})
         remarks.note(here.step, remarks_on(here, found.state, equilibrium))
-        found.warnings = list(remarks.texts())
+        found.warnings = [*remarks.texts(), *rest.remarks()]
 
 
 def _results(here):

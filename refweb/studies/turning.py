@@ -30,6 +30,7 @@ from scipy.sparse import block_array, coo_array, csc_array, csc_matrix, diags_ar
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from ..errors import SolverError
+from ..system.factorization import negative_pivots
 from .pencil import DENSE
 
 MOST = 1500
@@ -132,13 +133,10 @@ class Gyroscopic:
 
     def below(self, omega):
         """Number of frequencies between 0 and one, of a definite K."""
-        import qdldl
-
         real = self.pencil.K - omega**2 * self.pencil.M
         turned = omega * self.G
         both = csc_matrix(triu(block_array([[real, -turned], [turned, real]]), format="csc"))
-        pivots = qdldl.Solver(both, upper=True).factors()[1]
-        return int(np.count_nonzero(~(pivots > 0.0))) // 2
+        return negative_pivots(both, self.pencil.system.library) // 2
 
 
 def turning_pairs(pencil, G, number, least):

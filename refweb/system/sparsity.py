@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse
 
@@ -34,6 +36,8 @@ class Pattern:
         Components that are not supported, in the order of the unknowns.
     cells : list of ndarray of int32, shape (cells, arity)
         One entry per family with stiffness.
+    library : refweb.system.factorization.Library
+        What factorizes symmetric matrices.
 
     Attributes
     ----------
@@ -47,8 +51,10 @@ class Pattern:
         Places of the diagonal.
     """
 
-    def __init__(self, rows, free, cells):
+    def __init__(self, rows, free, cells, library):
         self.size = n = len(free)
+        self.library = library
+        library.choose(n)
         number = np.full(3 * rows, -1, dtype=np.int64)
         number[free] = np.arange(n)
         keys: list[np.ndarray] = [np.arange(n) * (n + 1)]
@@ -66,6 +72,11 @@ class Pattern:
         self.upper = np.flatnonzero(row <= col)
         self._upper_indices = self.indices[self.upper]
         self._upper_indptr = np.searchsorted(col[self.upper], np.arange(n + 1)).astype(np.int32)
+
+    @cached_property
+    def lower(self):
+        """Places of the lower triangle, diagonal included, shape (entries,)."""
+        return np.flatnonzero(self.indices >= np.repeat(np.arange(self.size), np.diff(self.indptr)))
 
     def assemble(self, blocks):
         """Values of the pattern from one array of blocks (cells, 3 arity, 3 arity) per family."""

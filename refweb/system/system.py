@@ -34,6 +34,8 @@ class System:
         Values with ``on(net)``.
     supported : ndarray of bool, shape (nodes, 3)
         Components of nodes that do not move, or move as prescribed.
+    factorization : {"auto", "qdldl", "rslab"}
+        What factorizes its symmetric matrices.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class System:
         Components 3 row + axis of the unknowns, increasing.
     """
 
-    def __init__(self, net, effects, supported):
+    def __init__(self, net, effects, supported, factorization="auto"):
         for effect in sorted(effects, key=lambda effect: hasattr(effect, "on")):  # bodies before what makes them turn
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
@@ -71,6 +73,9 @@ class System:
             self.supported[body.row] = body.fixed
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
+        self._factorization = factorization
+        if factorization == "rslab":
+            _ = self.library  # which refuses it where it is not installed
         self._arrange()
 
     def _arrange(self):
@@ -81,11 +86,28 @@ class System:
         self._blocks = [np.empty((count, size, size)) for count, size in sizes]
         self._at_time = None  # the last time that lengths were asked for, and `line_data` then
 
+    @cached_property
+    def library(self):
+        """What factorizes its symmetric matrices, a `refweb.system.factorization.Library`."""
+        from .factorization import Library
+
+        return Library(self._factorization)
+
+    @property
+    def factorized_by(self):
+        """The library that has factorized and the reason, in words; None where none has."""
+        return self.library.why if "library" in self.__dict__ else None
+
+    def remarks(self):
+        """What a reader of results has to know of their factorizations, each a text."""
+        return self.library.remarks if "library" in self.__dict__ else []
+
     def at_rest(self):
         """The system as statics sees it: free bodies are held and felt by nothing, what needs velocity is left out."""
         waiting = [body.row for body in self.net.bodies if not body.fixed]
         if not waiting and all(family.at_rest for family in self.families):
             return self
+        _ = self.library  # both say what factorizes for either
         rest = copy.copy(self)
         for kept in ("pattern", "unsupported_parts", "mass", "links"):
             rest.__dict__.pop(kept, None)
@@ -131,7 +153,7 @@ class System:
         """The fixed `refweb.system.sparsity.Pattern` of the tangent."""
         from .sparsity import Pattern
 
-        return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent])
+        return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent], self.library)
 
     @cached_property
     def mass(self):

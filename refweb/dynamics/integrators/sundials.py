@@ -174,7 +174,7 @@ class Symmetric(Factor):
 
     def apply(self, b):
         """Solution of A y = b."""
-        return self._solver.solve(b)
+        return self._by.solve(b)
 
 
 class Unsymmetric:
