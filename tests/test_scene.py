@@ -214,7 +214,7 @@ def test_defaults(tmp_path):
             "subdivide": 1,
             "groups": {},
         },
-        "solve": {"kind": "static", "method": "newton", "load_steps": [1.0], "mass": "lumped"},
+        "solve": {"kind": "static", "method": "newton", "load_steps": [1.0], "mass": "lumped", "factorization": "auto"},
         "output": {"frames": 1},
         "observe": [
             {"name": "deflection", "quantity": "displacement", "reduce": "max"},

@@ -7,10 +7,13 @@ import pathlib
 def add_arguments(parser):
     """The folder, what is drawn of it, how and where."""
     folder = parser.add_argument("folder", metavar="DIR")
-    parser.add_argument("--frame", type=int, metavar="N", help="number of the frame; -1 is the last")
+    parser.add_argument(
+        "--frame", type=int, metavar="N", help="number of the frame, of modes that of the mode; -1 is the last"
+    )
     text = "the frame nearest this time [s] or load step (default: that of the largest value of the first observable)"
     parser.add_argument("--time", type=float, metavar="T", help=text)
-    parser.add_argument("--field", metavar="NAME", help="what the colours show (default: stress)")
+    text = "what the colours show: stress, tension, strain, slack, displacement, velocity, reaction (default: stress)"
+    parser.add_argument("--field", metavar="NAME", help=text)
     text = "range of the colours [SI], --range=-1e3,2e3 where it begins with a minus, or auto: that of the one frame "
     text += "(default: that of all frames)"
     parser.add_argument("--range", nargs="+", action=_Words, most=2, folder=folder, metavar=("LOW", "HIGH"), help=text)

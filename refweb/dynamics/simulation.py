@@ -255,8 +255,7 @@ class Simulation:
         if integrated := sorted({family.name for family in outer}):
             spent["integrated_impulses"] = integrated
         choice = {} if self._ways is None else self._ways.told()
-        made = {"method": self.scene.solve.method, "factorization": self.system.factorized_by}
-        solution.solver = {**SOLVER, **made, **choice, **spent}
+        solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 
     def _frame(self, number, folder, course):

@@ -223,10 +223,10 @@ def _size(data):
 
 
 def _fields(mesh, blocks):
-    """Cell data, and point data as the mean over the nodes of each line; of vectors the magnitude."""
+    """Cell data, and point data as the largest over the nodes of each line; of vectors the magnitude."""
     fields = {name: np.concatenate([_size(data[i]) for i, _ in blocks]) for name, data in mesh.cell_data.items()}
     for name, data in mesh.point_data.items():
-        fields.setdefault(name, np.concatenate([_size(data)[cells].mean(axis=1) for _, cells in blocks]))
+        fields.setdefault(name, np.concatenate([_size(data)[cells].max(axis=1) for _, cells in blocks]))
     return fields
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..messages import nearest, shown
 from ..results.files import write_atomically
+from ..results.solution import SolutionData
 from . import render
 from .camera import VIEWS
 from .polygons import polygons
@@ -26,6 +27,8 @@ from .record import of_folder, of_solution
 from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
 SIZE = (1600, 1000)
+MOST_SCALED = 1e6
+"""Largest factor on displacements."""
 """Of a picture [pixel]."""
 
 
@@ -42,8 +45,8 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
         The frame nearest a time [s], in statics a load step, is drawn. Default the one nearest the largest value of the
         first observable; of modes the first.
     field : str, optional
-        Cell data, or point data: lines show the mean over their nodes, of vectors the magnitude. Default ``stress``, of
-        modes ``shape``, or the first there is.
+        Cell data, or point data: lines show the largest of their nodes, of vectors the magnitude. Default
+        ``stress``, of modes ``shape``, or the first there is.
     range : (low, high) or "auto", optional
         What the colours span [SI]; ``"auto"`` the values of this frame. Default the values of all frames.
     scale : float
@@ -102,14 +105,16 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
 
 def record_of(source):
     """The record of a solution or a folder."""
+    if not isinstance(source, str | os.PathLike | SolutionData):
+        raise InputError(f"source = {shown(source)} must be a Solution or a result folder")
     return of_folder(source) if isinstance(source, str | os.PathLike) else of_solution(source)
 
 
 def look_of(record, frame, field, limits, scale, view):
     """What is asked for, checked, as a `Look`; without limits [SI] they are those of all frames."""
     field = _field(frame, field)
-    if not (np.isfinite(scale) and scale > 0):
-        raise InputError(f"scale = {scale} must be > 0")
+    if not isinstance(scale, int | float) or not 0.0 < scale <= MOST_SCALED:
+        raise InputError(f"scale = {shown(scale)} must be a number > 0 and ≤ {MOST_SCALED:g}")
     return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
 
 
@@ -125,7 +130,7 @@ def clock_line(record, number, look, decimals=None):
     if look.scale != 1:
         parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {look.scale:g}")
     if record.status != "solved":
-        parts.append(f"run {record.status}")
+        parts.append("run not ended" if record.status == "running" else f"run {record.status}")
     return "  —  ".join(parts)
 
 
@@ -214,4 +219,4 @@ def _view(view):
         raise InputError(f"view = {shown(view)}: is no view, {nearest(str(view), VIEWS)}") from None
     if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
         raise InputError(f"view = {shown(view)} must be one of {', '.join(VIEWS)}, or three numbers, not all 0")
-    return direction
+    return direction / np.abs(direction).max()

@@ -585,3 +585,26 @@ def test_options_of_the_command(film, no_opengl, tmp_path, capsys):
 def test_import_stays_light():
     code = "import sys, refweb.pictures.film; print(*({'pyvista', 'vtkmodules', 'matplotlib'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.strip() == ""
+
+
+def test_lines_show_the_largest_of_their_nodes(film):
+    """As results do: the largest displacement of the nodes is the largest that a line shows."""
+    mesh = meshio.read(film / "frames/web_000020.vtu")
+    sizes = np.linalg.norm(mesh.point_data["displacement"], axis=1)
+    shown = read(film, 20).fields["displacement"]
+    assert shown.tolist() == sizes[mesh.cells[0].data].max(axis=1).tolist() and shown.max() == sizes.max()
+
+
+def test_what_is_no_number_or_too_large_is_refused(film):
+    for options, words in (
+        (dict(scale=1e300), "scale = 1e+300 must be a number > 0 and ≤ 1e+06"),
+        (dict(scale="big"), 'scale = "big" must be a number'),
+    ):
+        with pytest.raises(InputError, match=re.escape(words)):
+            pictures.picture(film, **options)
+    with pytest.raises(InputError, match="source = 3 must be a Solution or a result folder"):
+        refweb.picture(3)
+    far, near = (
+        pictures.look_of(of_folder(film), read(film, 20), None, None, 1.0, (s, 0.0, 0.0)) for s in (1e200, 1.0)
+    )
+    assert far.view.tolist() == near.view.tolist() == [1.0, 0.0, 0.0]

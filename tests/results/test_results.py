@@ -87,7 +87,7 @@ def check_solver(solver):
     counts = ["nsteps", "nfev", "njev", "nlu"]
     bounds = ["residual", "duality_gap", "above_lowest", "smallest_pivot", "slack_nodes"]
     drifts = ["energy_drift", "momentum_drift", "angular_momentum_drift"]
-    assert list(solver) == ["method", *counts, *bounds, *drifts] and solver["method"] == "newton"
+    assert list(solver) == ["method", "factorization", *counts, *bounds, *drifts] and solver["method"] == "newton"
     assert all(type(solver[key]) is int and solver[key] > 0 for key in counts)
     assert 0.0 <= solver["residual"] <= 1e-9 and solver["duality_gap"] > 0.0
     assert (

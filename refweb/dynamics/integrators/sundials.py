@@ -73,7 +73,8 @@ class Sundials(StepObserver):
 
     def spent(self, course):
         """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""
-        return {**super().spent(course), "linear_solver": self.choice}
+        made = {"linear_solver": self.choice, "factorization": self.system.factorized_by}
+        return {**super().spent(course), **made}
 
     # The linear solver
 
