@@ -8,7 +8,7 @@ import numpy as np
 
 from ..results.units import readable
 from .histories import clock_of, tick_steps
-from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, label, legend, telling
+from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, dot, label, legend, telling
 from .shown import unit_of
 
 AXES = "xyz"
@@ -75,7 +75,7 @@ def energy(shown):
     factor, unit = unit_of("J", book.top, book.given)
     keep = telling(*book.parts.values(), most=300)
     at = s.along[keep] / second
-    if len(keep) == 1:  # of one load step a column as broad as half a step
+    if len(keep) == 1 and not dynamic:  # of one load step a column as broad as half a step
         keep, at = np.repeat(keep, 2), at + np.array([-0.25, 0.25])
 
     def stack(axes):
@@ -84,11 +84,12 @@ def energy(shown):
             above = below + values[keep] / factor
             fill = {"facecolor": COLOURS[number % 7], "edgecolor": (1.0, 1.0, 1.0, 0.5), "linewidth": 0.0}
             area = axes.fill_between(at, below, above, hatch=HATCHES[number % len(HATCHES)], **fill)
+            if len(keep) == 1:  # an instant has no breadth
+                axes.vlines(at, below, above, color=COLOURS[number % 7], linewidth=12.0)
             entries.append((area, _called(name, book.least[name])))
             below = above
-        (line,) = axes.plot(at, below, color=DARK, linewidth=1.6)
-        total = "sum" if dynamic else "sum: total energy"
-        entries.append((line, total))
+        (line,) = axes.plot(at, below, color=DARK, linewidth=1.6, marker=dot(keep))
+        entries.append((line, _called("sum", sum(book.least.values()))))
         if dynamic:
             start = "at the start" + (" + work" if GIVEN in s.energies else "")
             (line,) = axes.plot(at, book.given[keep] / factor, color="white", linestyle=(0, (2, 2)), linewidth=1.6)
@@ -131,7 +132,7 @@ def _drifts(shown, what, second, clock):
         for s, drift in zip(shown, drifts, strict=True):
             keep = telling(drift)
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, **style)
+            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, marker=dot(keep), **style)
             said = s.said(_share(s, "energy_drift", what))
             entries += [(line, said)] if said else []
         label(axes, "drift", unit)
@@ -161,7 +162,7 @@ def _energies_beside(shown):
             for s in having:
                 keep = telling(s.history[name])
                 style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
-                axes.plot(s.along[keep] / second, s.history[name][keep] / factor, **style)
+                axes.plot(s.along[keep] / second, s.history[name][keep] / factor, marker=dot(keep), **style)
             label(axes, name.removesuffix("_energy").replace("_", " "), unit)
             if first:
                 legend(axes, names_of(axes, shown))
@@ -272,7 +273,9 @@ def _momenta(axes, s, book, second, factor, several):
         ink = Ink.of(number)
         style = {"color": s.ink.colour if several else ink.colour, "linestyle": ink.style}
         keep = telling(values)
-        (line,) = axes.plot(at[keep], values[keep] / factor, linewidth=1.6 if number == 0 else 1.1, **style)
+        (line,) = axes.plot(
+            at[keep], values[keep] / factor, marker=dot(keep), linewidth=1.6 if number == 0 else 1.1, **style
+        )
         handle = line if not several else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
         entries.append((handle, words))
     keep = telling(book.given)
@@ -291,7 +294,7 @@ def _momentum_drifts(shown, books, second, clock):
         for s, axis, drift in drifts:
             keep, ink = telling(drift), Ink.of(AXES.index(axis))
             style = {"color": s.ink.colour if s.name else ink.colour, "linestyle": ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, **style)
+            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, marker=dot(keep), **style)
             if s is shown[0]:
                 handle = line if not s.name else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
                 entries.append((handle, f"along {axis}"))

@@ -75,7 +75,7 @@ def largest(record, field):
 
 
 def _place(record, frame, middles, values, field):
-    """Where a web was hit or loaded [m], else where the largest value is; and that in words."""
+    """Where a web was hit or loaded [m], else where the largest value is, its centre if all is slack; and its words."""
     numbers = np.asarray(frame.fields.get("line", np.arange(len(values))))
     touched = {
         name: body for name, body in (record.summary.get("bodies") or {}).items() if body.get("line") is not None
@@ -86,6 +86,10 @@ def _place(record, frame, middles, values, field):
     loaded = _loaded(record, frame, numbers)
     if loaded is not None:
         return loaded
+    if frame.slack.all() or not (values > 0.0).any():
+        why = "all lines are slack" if frame.slack.all() else f"no line has {field}"
+        points = frame.origin.reshape(-1, 3)
+        return 0.5 * (points.min(axis=0) + points.max(axis=0)), f"the centre of the web, as {why}"
     line = int(np.nanargmax(values))
     return middles[line], f"line {int(numbers[line])}, where {field} is largest"
 
@@ -121,14 +125,17 @@ def distances(shown, field):
             size = 3.0 if len(one.values) > 500 else 5.0
             dots = {"linestyle": "", "markersize": size, "rasterized": many, "markeredgewidth": 0.0, "alpha": 0.75}
             far, values = one.distance / metre, one.values / factor
-            (points,) = axes.plot(far[taut], values[taut], marker=s.ink.marker, color=s.ink.colour, **dots)
-            largest = readable(float(np.nanmax(one.values)), None, FIELDS[field])
             place = f", from {one.origin}" if len(places) > 1 else ""
-            entries.append((points, s.said(f"lines at {at(s.record, one.frame.time)}, at most {largest}{place}")))
+            when = at(s.record, one.frame.time)
+            if taut.any():
+                (points,) = axes.plot(far[taut], values[taut], marker=s.ink.marker, color=s.ink.colour, **dots)
+                largest = readable(float(np.nanmax(one.values)), None, FIELDS[field])
+                entries.append((points, s.said(f"lines at {when}, at most {largest}{place}")))
             if one.slack.any():
                 look = {"linestyle": "", "marker": "x", "markersize": size + 1, "rasterized": many}
                 (points,) = axes.plot(far[one.slack], values[one.slack], color=s.ink.colour if s.name else PALE, **look)
-                entries.append((points, s.said(f"slack: {one.slack.sum()} of {len(one.slack)} lines")))
+                all_of_it = "" if taut.any() else f" at {when}{place}"
+                entries.append((points, s.said(f"slack: {one.slack.sum()} of {len(one.slack)} lines{all_of_it}")))
         label(axes, field, called)
         legend(axes, entries)
 

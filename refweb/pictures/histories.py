@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..results.units import scale_of
-from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, label, legend, telling
+from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, dot, label, legend, telling
 from .shown import bar, told, unit_of
 
 OF_ALL = "Points: results of all steps, with ± where it is known. Lines: rows of the history."
@@ -17,7 +17,8 @@ def history(shown, name):
     """The panel of a column of the history over time: its result stands as a point with ± where it was found."""
     having = [s for s in shown if name in s.units]
     unit = having[0].units[name]
-    factor, called = unit_of(unit, *(s.history[name] for s in having))
+    found = [s.results[name].value for s in having if name in s.results]
+    factor, called = unit_of(unit, *(s.history[name] for s in having), *found)
     second, clock = clock_of(having)
 
     def draw(axes):
@@ -25,7 +26,7 @@ def history(shown, name):
         for s in having:
             keep = telling(s.history[name])
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
-            style["marker"] = "." if len(keep) == 1 else ""
+            style["marker"] = dot(keep)
             (line,) = axes.plot(s.along[keep] / second, s.history[name][keep] / factor, **style)
             result = s.results.get(name)
             if result is None or not np.isfinite(result.value):

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import functools
 import io
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest, short
+from ..messages import shown as as_shown
 from ..results.files import write_atomically
 from . import books, distances, histories, spectra
 from .pictures import png, target
@@ -93,22 +95,46 @@ def draw(records, what=None, title=None):
 def _drawn(records, what, title=None):
     """The figure of some records, and which of them lack what, in words."""
     shown, notes = _beside(records)
-    names = [what] if isinstance(what, str) else list(what or _usual_of_all(shown))
-    panels, missing = [], {}
-    for name in dict.fromkeys(_meant(shown, name) for name in names):
+    panels, missing, asked = [], {}, {}
+    for typed in _asked(shown, what):
+        asked.setdefault(_meant(shown, typed), typed)
+    for name, typed in asked.items():
         having = [s for s in shown if _has(s, name)]
         if not having:
-            known = dict.fromkeys(k for s in shown for k in (*kinds(s.record), *s.units))
-            if name.startswith(SPECTRUM):
-                known = [f"{SPECTRUM}{column}" for s in shown for column in list(s.units)[1:]]
-            raise InputError(f'quantity = "{short(name)}": there is nothing of that name, {nearest(name, known)}')
+            _refuse(shown, name, typed)
         panels += _panels(having, name)
         for s in shown:
-            missing.setdefault(s.name, []).extend([name] if s not in having else [])
+            missing.setdefault(s.name, []).extend([typed] if s not in having else [])
     lacking = tuple(f"{who} has no {', '.join(names)}" for who, names in missing.items() if names)
     figure = sheet(panels, _title(shown) if title is None else title, [*notes, *lacking])
     setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
     return figure, lacking
+
+
+def _asked(shown, what):
+    """Names of what is to be drawn, as they were typed; the usual ones where there are none."""
+    several = isinstance(what, Iterable) and not isinstance(what, str)
+    names = _usual_of_all(shown) if what is None else list(what) if several else [what]
+    for name in names:
+        if not isinstance(name, str):
+            raise InputError(f"quantity = {as_shown(name)}: is not a name, {nearest(name, _known(shown))}")
+    return names or _usual_of_all(shown)
+
+
+def _known(shown):
+    """Names of all that can be drawn of some records, and of the columns of their tables."""
+    return dict.fromkeys(name for s in shown for name in (*kinds(s.record), *s.units))
+
+
+def _refuse(shown, name, typed):
+    """Say why there is nothing to draw of a name that stands for nothing here."""
+    known, kind = _known(shown), shown[0].record.kind
+    if name.startswith(SPECTRUM) or name == "spectrum":
+        if kind != "dynamic":
+            has = "modes have" if kind == "modes" else f"a {kind} run has"
+            raise InputError(f"quantity = {as_shown(typed)}: {has} no spectrum, which is of a history over time")
+        known = [f"{SPECTRUM}{column}" for s in shown for column in list(s.units)[1:]]
+    raise InputError(f"quantity = {as_shown(typed)}: there is nothing of that name, {nearest(typed, known)}")
 
 
 def _meant(shown, name):

@@ -19,6 +19,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F
 """Colours that colour-blind people tell apart, by Okabe and Ito (2008)."""
 STYLES = ("-", "--", "-.", ":", (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 2)), (0, (9, 2, 2, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+NARROWEST = 1e-3
+"""Least height of a panel over the largest value on its axis: below it ticks would need too many digits."""
 MOST = 1000
 """Parts of a long history whose extremes are drawn: about one for each pixel."""
 
@@ -80,12 +82,28 @@ def sheet(panels, title, notes=()):
             column[number - 1].set_xlabel("")
         axes.set_xlabel(panel.along, size=LETTERS, color=DARK)
         panel.draw(axes)
+        true_ticks(axes)
     look = {"x": 0.02, "ha": "left", "parse_math": False}
     if words:
         figure.suptitle("\n".join(words), size=LETTERS + 2, weight="bold", color=DARK, **look)
     if below:
         figure.supxlabel("\n".join(below), size=LETTERS - 1, color=DARK, **look)
     return figure
+
+
+def true_ticks(axes):
+    """Let ticks show values as they are: no offset and no power of ten beside the axis, in a window wide enough."""
+    from matplotlib.ticker import ScalarFormatter
+
+    if axes.get_yscale() == "linear":
+        low, high = axes.get_ylim()
+        lacking = NARROWEST * max(abs(low), abs(high)) - (high - low)
+        if lacking > 0.0:
+            axes.set_ylim(low - 0.5 * lacking, high + 0.5 * lacking)
+    for axis in (axes.xaxis, axes.yaxis):
+        if isinstance(formatter := axis.get_major_formatter(), ScalarFormatter):
+            formatter.set_useOffset(False)
+            formatter.set_scientific(False)
 
 
 def legend(axes, entries, columns=1):
@@ -103,6 +121,11 @@ def legend(axes, entries, columns=1):
 def label(axes, name, unit=""):
     """Name the vertical axis, with its unit."""
     axes.set_ylabel(f"{name} [{unit}]" if unit else name, size=LETTERS, color=DARK, parse_math=False)
+
+
+def dot(rows):
+    """The marker of a line through some rows: a dot where there is one row, of which a line shows nothing."""
+    return "." if len(rows) == 1 else ""
 
 
 def telling(*columns, most=MOST):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..results.units import readable, scale_of
+from ..results.units import scale_of, with_error
 from .sheet import DARK, Panel, label, legend, telling
 from .shown import unit_of
 
@@ -17,6 +17,8 @@ EVEN = 1e-6
 """Share of the interval by which rows may be off."""
 WIDTH_OF_A_LINE = 2.0
 """Resolution of the window over 1/duration: two equal sines that are farther apart are two peaks."""
+STANDS_OUT = 2.0
+"""Factor by which a peak is above the valleys on both of its sides."""
 DECADES = 5
 """Powers of ten below the largest amplitude that are drawn."""
 
@@ -33,8 +35,8 @@ class Spectrum(NamedTuple):
     resolution : float
         How far apart two frequencies have to be to be told apart [Hz].
     peak : int, optional
-        Number of the largest amplitude that is above those beside it and, in frequency, above the resolution; None
-        where there is none, as in a history that only grows.
+        Number of the highest peak at or above the resolution that stands out by `STANDS_OUT` from the valleys on both
+        sides; None where there is none, as in a history that only grows.
     """
 
     frequency: np.ndarray
@@ -78,7 +80,20 @@ def spectrum_of(time, values, name="history"):
     resolution = WIDTH_OF_A_LINE / (step * len(time))
     inner = amplitude[1:-1]
     high = 1 + np.flatnonzero((inner > amplitude[:-2]) & (inner > amplitude[2:]) & (frequency[1:-1] >= resolution))
-    return Spectrum(frequency, amplitude, resolution, int(high[amplitude[high].argmax()]) if len(high) else None)
+    falling = high[np.argsort(-amplitude[high], kind="stable")]
+    peak = next((int(number) for number in falling if _stands_out(amplitude, number)), None)
+    return Spectrum(frequency, amplitude, resolution, peak)
+
+
+def _stands_out(amplitude, number):
+    """Whether both valleys between a peak and what is higher are low; frequency 0 is none, as the mean is left out."""
+    height = amplitude[number]
+    for side in (amplitude[number - 1 : 0 : -1], amplitude[number + 1 :]):
+        higher = np.flatnonzero(side > height)
+        valley = side[: higher[0]] if len(higher) else side
+        if not len(valley) or STANDS_OUT * valley.min() > height:
+            return False
+    return True
 
 
 def spectrum(shown, name):
@@ -112,8 +127,17 @@ def spectrum(shown, name):
 
 
 def _peak(one, unit):
-    """The largest peak of a spectrum in words."""
+    """The peak of a spectrum in words, and where it is highest if that is elsewhere."""
     if one.peak is None:
-        return "no peak"
-    at, height = float(one.frequency[one.peak]), float(one.amplitude[one.peak])
-    return f"largest peak at {readable(at, 0.5 * one.resolution, 'Hz')}: {readable(height, None, unit)}"
+        return "no peak stands out"
+    error = 0.5 * one.resolution
+    words = f"highest peak that stands out at {_near(one, one.peak, unit, error)}"
+    top = int(one.amplitude.argmax())
+    return words if top == one.peak else f"{words}; most of all at {_near(one, top, unit, error)}"
+
+
+def _near(one, number, unit, error):
+    """A frequency with ± and its amplitude, in words."""
+    height = float(one.amplitude[number])
+    factor, name = scale_of(height, unit)
+    return f"{with_error(float(one.frequency[number]), error)} Hz: {height / factor:.3g} {name}".rstrip()

@@ -14,7 +14,7 @@ from refweb.errors import InputError
 from refweb.pictures import books, distances, plots, sheet
 from refweb.pictures.record import of_folder, of_solution
 from refweb.pictures.shown import Shown
-from refweb.pictures.spectra import FEWEST, spectrum_of
+from refweb.pictures.spectra import FEWEST, _peak, _stands_out, spectrum_of
 
 SOLVE = '[solve]\nkind = "static"\nload_steps = [1, 2, 3]'
 THROWN = """
@@ -152,6 +152,57 @@ def test_energies_are_stacked_to_what_came_in(runs):
     np.testing.assert_allclose(axes.get_lines()[-1].get_ydata(), factor * (book.top[0] + work))
 
 
+def test_the_sum_of_energies_is_told_above_what(runs):
+    """What the legend says the sum is above, and the height of its line, are the total energy and loss together."""
+    for name, tail in {"static": "", "dynamic": "dissipated_energy"}.items():
+        axes = of(plots.draw(of_folder(runs / name), "energy"), "energy")
+        factor = {"J": 1.0, "mJ": 1e-3, "µJ": 1e-6}[axes.get_ylabel().split("[")[1][:-1]]
+        said = [text.get_text().strip() for text in axes.get_legend().get_texts()]
+        (words,) = (text for text in said if text.startswith("sum"))
+        number, unit = words.removeprefix("sum above ").split() if "above" in words else ("0", "J")
+        assert ("above" in words) == any("potential above" in text for text in said)
+        table = shown(runs / name).history
+        drawn = factor * axes.get_lines()[0].get_ydata() + float(number) * {"J": 1.0, "mJ": 1e-3, "µJ": 1e-6}[unit]
+        expected = table["total_energy"] + (table[tail] if tail else 0.0)
+        # six digits of the number in the legend
+        np.testing.assert_allclose(drawn, expected, rtol=0.0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_a_history_of_one_row(runs):
+    """Is drawn at its instant, and in the unit of its result, where that is larger than the row."""
+    record = of_folder(runs / "dynamic")
+    first = {name: column[:1] for name, column in record.table()[1].items()}
+    one = record._replace(table=lambda: (record.table()[0], first))
+    energies = of(plots.draw(one, "energy"), "energy")
+    ends = [part.vertices[:, 0] for area in energies.collections for part in area.get_paths()]
+    assert ends and all(np.all(x == first["time"][0]) for x in ends)
+    assert all(line.get_marker() == "." for line in of(energies.figure, "drift").get_lines())
+    axes = of(plots.draw(one, "deflection"), "deflection")
+    (ends,) = spans(axes)
+    assert axes.get_ylabel() == "deflection [mm]"
+    assert ends[:, 1].mean() == pytest.approx(1e3 * refweb.load(runs / "dynamic").results["deflection"].value)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_ticks_are_true(runs, rows):
+    """No axis has an offset or a power beside it; each tick reads as its value, also where values hardly differ."""
+    record = of_folder(runs / "static")
+    steps = json.loads(json.dumps(record.summary["steps"][:rows]))
+    for step in steps:
+        step["results"]["deflection"] |= {"value": -1.177709927 + 1e-11 * step["step"], "error": 1e-11}
+    table = {name: column[:rows] for name, column in record.table()[1].items()}
+    few = record._replace(summary={**record.summary, "steps": steps}, table=lambda: (record.table()[0], table))
+    figure = plots.draw(few, "deflection")
+    figure.draw_without_rendering()
+    axes = of(figure, "deflection")
+    assert axes.yaxis.get_offset_text().get_text() == axes.xaxis.get_offset_text().get_text() == ""
+    said = [text.get_text().replace("\N{MINUS SIGN}", "-") for text in axes.get_yticklabels()]
+    assert max(map(len, said)) <= 8 and len(set(said)) == len(said) > 2
+    np.testing.assert_allclose([float(text) for text in said], axes.get_yticks(), rtol=1e-12)
+    low, high = axes.get_ylim()
+    assert low < -1.177709927 < high
+
+
 def test_momentum_against_impulses(runs):
     """Momentum is what supports, load, gravity and damping gave, along each axis."""
     book = books.momentum_book(shown(runs / "dynamic"))["z"]
@@ -189,6 +240,22 @@ def test_a_spectrum_that_there_is_not():
     end = np.append(time, time[-1] + 0.03)
     assert np.array_equal(spectrum_of(end, np.cos(end)).amplitude, spectrum_of(time, np.cos(time)).amplitude)
     assert spectrum_of(time, np.exp(time)).peak is None
+
+
+def test_a_peak_stands_out():
+    """By a factor of two from the valleys on both sides; a trend that is higher is told, and waves on it are none."""
+    time = np.arange(400) * 1e-2
+    ring = 0.2 * np.sin(2 * np.pi * 20 * time)
+    found = spectrum_of(time, 5.0 * time + ring)
+    assert found.frequency[found.peak] == 20.0 and found.amplitude[1] > found.amplitude[found.peak]
+    assert "highest peak that stands out at 20.00 ± 0.25 Hz: 200 mm; most of all at 0.25 ± 0.25" in _peak(found, "m")
+    alone = spectrum_of(time, ring)
+    assert _peak(alone, "m") == "highest peak that stands out at 20.00 ± 0.25 Hz: 200 mm"
+    amplitude = np.array([0.0, 9.0, 5.0, 2.0, 2.08, 1.0, 0.5])  # a wave 4 % above the valley to its left
+    assert not _stands_out(amplitude, 4) and _stands_out(np.where(amplitude == 2.08, 4.1, amplitude), 4)
+    assert not _stands_out(amplitude[::-1], 2)
+    assert not _stands_out(np.array([0.0, 4.0, 2.0]), 1)  # the mean, which is left out, is no valley
+    assert _peak(spectrum_of(time, np.exp(time)), "m") == "no peak stands out"
 
 
 def test_stress_over_distance(runs):
@@ -233,6 +300,27 @@ def test_distances_are_from_where_a_body_touches(runs):
     near = distances.spread(moved, "stress")
     assert abs(near.frame.time - time) == min(abs(t - time) for t in moved.times.values()) > 0.0
     assert "nearest to deflection" in near.note
+
+
+def test_distances_where_all_is_slack(runs):
+    """From the centre if nothing is hit or loaded, and told; from the node that is loaded else."""
+    record = of_folder(runs / "static")
+
+    def slack(number):
+        frame = record.frame(number)
+        none = {name: np.zeros_like(v) if name in distances.FIELDS else v for name, v in frame.fields.items()}
+        return frame._replace(fields=none, slack=np.ones(len(frame.slack), dtype=bool))
+
+    still = record._replace(frame=slack)
+    assert "which is loaded" in distances.spread(still, "stress").origin
+    bare = still._replace(scene={})
+    found = distances.spread(bare, "stress")
+    assert found.origin == "the centre of the web, as all lines are slack"
+    web = refweb.load(runs / "static").scene.build().net.web
+    middles = web.points[web.lines].mean(axis=1)
+    np.testing.assert_allclose(found.distance, np.linalg.norm(middles - web.points.mean(axis=0), axis=1), atol=1e-12)
+    words = texts(plots.draw(bare, "stress"))
+    assert "largest" not in words and f"slack: {len(found.slack)} of {len(found.slack)} lines at step 3" in words
 
 
 def test_load_steps_with_their_error(runs):
@@ -398,6 +486,20 @@ def test_a_quantity_that_there_is_not(runs, tmp_path, name):
     with pytest.raises(InputError, match=re.escape(WRONG[name])):
         plots.plot([runs / "dynamic"], quantity=name, out=tmp_path / "plot.png")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_refusals_name_what_was_typed(runs):
+    """Not what it stands for; a run that has no spectrum is told to have none; what is no text is no name."""
+    for name, typed, said in [
+        ("modes", "stress", 'quantity = "stress": there is nothing of that name'),
+        ("modes", "spectrum", 'quantity = "spectrum": modes have no spectrum'),
+        ("static", "spectrum", 'quantity = "spectrum": a static run has no spectrum'),
+        ("static", "spectrum:deflection", 'quantity = "spectrum:deflection": a static run has no spectrum'),
+        ("dynamic", 3, "quantity = 3: is not a name, known: deflection, speed"),
+        ("dynamic", ["energy", True], "quantity = true: is not a name"),
+    ]:
+        with pytest.raises(InputError, match=re.escape(said)):
+            plots.draw(of_folder(runs / name), typed)
 
 
 def test_places_and_folders_that_cannot_be(runs, tmp_path):
