@@ -216,13 +216,13 @@ class Solution(SolutionData):
             write(figure, path)
         return figure
 
-    def report(self, out, frames: int | None = None) -> pathlib.Path:
+    def report(self, out: str | PathLike | None = None, frames: int | None = None) -> pathlib.Path:
         """Write one page of the run, HTML that needs nothing else, with the web in space to turn and play.
 
         Parameters
         ----------
-        out : path-like
-            The file, which ends in ``.html``.
+        out : path-like, optional
+            The file, which ends in ``.html``; by default ``report.html`` in the folder of the run, where it has one.
         frames : int, optional
             Number of frames to turn and play; by default as many as leave the page small.
 
@@ -234,7 +234,7 @@ class Solution(SolutionData):
         Raises
         ------
         InputError
-            Where the file cannot be written or ``frames`` is below 1.
+            Where the file cannot be written, ``frames`` is below 1, or a solution in memory gets no ``out``.
         """
         from .pages.page import report_of
 

@@ -356,6 +356,8 @@ MUTANTS = [
     ),
     Mutant("pages/markup", 'written.replace("<", "\\\\u003c")', "written"),
     Mutant("pages/page", "hashlib.sha256(script.encode())", "hashlib.sha256(script[1:].encode())"),
+    Mutant("pages/page", "if not len(next(iter(history.values()), [])):", "if history is None:"),
+    Mutant("pages/markup", "zip(columns, cells, strict=True)", "zip(columns[::-1], cells, strict=True)"),
     Mutant("pictures/paraview", '"vector": points.get(look.field, 1) > 1', '"vector": look.field in points'),
     Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
     Mutant("reference/schema", "without=every - set(own)", "without=()"),

@@ -1,6 +1,7 @@
 """Look at a result folder: its page in a browser, a window, or a script for ParaView."""
 
 import pathlib
+import sys
 
 from ..errors import InputError
 
@@ -47,4 +48,5 @@ def _browse(folder):
             report(folder, progress=tell)
     print(page)
     if not webbrowser.open(page.resolve().as_uri()):
-        raise InputError(f"{page}: there is no browser to open it with; it is one file, open it wherever there is one")
+        words = "no browser was found to open it with; it is one file, open it wherever there is one"
+        print(f"refweb: {page}: {words}", file=sys.stderr)

@@ -19,13 +19,16 @@ MOST_PLOTS = 16
 """Plots that a page has at most."""
 
 
-def space(record, frames=None, progress=None):
-    """The web in space, and the data it needs."""
-    peak = record.chosen() if record.times else None
-    found = space_of(record, peak, frames, progress) if record.times else None
+def frames_of(record, frames=None, progress=None):
+    """The `Space` of a record; None where none of its frames can be drawn."""
+    return space_of(record, record.chosen(), frames, progress) if record.times else None
+
+
+def space(record, found):
+    """The web in space, and the data it needs; ``found`` is what `frames_of` gives."""
     if found is None:
         return section("space", "In space", tag("p", "No frame of this run can be drawn."))
-    head = found.head
+    head, peak = found.head, record.chosen()
     head["labels"] = [record.clock(number) for number in found.shown]
     head["peak"] = found.shown.index(peak) if peak in found.shown else len(found.shown) - 1
     for field in head["fields"]:
@@ -49,8 +52,8 @@ def _on_frames(record, found, peak):
     if found.missing:
         words.append(f"Not to be read: {', '.join(map(str, found.missing))}.")
     words.append(
-        f"Points are within {found.error / found.extent:.0e} of the web's extent, values within 0.2 % of their range "
-        "in a frame."
+        f"Points are within {found.error / found.extent:.0e} of the web's extent, values of lines within 0.2 % of "
+        "their range in a frame."
     )
     return " ".join(words)
 

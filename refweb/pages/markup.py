@@ -30,11 +30,24 @@ def section(identity, heading, *content):
 
 
 def table(columns, rows, last=()):
-    """Rows below names of columns, the first cell of each as its head, in a box that scrolls if it is too wide."""
+    """Rows below names of columns, the first cell of each as its head, in a box that scrolls if it is too wide.
+
+    Each cell has the name of its column as ``data-label``, for narrow screens, where rows are cards.
+    """
     head = tag("tr", [tag("th", name, scope="col") for name in columns])
-    body = [tag("tr", [tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:])]) for row in rows]
-    body += [tag("tr", [tag("td", cell) for cell in last], class_="last")] if last else []
+    body = []
+    for row in rows:
+        first = tag("th", tag("span", row[0]), scope="row", data_label=columns[0])
+        body.append(tag("tr", [first, *_cells(columns[1:], row[1:])]))
+    body += [tag("tr", _cells(columns, last), class_="last")] if last else []
     return tag("div", tag("table", [tag("thead", head), tag("tbody", body)]), class_="wide", tabindex="0")
+
+
+def _cells(columns, cells):
+    """Cells with the names of their columns; one that is empty holds nothing at all."""
+    return [
+        tag("td", tag("span", cell) if cell else "", data_label=name) for name, cell in zip(columns, cells, strict=True)
+    ]
 
 
 def pairs(rows):

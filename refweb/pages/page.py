@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import os
 import re
 import string
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError
+from ..messages import short
 from ..pictures.record import of_folder, of_solution
 from ..results.files import write_text
 from ..results.folder import read_summary, so_far
@@ -44,21 +46,45 @@ def report(folder, out=None, frames=None, progress=None):
     Raises
     ------
     InputError
-        Where the folder is no result folder, the file cannot be written, or ``frames`` is below 1.
+        Where the folder is none of a run or of modes, the file cannot be written, or ``frames`` is below 1.
     """
     folder = Path(folder)
     record = of_folder(folder, seen=False)
+    _refuse_others(record)
     if record.status == "running":
         record = record._replace(summary=so_far(folder, read_summary(folder)))
-    return _write(record, folder / NAME if out is None else out, frames, progress)
+    unread = "" if record.summary else _unread(folder / "run.json")
+    return _write(record, folder / NAME if out is None else out, frames, progress, unread)
 
 
-def report_of(solution, out, frames=None):
-    """Write the page of a solution, wherever it is; see `report`."""
-    return _write(of_solution(solution, seen=False), out, frames, None)
+def report_of(solution, out=None, frames=None):
+    """Write the page of a solution, wherever it is, by default into its folder; see `report`."""
+    if out is None and solution.path is None:
+        raise InputError("out is missing: this solution has no folder, so say where the page goes, such as report.html")
+    return _write(of_solution(solution, seen=False), Path(solution.path) / NAME if out is None else out, frames, None)
 
 
-def _write(record, out, frames, progress):
+def _refuse_others(record):
+    """Refuse a folder that holds what is neither a run nor modes."""
+    from ..pictures.plots import NOT_OURS
+
+    if (kind := record.summary.get("kind")) not in (None, "modes"):
+        words = NOT_OURS.get(kind, "pages are of runs and of modes")
+        raise InputError(f"{record.name}: holds {short(str(kind))}, not a run: {words}")
+
+
+def _unread(path):
+    """Why a ``run.json`` that gives no summary does not, in words."""
+    if not path.exists():
+        return "there is no run.json"
+    try:
+        json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        return f"run.json cannot be read: {error}"
+    return "run.json cannot be read: it is not what a run of refweb writes"
+
+
+def _write(record, out, frames, progress, unread=""):
     out = Path(out)
     if out.suffix.lower() not in (".html", ".htm"):
         raise InputError(f'out = "{out}" must end in .html')
@@ -66,13 +92,15 @@ def _write(record, out, frames, progress):
         raise InputError(f'out = "{out}": there is no folder "{out.parent}"')
     if out.is_dir() or not os.access(out.parent, os.W_OK):
         raise InputError(f'out = "{out}": cannot be written, choose another place')
-    write_text(out, page_of(record, frames, progress))
+    write_text(out, page_of(record, frames, progress, unread))
     return out
 
 
-def page_of(record, frames=None, progress=None):
-    """The page of a record, as text."""
-    parts = [sections.results(record), sections.warnings(record), drawings.space(record, frames, progress)]
+def page_of(record, frames=None, progress=None, unread=""):
+    """The page of a record, as text; ``unread`` says why it has no summary, where it has none."""
+    found = drawings.frames_of(record, frames, progress)
+    lacking = list(_lacking(record, found, unread))
+    parts = [sections.results(record), sections.warnings(record, lacking), drawings.space(record, found)]
     parts += [sections.simulated(record), drawings.plots(record), drawings.pictures(record)]
     parts += [make(record) for make in (sections.cost, sections.scene, sections.versions)]
     parts = [part for part in parts if part]
@@ -82,7 +110,7 @@ def page_of(record, frames=None, progress=None):
     return string.Template(_read("page.html")).substitute(
         title=html(record.title),
         version=html(__version__),
-        status=_status(record),
+        status=_status(record, unread),
         style=_read("page.css"),
         contents=html([tag("a", Html(found[2]), href=f"#{found[1]}") for found in contents if found]),
         main="\n".join(parts),
@@ -91,13 +119,28 @@ def page_of(record, frames=None, progress=None):
     )
 
 
-def _status(record):
-    """How the run ended, and what it was."""
-    solver = record.summary.get("solver") or {}
-    what = f"{sections.KINDS.get(record.kind, record.kind)}, {solver.get('method') or 'method unknown'}"
-    status = record.status if record.summary else "unknown: there is no run.json"
-    badge = tag("span", status, class_="status" + " bad" * (record.status != "solved"))
-    return html([badge, f" {what}. ", record.summary.get("message") or ""])
+def _lacking(record, found, unread):
+    """Sentences on what the page has nothing of: the summary, the history, the frames."""
+    if unread:
+        yield f"Results, warnings and how the run ended are not known: {unread}."
+    try:
+        _, history = record.table()
+        if not len(next(iter(history.values()), [])):
+            yield "The history has no rows."
+    except InputError:
+        yield "The history cannot be read."
+    if found is None:
+        yield "No frame can be drawn." if record.times else "There are no frames."
+
+
+def _status(record, unread):
+    """How the run ended, and what it was, as far as that is known."""
+    method = (record.summary.get("solver") or {}).get("method")
+    known = [sections.KINDS.get(record.kind) or record.kind] if record.scene or record.kind != "dynamic" else []
+    known += [str(method)] if method else []
+    status = unread.partition(":")[0] or record.status
+    badge = tag("span", status, class_="status" + " bad" * (status != "solved"))
+    return html([badge, f" {', '.join(known)}. " if known else " ", record.summary.get("message") or ""])
 
 
 def _read(name):

@@ -27,7 +27,7 @@ def results(record):
         columns, rows, _ = rows_of_results(found, dynamic=record.kind == "dynamic")
         shown = [table(columns, [[cell.removeprefix("t = ").removeprefix("at ") for cell in row] for row in rows])]
     else:
-        shown = [tag("p", "There are no results.")]
+        shown = [tag("p", "There are no results." if summary else "Results are not known.")]
     said += [] if record.kind == "modes" else on_results(found)
     events = [
         [event["name"], "did not happen" if event["time"] is None else f"t = {event['time']:.6g} s"]
@@ -38,9 +38,9 @@ def results(record):
     return section("results", "Results", *parts, pairs(more) if more else "")
 
 
-def warnings(record):
-    """What a reader of the results has to know."""
-    found = [*record.summary.get("warnings", [])]
+def warnings(record, lacking=()):
+    """What a reader of the results has to know: warnings of the run, and sentences on what its folder lacks."""
+    found = [*record.summary.get("warnings", []), *lacking]
     body = listing(found) if found else tag("p", "None.")
     return section("warnings", "Warnings", tag("div", body, class_="warned") if found else body)
 

@@ -215,6 +215,12 @@ def test_it_is_readable_on_a_phone(browser, hit):
         "[...document.querySelectorAll('p, td, dd, label')].map((e) => parseFloat(getComputedStyle(e).fontSize))"
     )
     assert min(sizes) >= 12
+    cut = "(e) => e.scrollWidth > e.clientWidth || e.getBoundingClientRect().right > innerWidth"
+    assert tab.evaluate(f"[...document.querySelectorAll('.wide, .wide th, .wide td')].filter({cut}).length") == 0
+    named = tab.evaluate(
+        "[...document.querySelectorAll('.wide td')].map((e) => getComputedStyle(e, '::before').content)"
+    )
+    assert named and "none" not in named
     assert tab.title() == "Web <b>hit</b> by a ball"
     tab.close()
 

@@ -4,6 +4,7 @@ What a browser makes of one is in `test_browser.py`.
 """
 
 import base64
+import dataclasses
 import hashlib
 import html.parser
 import json
@@ -21,7 +22,7 @@ import refweb
 from refweb.__main__ import main
 from refweb.errors import InputError
 from refweb.pages import drawings, page, sections, space
-from refweb.pages.markup import data, tag
+from refweb.pages.markup import data, table, tag
 from refweb.pages.markup import html as as_html
 from refweb.pages.packed import PLACES, VALUES, differences, levels, pack, summed, unpack
 from refweb.pictures.record import of_folder
@@ -304,6 +305,23 @@ def without_frames(folder):
     (folder / "web.pvd").unlink()
 
 
+def half_a_summary(folder):
+    text = (folder / "run.json").read_text()
+    (folder / "run.json").write_text(text[: len(text) // 2])
+
+
+def a_list(folder):
+    (folder / "run.json").write_text("[1,2]")
+
+
+def without_rows(folder):
+    (folder / "history.csv").write_text((folder / "history.csv").read_text().partition("\n")[0] + "\n")
+
+
+def without_history(folder):
+    (folder / "history.csv").unlink()
+
+
 def bare(folder):
     for name in ("run.json", "scene.toml", "checkpoint.npz", "history.csv"):
         (folder / name).unlink()
@@ -316,7 +334,11 @@ def bare(folder):
         (failed, "line 7 broke"),
         (spoilt, "Not to be read: 20."),
         (without_frames, "No frame of this run can be drawn."),
-        (bare, "no run.json"),
+        (bare, "there is no run.json"),
+        (half_a_summary, "run.json cannot be read: "),
+        (a_list, "run.json cannot be read: it is not what a run of refweb writes"),
+        (without_rows, "The history has no rows."),
+        (without_history, "The history cannot be read."),
     ],
 )
 def test_folders_of_runs_that_are_not_whole(hit, quick, tmp_path, harm, words):
@@ -324,6 +346,66 @@ def test_folders_of_runs_that_are_not_whole(hit, quick, tmp_path, harm, words):
     shutil.copytree(hit, folder)
     harm(folder)
     assert words in " ".join(Reader(page.report(folder).read_text()).words)
+
+
+def parts_of(path):
+    """Words of the line on how the run ended, and of the warnings."""
+    text = path.read_text()
+    status = re.search(r'<span class="status.*?(?=</p>)', text)[0]
+    return [" ".join(Reader(part).words) for part in (status, re.search('<section id="warnings">.*', text)[0])]
+
+
+@pytest.mark.parametrize("harm", [half_a_summary, a_list, bare, without_rows, without_history, without_frames])
+def test_what_a_folder_lacks_is_no_absence_of_warnings(hit, quick, tmp_path, harm):
+    shutil.copytree(hit, tmp_path / "out")
+    summary = json.loads((hit / "run.json").read_text()) | {"warnings": []}
+    (tmp_path / "out/run.json").write_text(json.dumps(summary))
+    _, whole = parts_of(page.report(tmp_path / "out"))
+    assert "None." in whole, "nothing is missing, and the run has no warning"
+    harm(tmp_path / "out")
+    assert "None." not in parts_of(page.report(tmp_path / "out"))[1]
+
+
+@pytest.mark.parametrize("harm, known", [(half_a_summary, "dynamics"), (a_list, "dynamics"), (bare, "")])
+def test_what_is_not_known_is_left_out(hit, quick, tmp_path, harm, known):
+    shutil.copytree(hit, tmp_path / "out")
+    harm(tmp_path / "out")
+    status, _ = parts_of(page.report(tmp_path / "out"))
+    assert "run.json" in status and "unknown" not in status and "solved" not in status
+    assert re.findall("dynamics|statics|modes", status) == ([known] if known else [])
+
+
+def test_what_is_not_a_run_has_no_page(tmp_path, capsys):
+    """A folder of measured costs, whose diagram stands there already."""
+    (tmp_path / "run.json").write_text(json.dumps({"kind": "cost", "versions": {"refweb": "1"}}))
+    assert main(["report", str(tmp_path)]) == 2
+    assert "cost.png" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
+
+
+def test_every_cell_has_the_name_of_its_column():
+    text = table(["result", "value", "place"], [["a", "1 mm", "node 8"], ["b", "2 mm", ""]], ["", "", "at line 3"])
+    cells = re.findall('<t[hd][^>]* data-label="([^"]*)"[^>]*>(?:<span>(.*?)</span>)?</t[hd]>', text)
+    assert cells == [
+        ("result", "a"),
+        ("value", "1 mm"),
+        ("place", "node 8"),
+        ("result", "b"),
+        ("value", "2 mm"),
+        ("place", ""),
+        ("result", ""),
+        ("value", ""),
+        ("place", "at line 3"),
+    ]
+
+
+def test_a_solution_goes_where_its_folder_is(hit, quick, tmp_path):
+    folder = tmp_path / "out"
+    shutil.copytree(hit, folder, ignore=shutil.ignore_patterns("report.html"))
+    solution = refweb.load(folder)
+    assert solution.report() == folder / "report.html" and (folder / "report.html").exists()
+    with pytest.raises(InputError, match="out is missing"):
+        dataclasses.replace(solution, path=None).report()
 
 
 def test_statics_modes_and_a_single_frame(quick, tmp_path):
@@ -380,8 +462,10 @@ def test_the_verbs(hit, quick, tmp_path, monkeypatch, capsys):
     assert main(["view", str(folder)]) == 0 and (folder / "report.html").stat().st_mtime > 1
     assert opened == [(folder / "report.html").as_uri()] * 3
     monkeypatch.setattr("webbrowser.open", lambda address: False)
-    assert main(["view", str(folder)]) == 2
-    assert "no browser" in capsys.readouterr().err
+    capsys.readouterr()
+    assert main(["view", str(folder)]) == 0
+    said = capsys.readouterr()
+    assert said.out.strip() == str(folder / "report.html") and "no browser" in said.err
 
 
 def test_force_removes_the_page(hit, tmp_path):
