@@ -104,17 +104,16 @@ class Solution(SolutionData):
         """
         import pyvista
 
+        from .pictures.frames import listed, number_of
         from .results.vtu import meshes
 
         if self.frames:
             found = dict(self.frames)
-            state = found[_number(frame, list(found))]
+            state = found[number_of(frame, list(found))]
             time, blocks = state.time, {name: pyvista.from_meshio(mesh) for name, mesh in meshes(state).items()}
         else:
-            from .pictures.frames import listed
-
             found = listed(self.path)
-            time, paths = found[_number(frame, list(found))]
+            time, paths = found[number_of(frame, list(found))]
             blocks = {name: pyvista.read(path) for name, path in paths.items()}
         result = pyvista.MultiBlock(blocks)
         result.add_field_data([time], "TimeValue")
@@ -349,16 +348,6 @@ def _last_state(folder, scene):
     if x.shape != (system.rows, 3):
         raise InputError(f"{short(str(path))}: is not that of a run that scene.toml leads to")
     return State(system, time, x, v)
-
-
-def _number(frame, known):
-    """Number of a frame, counted from the end where it is negative."""
-    if -len(known) <= frame < 0:
-        return known[frame]
-    if frame not in known:
-        close = min(known, key=lambda number: abs(number - frame))
-        raise InputError(f"frame = {frame}: there is no such frame, the nearest is {close}, the last {known[-1]}")
-    return frame
 
 
 def _named(column):

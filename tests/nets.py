@@ -75,6 +75,22 @@ def interrupt(scene, folder):
         refweb.run(scene, out=folder, progress=stop)
 
 
+def hit_web(title):
+    """A small web that a ball hits: eleven frames, some lines slack."""
+    return refweb.Scene(
+        title=title,
+        web=refweb.Window(mesh="square", rows=6, columns=6, side=0.2),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
+        effects=[
+            refweb.Body(name="ball", radius=0.1, mass=0.2, position=(0, 0, -0.11), velocity=(0, 0, 2.0)),
+            refweb.Contact(stiffness=1e5),
+        ],
+        solve=refweb.Dynamic(duration=0.05),
+        output=refweb.Output(interval=1e-3, frames=5),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+
+
 def skew_web():
     """A branching, closed net in space with a group, a stub and prestressed and slack lines."""
     points = [[0, 0, 0], [1, 0.1, 0], [1.1, 1, 0.2], [-0.1, 0.9, 0], [0.5, 0.5, 0.3], [0.6, 0.4, -0.5]]

@@ -21,6 +21,7 @@ from ..results.words import (
     on_results,
     on_run,
     on_solver,
+    on_web,
     rows_of_modes,
     rows_of_results,
     rows_of_steps,
@@ -42,7 +43,7 @@ def _box(title, rows):
 
 def print_scene(scene, system):
     """Print what is simulated: sizes, cable, effects present, solver."""
-    web, cable, solve = web_of(system), scene.cable, scene.solve
+    cable, solve = scene.cable, scene.solve
     law = cable.law
     if law == "smooth":
         law += f", ε0 = {cable.slackness:g}, η = {cable.smoothing:g}"
@@ -64,7 +65,7 @@ def print_scene(scene, system):
         knob = INTEGRATORS[solve.method].knob
         step = f"{knob} {getattr(solve, knob):g}" if solve.step_size is None else f"step {solve.step_size:g} s"
         how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
-    area = f"{web['area']:.4g} m², " if web["cells"] else ""
+    counts, sizes = on_web(web_of(system))
     corners, steps = [], []
     if solve.kind == "dynamic" and len(system.corners):
         from ..dynamics.schedule import FEW_CORNERS
@@ -81,8 +82,8 @@ def print_scene(scene, system):
     _box(
         scene.title,
         [
-            ("web", f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells; {len(system.free)} unknowns"),
-            ("", f"{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg"),
+            ("web", f"{counts}; {len(system.free)} unknowns"),
+            ("", sizes),
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
             *_stiffness(scene, system),

@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import os
 import re
 import string
 from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError
-from ..messages import short
+from ..pictures.pictures import target
 from ..pictures.record import of_folder, of_solution
 from ..results.files import write_text
 from ..results.folder import read_summary, so_far
@@ -20,6 +19,7 @@ from . import drawings, sections
 from .markup import Html, html, tag
 
 SCRIPTS = ("model.js", "webgl.js", "hand.js", "view.js")
+ENDINGS = ("html", "htm")
 NAME = "report.html"
 """What the page of a result folder is called."""
 
@@ -50,7 +50,7 @@ def report(folder, out=None, frames=None, progress=None):
     """
     folder = Path(folder)
     record = of_folder(folder, seen=False)
-    _refuse_others(record)
+    record.refuse_others("pages")
     if record.status == "running":
         record = record._replace(summary=so_far(folder, read_summary(folder)))
     unread = "" if record.summary else _unread(folder / "run.json")
@@ -62,15 +62,6 @@ def report_of(solution, out=None, frames=None):
     if out is None and solution.path is None:
         raise InputError("out is missing: this solution has no folder, so say where the page goes, such as report.html")
     return _write(of_solution(solution, seen=False), Path(solution.path) / NAME if out is None else out, frames, None)
-
-
-def _refuse_others(record):
-    """Refuse a folder that holds what is neither a run nor modes."""
-    from ..pictures.plots import NOT_OURS
-
-    if (kind := record.summary.get("kind")) not in (None, "modes"):
-        words = NOT_OURS.get(kind, "pages are of runs and of modes")
-        raise InputError(f"{record.name}: holds {short(str(kind))}, not a run: {words}")
 
 
 def _unread(path):
@@ -86,13 +77,9 @@ def _unread(path):
 
 def _write(record, out, frames, progress, unread=""):
     out = Path(out)
-    if out.suffix.lower() not in (".html", ".htm"):
+    if out.suffix[1:].lower() not in ENDINGS:
         raise InputError(f'out = "{out}" must end in .html')
-    if not out.parent.is_dir():
-        raise InputError(f'out = "{out}": there is no folder "{out.parent}"')
-    if out.is_dir() or not os.access(out.parent, os.W_OK):
-        raise InputError(f'out = "{out}": cannot be written, choose another place')
-    write_text(out, page_of(record, frames, progress, unread))
+    write_text(target(out, ENDINGS), page_of(record, frames, progress, unread))
     return out
 
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 from ..messages import shown
 from ..registry import EFFECTS
 from ..results.files import as_toml
-from ..results.words import on_cost, on_results, on_run, on_solver, rows_of_modes, rows_of_results, rows_of_steps
+from ..results.words import (
+    on_cost,
+    on_results,
+    on_run,
+    on_solver,
+    on_web,
+    rows_of_modes,
+    rows_of_results,
+    rows_of_steps,
+)
 from .markup import Html, html, listing, pairs, section, table, tag
 
 LONGEST = 1000
@@ -115,9 +124,16 @@ def _several(given):
 
 def _keys(given):
     """Keys of a table with their values, in one line."""
-    words = [(key, _value(value)) for key, value in given.items() if value != {}]
+    return _listed({key: _value(value) for key, value in given.items() if value != {}})
+
+
+def _listed(words):
+    """Names and what they are, in one line."""
     return html(
-        [[", " if i else "", tag("span", f"{key} = {value}", class_="key")] for i, (key, value) in enumerate(words)]
+        [
+            [", " if i else "", tag("span", f"{key} = {value}", class_="key")]
+            for i, (key, value) in enumerate(words.items())
+        ]
     )
 
 
@@ -135,9 +151,7 @@ def _sizes(web):
     """Sizes of a web, in words."""
     if not web:
         return ""
-    area = f"{web['area']:.4g} m², " if web.get("cells") else ""
-    text = f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells; "
-    return tag("div", f"{text}{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg")
+    return tag("div", "; ".join(on_web(web)))
 
 
 def _cable(cable):
@@ -148,15 +162,7 @@ def _cable(cable):
         for key, value in cable.items()
         if key != "groups"
     }
-    return [
-        tag(
-            "div",
-            html(
-                [[", " if i else "", tag("span", f"{k} = {v}", class_="key")] for i, (k, v) in enumerate(own.items())]
-            ),
-        ),
-        *groups,
-    ]
+    return [tag("div", _listed(own)), *groups]
 
 
 def _together(text):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..pictures.camera import choose
+from ..pictures.camera import choose, nearby
 from ..pictures.stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, UNITS, colour_map
 from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
 
@@ -255,8 +255,7 @@ def _camera(frames, origin, moved):
     extent = np.linalg.norm(np.ptp(points, axis=0))
     if frames[0].swing is not None:
         points = np.concatenate([points, (origin - moved).reshape(-1, 3)])
-    low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
-    near = np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
+    near = nearby(points, solid, extent)
     length = np.median(np.linalg.norm(np.diff(frames[0].origin, axis=1), axis=2).sum(axis=1))
     radius = np.clip(0.06 * length, 0.0006 * extent, 0.002 * extent)
     box = [near.min(axis=0).tolist(), near.max(axis=0).tolist()]

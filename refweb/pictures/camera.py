@@ -93,6 +93,12 @@ class View:
         return x - w, x + w, y - h, y + h
 
 
+def nearby(points, solid, extent):
+    """Points of the web and those of bodies, shape (n, 3) [m], that lie within 0.3 of an extent around it."""
+    low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
+    return np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
+
+
 def choose(origin, points, solid, moved, tree, aspect, named=None):
     """The views that show a web best, and where on the page they stand.
 
@@ -122,8 +128,7 @@ def choose(origin, points, solid, moved, tree, aspect, named=None):
         Shares of the page.
     """
     extent = np.linalg.norm(np.ptp(points, axis=0))
-    low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
-    near = np.concatenate([points, solid[np.all((solid >= low) & (solid <= high), axis=1)]])
+    near = nearby(points, solid, extent)
     side = _side(origin)
     if named is not None:
         if isinstance(named, str) and named == "oblique":

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.files import write_atomically
 from . import moving, render
-from .pictures import blank_page, clock_line, look_of, record_of, target, with_clear_white
+from .pictures import blank_page, clock_line, look_of, pixels, record_of, target, with_clear_white
 from .polygons import flat_images
 from .stage import DARK, PALE, Seen, Stage, colour_map
 
@@ -139,15 +139,10 @@ class _Film:
 
     def _page(self):
         """What stands around the web, with transparency: an image, RGBA."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from PIL import Image
-
         page = blank_page(self._stage, self._record.title, SIZE)
         for patch in (page.patch, *(axes.patch for axes in page.axes)):
             patch.set_alpha(0.0)
-        canvas = FigureCanvasAgg(page)
-        canvas.draw()
-        return Image.fromarray(np.asarray(canvas.buffer_rgba()).copy())
+        return pixels(page)
 
     def _image(self, renderer, pose):
         """The whole page of a frame, an image, RGB."""

@@ -129,6 +129,16 @@ def listed(folder):
     return found
 
 
+def number_of(frame, known):
+    """The number of a frame among those that are known, ascending; counted from the end where it is negative."""
+    if -len(known) <= frame < 0:
+        return known[frame]
+    if frame not in known:
+        close = min(known, key=lambda number: abs(number - frame))
+        raise InputError(f"frame = {frame}: there is no such frame, the nearest is {close}, the last {known[-1]}")
+    return frame
+
+
 def read(folder, number, found=None):
     """One frame of a result folder, whose `listed` frames may be given.
 

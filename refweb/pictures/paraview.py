@@ -9,12 +9,11 @@ import numpy as np
 
 from ..results.files import write_text
 from .frames import listed
-from .pictures import look_of, target
-from .record import of_folder
-from .stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, Seen, Stage, colour_map, scaled_unit
+from .pictures import stage_of, target
+from .record import CLOCKS, of_folder
+from .stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, colour_map, scaled_unit
 
 NAME, TEMPLATE = "web_in_paraview.py", Path(__file__).with_name("for_paraview.template")
-CLOCKS = {"modes": "mode {time:g}", "static": "step {time:g}", "dynamic": "t = {time:.6g} s"}
 SIZE = (1600, 1000)
 """Of the view [pixel]."""
 
@@ -47,8 +46,8 @@ def script(folder, field=None, out=None):
     out = target(folder / NAME if out is None else out, ["py"])
     number = record.chosen()
     frame = record.frame(number)
-    look = look_of(record, frame, field, None, 1.0, None)
-    stage = Stage.of(Seen.of(frame, look.field), look, SIZE[0] / SIZE[1])
+    stage = stage_of(record, frame, field, SIZE)
+    look = stage.look
     factor, unit = scaled_unit(look.field, max(map(abs, look.limits)))
     points, cells = _arrays(folder, number)
     given = {
@@ -56,7 +55,7 @@ def script(folder, field=None, out=None):
         "beside": out.resolve().parent == folder.resolve(),
         "title": record.title,
         "time": record.times[number],
-        "clock": CLOCKS.get(record.kind, CLOCKS["dynamic"]),
+        "clock": CLOCKS.get(record.kind, CLOCKS["dynamic"]).replace("{:", "{time:"),
         "size": list(SIZE),
         "field": look.field,
         "label": look.field.replace("_", " ") + (f" [{unit}]" if unit else ""),

@@ -27,9 +27,9 @@ from .record import of_folder, of_solution
 from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
 SIZE = (1600, 1000)
+"""Of a picture [pixel]."""
 MOST_SCALED = 1e6
 """Largest factor on displacements."""
-"""Of a picture [pixel]."""
 
 
 def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, view=None, out=None):
@@ -118,6 +118,12 @@ def look_of(record, frame, field, limits, scale, view):
     return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
 
 
+def stage_of(record, frame, field, size):
+    """The stage of a frame by itself, in a view of some size [pixel], as without any other option."""
+    look = look_of(record, frame, field, None, 1.0, None)
+    return Stage.of(Seen.of(frame, look.field), look, size[0] / size[1])
+
+
 def with_supports(record, frame):
     """The frame, with the supports of the last one where it knows none."""
     last = max(record.times)
@@ -129,9 +135,7 @@ def clock_line(record, number, look, decimals=None):
     parts = [record.clock(number, decimals)]
     if look.scale != 1:
         parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {look.scale:g}")
-    if record.status != "solved":
-        parts.append("run not ended" if record.status == "running" else f"run {record.status}")
-    return "  —  ".join(parts)
+    return "  —  ".join(filter(None, [*parts, record.ending]))
 
 
 def blank_page(stage, title, size):
@@ -147,7 +151,12 @@ def blank_page(stage, title, size):
     stage.legend(figure)
     large = min(23.0, 23.0 * 58 / max(len(title), 1))
     figure.text(0.03, 0.945, title, size=large, weight="bold", color="#111111", parse_math=False)
-    setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
+    return shows_itself(figure)
+
+
+def shows_itself(figure):
+    """A figure, which notebooks show from here on."""
+    setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what they look for
     return figure
 
 
@@ -158,13 +167,19 @@ def with_clear_white(image):
 
 def png(figure):
     """The bytes of a figure as PNG, in full colour and without transparency."""
+    page = io.BytesIO()
+    pixels(figure).convert("RGB").save(page, "PNG")
+    return page.getvalue()
+
+
+def pixels(figure):
+    """A figure as an image of pillow, RGBA."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
 
-    canvas, page = FigureCanvasAgg(figure), io.BytesIO()
+    canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").save(page, "PNG")
-    return page.getvalue()
+    return Image.fromarray(np.asarray(canvas.buffer_rgba()).copy())
 
 
 def target(out, endings=None):

@@ -5,18 +5,17 @@
 
 from __future__ import annotations
 
-import functools
 import io
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import InputError
-from ..messages import nearest, short
+from ..messages import nearest
 from ..messages import shown as as_shown
 from ..results.files import write_atomically
 from . import books, distances, histories, spectra
-from .pictures import png, target
+from .pictures import shows_itself, target
 from .record import Record, of_folder
 from .sheet import Ink, sheet
 from .shown import Shown, refuse_spoilt
@@ -28,7 +27,6 @@ LETTERS_STAY: dict[Any, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg
 BESIDE: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """What is written of a file's making: nothing, so that equal plots are equal files."""
 SPECTRUM, DISTANCE = "spectrum:", "-distance"
-NOT_OURS = {"cost": "its diagram is cost.png there, by refweb cost"}
 
 
 def kinds(record):
@@ -107,8 +105,7 @@ def _drawn(records, what, title=None):
             missing.setdefault(s.name, []).extend([typed] if s not in having else [])
     lacking = tuple(f"{who} has no {', '.join(names)}" for who, names in missing.items() if names)
     figure = sheet(panels, _title(shown) if title is None else title, [*notes, *lacking])
-    setattr(figure, "_repr_png_", functools.partial(png, figure))  # noqa: B010  # what notebooks look for
-    return figure, lacking
+    return shows_itself(figure), lacking
 
 
 def _asked(shown, what):
@@ -158,14 +155,12 @@ def _beside(records):
         raise InputError("there is nothing to plot: name a result folder")
     for record in records:
         refuse_spoilt(record)
-        if (kind := record.summary.get("kind")) not in (None, "modes"):
-            words = NOT_OURS.get(kind, "plots are of runs and of modes")
-            raise InputError(f"{record.name}: holds {short(str(kind))}, not a run: {words}")
+        record.refuse_others("plots")
     if len(found := dict.fromkeys(record.kind for record in records)) > 1:
         raise InputError(f"{' and '.join(found)} runs have no axis in common: plot them one by one")
     single = len(records) == 1
     shown = [Shown(r, "" if single else r.name, Ink.of(n)) for n, r in enumerate(records)]
-    notes = [_remark(s) for s in shown if _status(s.record)]
+    notes = [_remark(s) for s in shown if s.record.ending]
     empty = [s for s in shown if not len(s.along)]
     if len(empty) == len(shown):
         raise InputError(f"{records[0].name}: its history has no rows, so there is nothing to plot")
@@ -173,20 +168,15 @@ def _beside(records):
     return [s for s in shown if s not in empty], notes
 
 
-def _status(record):
-    """How a run ended that is not solved, in words; empty of one that is."""
-    return {"solved": "", "running": "run not ended"}.get(record.status, f"run {record.status}")
-
-
 def _remark(s):
     """What is to be said below of a run that is not solved: its message, and its status where others are shown."""
-    message = str(s.record.summary.get("message") or "")[:200] if _status(s.record) else ""
-    return s.said(": ".join(filter(None, [_status(s.record) if s.name else "", message])))
+    message = str(s.record.summary.get("message") or "")[:200] if s.record.ending else ""
+    return s.said(": ".join(filter(None, [s.record.ending if s.name else "", message])))
 
 
 def _title(shown):
     titles = list(dict.fromkeys(s.record.title[:100] for s in shown))
-    words = _status(shown[0].record) if len(shown) == 1 else ""
+    words = shown[0].record.ending if len(shown) == 1 else ""
     note = f" — {words}" if words else ""
     return (", ".join(titles) if len(titles) <= 3 else f"{len(shown)} runs") + note
 

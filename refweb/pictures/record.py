@@ -17,10 +17,13 @@ from ..results.folder import TABLES, read_summary
 from ..results.solution import as_history
 from ..results.units import readable
 from .arrays import cell_arrays
-from .frames import Frame, frame_of, listed, read
+from .frames import Frame, frame_of, listed, number_of, read
 
 CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}
 """How the time of a frame reads, by kind of run."""
+
+OTHERS = {"cost": "its diagram is cost.png there, by refweb cost"}
+"""What is said of folders that hold something else."""
 
 
 class Values(NamedTuple):
@@ -72,6 +75,17 @@ class Record(NamedTuple):
         """How it ended."""
         return str(self.summary.get("status", "solved"))
 
+    @property
+    def ending(self):
+        """How a run ended that is not solved, in words; empty of one that is."""
+        return {"solved": "", "running": "run not ended"}.get(self.status, f"run {self.status}")
+
+    def refuse_others(self, drawn):
+        """Refuse what holds neither a run nor modes; ``drawn`` is what is made of these, such as "plots"."""
+        if (kind := self.summary.get("kind")) not in (None, "modes"):
+            words = OTHERS.get(kind, f"{drawn} are of runs and of modes")
+            raise InputError(f"{self.name}: holds {short(str(kind))}, not a run: {words}")
+
     def clock(self, number, decimals=None):
         """When a frame is, in words: its time or load step, of a mode its number and frequency with ±.
 
@@ -107,14 +121,7 @@ class Record(NamedTuple):
         if not numbers:
             raise InputError(f'"{short(self.name)}" has no frames: run it with frames = 1 or more in [output]')
         if frame is not None:
-            if -len(numbers) <= frame < 0:
-                return numbers[frame]
-            if frame not in self.times:
-                close = min(numbers, key=lambda n: abs(n - frame))
-                raise InputError(
-                    f"frame = {frame}: there is no such frame, the nearest is {close}, the last {numbers[-1]}"
-                )
-            return frame
+            return number_of(frame, numbers)
         if time is None:
             time = self._time_of_the_largest()
         elif not np.isfinite(time):

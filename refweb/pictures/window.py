@@ -9,9 +9,9 @@ import numpy as np
 
 from ..errors import InputError
 from .paraview import camera_of
-from .pictures import look_of
+from .pictures import stage_of
 from .record import of_folder
-from .stage import BODIES, DARK, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, Seen, Stage, colour_map, scaled_unit
+from .stage import BODIES, DARK, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, colour_map, scaled_unit
 
 SIZE = (1400, 900)
 """Of the window [pixel]."""
@@ -59,8 +59,7 @@ def prepared(record, field=None, off_screen=False):
     numbers = list(record.times)
     first = record.chosen()
     frame = record.frame(first)
-    look = look_of(record, frame, field, None, 1.0, None)
-    stage = Stage.of(Seen.of(frame, look.field), look, SIZE[0] / SIZE[1])
+    stage = stage_of(record, frame, field, SIZE)
     plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(SIZE))
     plotter.background_color = "white"
     plotter.add_axes(color=DARK)

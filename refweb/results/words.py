@@ -65,6 +65,13 @@ def rows_of_modes(step):
     return Rows(["mode", "frequency", "along", "moving mass", "most at node", ""], rows, [])
 
 
+def on_web(web):
+    """(How many nodes, lines and cells a web has, how long, large and heavy it is), of what ``web_of`` finds."""
+    area = f"{web['area']:.4g} m², " if web["cells"] else ""
+    counts = f"{web['nodes']} nodes, {web['lines']} lines, {web['cells']} cells"
+    return counts, f"{web['cable_length']:.6g} m of cable, {area}{web['mass']:.4g} kg"
+
+
 def on_results(results):
     """Sentences on results: errors that are not known, intervals, errors besides ±."""
     if results and any(result["error"] is None for result in results.values()):

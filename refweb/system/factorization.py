@@ -100,7 +100,7 @@ class _Qdldl:
 
     def negative_pivots(self):
         """Number of pivots that are not positive."""
-        return int(np.count_nonzero(~(self._solver.factors()[1] > 0.0)))
+        return _not_positive(self._solver)
 
 
 class _Rslab:
@@ -214,7 +214,12 @@ def negative_pivots(upper, library):
                 return negative + zero
     import qdldl
 
-    return int(np.count_nonzero(~(qdldl.Solver(upper, upper=True).factors()[1] > 0.0)))
+    return _not_positive(qdldl.Solver(upper, upper=True))
+
+
+def _not_positive(solver):
+    """Number of pivots of a `qdldl.Solver` that are not positive."""
+    return int(np.count_nonzero(~(solver.factors()[1] > 0.0)))
 
 
 class Lu:

@@ -5,6 +5,7 @@ It takes Playwright for Python and a Chromium, its own or the system's; where on
 
 import shutil
 
+import nets
 import numpy as np
 import pytest
 
@@ -41,19 +42,7 @@ def browser():
 def hit(tmp_path_factory):
     """The folder of a web that a ball hits, and its page."""
     folder = tmp_path_factory.mktemp("browser") / "hit"
-    scene = refweb.Scene(
-        title="Web <b>hit</b> by a ball",
-        web=refweb.Window(mesh="square", rows=6, columns=6, side=0.2),
-        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
-        effects=[
-            refweb.Body(name="ball", radius=0.1, mass=0.2, position=(0, 0, -0.11), velocity=(0, 0, 2.0)),
-            refweb.Contact(stiffness=1e5),
-        ],
-        solve=refweb.Dynamic(duration=0.05),
-        output=refweb.Output(interval=1e-3, frames=5),
-        accuracy=refweb.Accuracy(error="none"),
-    )
-    refweb.run(scene, out=folder)
+    refweb.run(nets.hit_web("Web <b>hit</b> by a ball"), out=folder)
     page.report(folder)
     return folder
 

@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import tomllib
 
+import nets
 import numpy as np
 import pytest
 
@@ -77,19 +78,7 @@ class Reader(html.parser.HTMLParser):
 def hit(tmp_path_factory):
     """The folder of a small web that a ball hits: eleven frames, some slack."""
     folder = tmp_path_factory.mktemp("pages") / "hit"
-    scene = refweb.Scene(
-        title="Small web hit by a ball",
-        web=refweb.Window(mesh="square", rows=6, columns=6, side=0.2),
-        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0),
-        effects=[
-            refweb.Body(name="ball", radius=0.1, mass=0.2, position=(0, 0, -0.11), velocity=(0, 0, 2.0)),
-            refweb.Contact(stiffness=1e5),
-        ],
-        solve=refweb.Dynamic(duration=0.05),
-        output=refweb.Output(interval=1e-3, frames=5),
-        accuracy=refweb.Accuracy(error="none"),
-    )
-    refweb.run(scene, out=folder)
+    refweb.run(nets.hit_web("Small web hit by a ball"), out=folder)
     return folder
 
 
