@@ -138,6 +138,7 @@ COMMANDS = {
     "view": "refweb.commands.view",
     "modes": "refweb.commands.modes",
     "cost": "refweb.commands.cost",
+    "sweep": "refweb.commands.sweep",
 }
 """Verbs of the command line, in the order of its help."""
 EXPORTS = (
@@ -149,6 +150,9 @@ EXPORTS = (
     "refweb.studies.modes:Modes",
     "refweb.studies.work_precision:cost",
     "refweb.studies.cost:Cost",
+    "refweb.sweeps.sweep:sweep",
+    "refweb.sweeps.found:Sweep",
+    "refweb.sweeps.study:Study",
     "refweb.scene:Scene",
     "refweb.settings:Static",
     "refweb.settings:Dynamic",

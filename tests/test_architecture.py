@@ -67,6 +67,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     ("what users hold", "solution", ""),
     ("studies", "*", "Runs about runs: errors of elements, horizons, modes and what digits cost."),
     ("the desk", "runner", ""),
+    (
+        "sweeps",
+        "*",
+        "Many runs of one scene: cases, workers, rows and chances; it knows the desk, and nothing of the command line.",
+    ),
     ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
     ("the door", "__main__", ""),
 ]

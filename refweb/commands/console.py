@@ -232,3 +232,55 @@ def _compared(value):
     if value["interval"] is not None:
         return Text(between(value["interval"], value["unit"]))
     return Text(readable(value["value"], value["error"], value["unit"]))
+
+
+def print_sweep_begins(found):
+    """Print what a study is about to run."""
+    from ..results.study_words import on_design
+
+    study = found.study.to_dict()
+    varied, how = on_design(study)
+    there = sum(row["status"] not in ("waiting", "skipped") for row in found.rows)
+    rows = [("scene", found.title), ("varied", varied), ("cases", f"{len(found.cases)}, {how}")]
+    rows += [("", text) for text in found.reasons]
+    rows += [("", f"{there} of them have rows already")] if there else []
+    kept = {"json": "run.json of each", "all": "result folders of all"}
+    rows += [("keeps", kept[study["keep"]])] if study["keep"] in kept else []
+    _box(found.study.title, rows)
+
+
+def print_sweep(summary):
+    """Print the box of a study from the content of its ``run.json``."""
+    from ..results import study_words as words
+
+    rows: list = [("cases", words.on_count(summary)), *(("", text) for text in summary["reasons"])]
+    for entry in summary["chances"]:
+        if of := words.of_group(entry["of"]):
+            rows.append(("", Text(of, style="bold")))
+        parts = {
+            "results": words.rows_of_spread,
+            "conditions": words.rows_of_conditions,
+            "indices": words.rows_of_indices,
+        }
+        for name, make in parts.items():
+            found = make(entry)
+            if found.rows:
+                rows.append((name, _columns(found)))
+        rows += [("", text) for text in (*words.on_spread(entry), *words.on_indices(entry))]
+    rows += [("samples", text) for text in words.on_samples(summary["study"])]
+    cost = summary["cost"]
+    rows.append(("cost", f"{cost['cases_cpu_s']:.2f} s CPU of all cases; this start {cost['wall_s']:.2f} s wall"))
+    rows += [("warning", text) for text in summary["warnings"]]
+    if summary["status"] != "solved":
+        rows.append((summary["status"], summary["message"]))
+    _box(f"{summary['title']}: {summary['status']}", rows)
+
+
+def _columns(found):
+    """Rows below names of columns, as a grid."""
+    grid = Grid(box=None, padding=(0, 2), pad_edge=False)
+    for number, name in enumerate(found.columns):
+        grid.add_column(Text(name), justify="right" if number else "left")
+    for row in found.rows:
+        grid.add_row(*map(Text, row))
+    return grid

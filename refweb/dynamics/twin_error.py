@@ -16,6 +16,9 @@ from .history import SPREAD
 from .integrators.integrator import Course
 from .schedule import blocks
 
+THREADS = True
+"""Whether twins may have a thread of their own: not in processes that share a machine as it is."""
+
 
 def steps_with_twin(scene):
     """Steps of a scene's run and its twin over those of the run: of order 2, half the error is √2 times the steps."""
@@ -63,7 +66,7 @@ class Twin:
 
     def __enter__(self):
         integrator = self._simulation.integrator
-        if integrator.beside:  # the twin is made here: a system is used by one thread at a time
+        if integrator.beside and THREADS:  # the twin is made here: a system is used by one thread at a time
             twin = integrator.refined()
             twin.breathe = self._breathe
             self._thread = threading.Thread(target=self._run, args=(lambda: twin,), daemon=True)

@@ -30,8 +30,8 @@ RESULT_FILES = re.compile(
 )
 """Files that a run writes, and that ``--force`` removes."""
 
-TABLES = ("history.csv", "modes.csv")
-"""Names of the table that a run writes."""
+TABLES = ("history.csv", "modes.csv", "results.csv")
+"""Names of the table that a run, or a study of many, writes."""
 
 
 def read_summary(folder):
@@ -82,19 +82,33 @@ def so_far(folder, summary):
     """The summary of a run without an end: how far it came, and whether it is dead."""
     alive, at = is_alive(folder), reached(folder)
     text = f"it has reached {at}" if at else "it has written no row"
+    if summary.get("kind") == "sweep":
+        text = _rows(folder)
     if alive is False:
         return {**summary, "status": "killed", "message": f"its process is dead; {text}; {_remedy(folder)}"}
     return {**summary, "message": f"{text}; {'its process is alive' if alive else 'whether it is alive is not known'}"}
 
 
+def _rows(folder):
+    """How many rows the table of a study has, in words."""
+    try:
+        with open(folder / "results.csv", "rb") as lines:
+            count = sum(line.endswith(b"\n") for line in lines) - 1
+    except OSError:
+        count = 0
+    return f"it has written {max(count, 0)} row{'s' * (count != 1)}"
+
+
 def _remedy(folder):
+    if (folder / "results.csv").exists():
+        return "refweb sweep with the same study and --out goes on with what is missing"
     if (folder / "checkpoint.npz").exists():
         return f"refweb resume {folder} continues it"
     return "refweb run --force starts it again"
 
 
-def _lock(table):
-    """Hold the lock on a history that is open, where there are locks."""
+def hold(table):
+    """Hold the lock on a table that is open, where there are locks."""
     with contextlib.suppress(ImportError, OSError):
         import fcntl
 
@@ -214,7 +228,7 @@ class Folder:
     def _start(self):
         with self._written():
             self._history = open(self.path / self._table, "wb", buffering=0)
-            _lock(self._history)
+            hold(self._history)
         self.row(self._columns)
         self._listed = []
         self._list_frames()
@@ -233,7 +247,7 @@ class Folder:
             raise InputError(f"{self.path / self._table}: is not the history that checkpoint.npz belongs to")
         with self._written():
             self._history = open(self.path / self._table, "r+b", buffering=0)
-            _lock(self._history)
+            hold(self._history)
             kept = sum(kept)
             self._history.truncate(kept)
             self._history.seek(kept)

@@ -1,0 +1,207 @@
+"""A case where it is run: a `Job` comes in, and its `Outcome` goes out, and no disk is shared.
+
+The process may be anywhere. What it needs of files travels with the job, and what a run leaves travels back: as cells
+of a row, as its ``run.json``, or its result folder as one archive.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import io
+import json
+import os
+import pathlib
+import shutil
+import socket
+import tempfile
+import warnings
+import zipfile
+from typing import NamedTuple
+
+from ..errors import InputError, SolverError
+from ..messages import one_line
+
+
+class Job(NamedTuple):
+    """A case that is to be run.
+
+    Attributes
+    ----------
+    key : str
+        What the case is known by.
+    given : dict
+        Its scene as a file would have it.
+    folder, file : str
+        Where paths in it start, and what it is called in messages.
+    keep : {"none", "json", "all"}
+        What is to come back besides cells.
+    home : tuple
+        Machine and process that sent it.
+    files : dict
+        Content of files that the scene reads, by absolute path, for machines that do not have them.
+    """
+
+    key: str
+    given: dict
+    folder: str | None
+    file: str
+    keep: str
+    home: tuple
+    files: dict
+
+
+class Outcome(NamedTuple):
+    """What came of a case: cells of its row, the content of its ``run.json``, its result folder as an archive."""
+
+    key: str
+    cells: dict
+    summary: dict | None = None
+    archive: bytes | None = None
+
+
+def here():
+    """This machine and process."""
+    return socket.gethostname(), os.getpid()
+
+
+def solve(job):
+    """Run a case; whatever becomes of it is an `Outcome`."""
+    from ..results.run_status import Clock
+
+    if job.home != here():
+        _settle()
+    clock = Clock()
+    try:
+        with warnings.catch_warnings() if job.home == here() else contextlib.nullcontext():
+            summary, archive = _run(job)
+        cells = cells_of(summary)
+    except InputError as error:
+        summary, archive, cells = None, None, {"status": "refused", "message": _told(job, error)}
+    except SolverError as error:
+        summary, archive, cells = None, None, {"status": "failed", "message": _told(job, error)}
+    except Exception as error:
+        text = one_line(f"internal error, {type(error).__name__}: {error}")
+        summary, archive, cells = None, None, {"status": "failed", "message": text}
+    return Outcome(job.key, cells | clock.spent(), summary if job.keep == "json" else None, archive)
+
+
+def _told(job, error):
+    """A message without the name of the file and the values, which the row has anyway."""
+    text = one_line(str(error))
+    head = f"{job.file}: " if job.file else ""
+    text = text.removeprefix(head)
+    return text if len(text) <= 1000 else text[:997] + "..."
+
+
+@functools.cache
+def _settle():
+    """Make a process one of many: kernels are compiled by one of them at a time, and twins have no thread."""
+    from ..dynamics import twin_error
+    from .compiling import one_at_a_time
+
+    warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
+    one_at_a_time()
+    twin_error.THREADS = False
+
+
+def _run(job):
+    """(Content of ``run.json``, archive of the result folder or None) of a case."""
+    from ..runner import run
+    from ..scene import Scene
+
+    with contextlib.ExitStack() as stack:
+        given, folder = job.given, job.folder and pathlib.Path(job.folder)
+        if job.files:
+            place = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-")))
+            given = _brought(job, place)
+        scene = Scene.from_dict(given, folder, job.file)
+        if job.keep != "all":
+            return run(scene, progress=False).summary(), None
+        place = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-"))) / "run"
+        return run(scene, out=place, progress=False).summary(), packed(place)
+
+
+def _brought(job, place):
+    """The scene of a job whose files are on this machine, in a folder where they are not there already."""
+    moved = {}
+    for number, (path, content) in enumerate(job.files.items()):
+        there = pathlib.Path(path)
+        same = there.is_file() and hashlib.sha256(there.read_bytes()).digest() == hashlib.sha256(content).digest()
+        if not same:
+            own = (
+                place / str(number)
+                if there.name not in ("run.json", "scene.toml", "checkpoint.npz")
+                else place / "start"
+            )
+            own.mkdir(exist_ok=True)
+            (own / there.name).write_bytes(content)
+            moved[path] = str(own / there.name)
+            moved[str(there.parent)] = str(own)
+    web, solve = dict(job.given["web"]), dict(job.given["solve"])
+    base = pathlib.Path(job.folder or "")
+    for table, keys in ((web, ("path", "lines")), (solve, ("start",))):
+        for key in keys:
+            if isinstance(table.get(key), str):
+                full = str(base.joinpath(table[key]).resolve())
+                table[key] = moved.get(full, table[key])
+    return {**job.given, "web": web, "solve": solve}
+
+
+def packed(folder):
+    """A result folder as one archive."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file():
+                archive.writestr(zipfile.ZipInfo(path.relative_to(folder).as_posix()), path.read_bytes())
+    return content.getvalue()
+
+
+def unpacked(content, folder):
+    """Put the files of an archive into a folder."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(folder)
+
+
+def cells_of(summary):
+    """Cells of a row from the content of a ``run.json``."""
+    cells = {"status": summary["status"], "message": summary["message"]}
+    horizon = summary.get("horizon") or {}
+    statistical, ensemble = horizon.get("statistical", []), horizon.get("ensemble", {})
+    for name, result in summary["results"].items():
+        cells[f"{name} [{result['unit']}]"] = result["value"]
+        cells[f"{name} ±"] = result["error"]
+        if result.get("interval") is not None:
+            least, most = result["interval"]
+            cells[f"{name} least"] = -float("inf") if least is None else least
+            cells[f"{name} most"] = float("inf") if most is None else most
+        if name in statistical and name in ensemble:
+            cells[f"{name} mean"], cells[f"{name} deviation"] = ensemble[name]["mean"], ensemble[name]["deviation"]
+    cells["statistical"] = " ".join(statistical)
+    return cells
+
+
+def kept_files(folder, job_key):
+    """Where a study keeps the ``run.json`` and the result folder of a case."""
+    cases = pathlib.Path(folder) / "cases"
+    return cases / f"{job_key}.json", cases / job_key
+
+
+def keep_outcome(folder, outcome):
+    """Put what came of a case into the folder of a study, whole."""
+    from ..results.files import write_text
+
+    as_json, whole = kept_files(folder, outcome.key)
+    if outcome.summary is not None or outcome.archive is not None:
+        as_json.parent.mkdir(exist_ok=True)
+    if outcome.summary is not None:
+        write_text(as_json, json.dumps(outcome.summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    if outcome.archive is not None:
+        beside = whole.with_name(f".refweb-{outcome.key}")
+        for path in (beside, whole):
+            if path.exists():
+                shutil.rmtree(path)
+        unpacked(outcome.archive, beside)
+        os.replace(beside, whole)

@@ -1,0 +1,231 @@
+"""What the rows of a study say together: spread and numerical ± apart, chances with their confidence intervals.
+
+Two things are not known of the mean of a result. One is which cases there might have been: that is the spread, and its
+share in the mean falls with the number of samples. The other is how far the solution of each case is from the truth:
+that is ±, which no number of samples lets fall. They are told beside each other and never added.
+
+The probability of a condition has an interval by Clopper and Pearson (1934), which covers it at least as often as its
+level says, of independent samples; of samples that are evenly spread it is that of as many independent ones, and
+mostly wider than it need be. A case that its ± leaves undecided, and one that has failed, may count either way: the
+interval holds for both. Results behind the horizon of their motion are draws: their ± says nothing, a case counts by
+its one run, and where it has an ensemble by mean and spread of that in mean and deviation.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from ..results.case_rows import results_among
+from .expressions import Expression, Interval
+from .study import SAMPLES
+
+RESAMPLES = 999
+"""Number of samples with replacement that intervals of Sobol's indices are taken of."""
+UNDONE = ("skipped", "waiting")
+"""Status of rows that say nothing of a condition, as their cases have not been run."""
+
+
+def chances(study, rows, columns, names):
+    """What rows say together.
+
+    Parameters
+    ----------
+    study : Study
+        What was asked.
+    rows : sequence of (Case, dict)
+        Cases with their rows.
+    columns : sequence of str
+        Columns of the rows.
+    names : list of dict
+        Values of the lists in each group of cases.
+
+    Returns
+    -------
+    list of dict
+        Of each group ``of``, its values by path; ``cases``, how many have which status; ``results``, by name what
+        `_spread` finds; ``conditions``, by name what `_share` finds; ``indices``, by name what `_indices` finds, or
+        None with the reason.
+    """
+    results, sampled = results_among(columns), study.sample in SAMPLES
+    known = [*study.parameters, *(one.name for one in results)]
+    conditions = {name: Expression(text, known) for name, text in study.conditions.items()} if results else {}
+    found = []
+    for number, of in enumerate(names):
+        mine = [(case, row) for case, row in rows if case.group == number]
+        plain = [(case, row) for case, row in mine if case.part in ("", "A", "B")]
+        solved = [row for _, row in plain if row["status"] == "solved"]
+        count = {}
+        for _, row in mine:
+            count[row["status"]] = count.get(row["status"], 0) + 1
+        entry = {"of": of, "cases": count, "results": {}, "conditions": {}}
+        for one in results:
+            if spread := _spread(study, one, solved, sampled):
+                entry["results"][one.name] = spread
+        for name, condition in conditions.items():
+            entry["conditions"][name] = _share(study, condition, results, plain, sampled)
+        if study.indices:
+            entry["indices"] = {one.name: _indices(study, one, mine) for one in results}
+        found.append(entry)
+    return found
+
+
+def column_of(row, result):
+    """(Value, ±, statistical) of a result in a row; its mean over the ensemble where there is one."""
+    value, error = row.get(f"{result.name} [{result.unit}]"), row.get(f"{result.name} ±")
+    statistical = result.name in (row.get("statistical") or "").split()
+    return value, error, statistical
+
+
+def _spread(study, result, rows, sampled):
+    """Mean, spread and quantiles of a result, each with what ± makes of it; None where no row has it."""
+    values, errors, within, means = [], [], [], []
+    for row in rows:
+        value, error, statistical = column_of(row, result)
+        if value is None or not math.isfinite(value):
+            continue
+        values.append(value)
+        errors.append(0.0 if statistical else error)
+        means.append(row[f"{result.name} mean"] if row.get(f"{result.name} mean") is not None else value)
+        within.append(row.get(f"{result.name} deviation") or 0.0)
+    if not values:
+        return None
+    values, means, n = np.array(values), np.array(means), len(values)
+    unknown = sum(error is None for error in errors)
+    wide = np.array([error or 0.0 for error in errors])
+    found = {"unit": result.unit, "count": n, "least": float(values.min()), "largest": float(values.max())}
+    found |= {"without_error": unknown, "error": None if unknown else float(wide.max())}
+    if not sampled:
+        return found
+    between = float(np.var(means, ddof=1)) if n > 1 else 0.0
+    deviation = math.sqrt(between + float(np.mean(np.square(within))))
+    found |= {"mean": float(means.mean()), "mean_error": None if unknown else float(wide.mean())}
+    found |= {"deviation": deviation, "standard_error": math.sqrt(between / n) if n > 1 else None}
+    found["quantiles"] = [_quantile(values, None if unknown else wide, q, study.confidence) for q in study.quantiles]
+    return found
+
+
+def _quantile(values, errors, q, level):
+    """A quantile; least and most of it that ± leaves, as quantiles rise with values; its interval by ranks."""
+    ordered, n = np.sort(values), len(values)
+    at = {"q": q, "value": float(np.quantile(values, q)), "least": None, "most": None, "interval": None}
+    if errors is not None:
+        at["least"], at["most"] = (float(np.quantile(values + sign * errors, q)) for sign in (-1.0, 1.0))
+    if (ranks := _ranks(n, q, level)) is not None:
+        at["interval"] = [float(ordered[rank]) for rank in ranks]
+    return at
+
+
+def _ranks(n, q, level):
+    """Places of the ordered samples between which a quantile is with a probability; None where too few say nothing.
+
+    So many of n samples are below a quantile as a binomial variable is: no distribution is assumed.
+    """
+    from scipy.stats import binom
+
+    low = int(binom.ppf(0.5 * (1.0 - level), n, q)) - 1
+    high = int(binom.ppf(0.5 * (1.0 + level), n, q))
+    return (low, high) if 0 <= low and high < n else None
+
+
+def bounds(row, results, values):
+    """Values by name for a condition: parameters, and results as intervals; exact of draws and of unknown ±."""
+    told = dict(values)
+    for result in results:
+        value, error, statistical = column_of(row, result)
+        if value is None:
+            continue
+        wide = 0.0 if statistical or error is None else error
+        least, most = row.get(f"{result.name} least"), row.get(f"{result.name} most")
+        told[result.name] = Interval(value - wide if least is None else least, value + wide if most is None else most)
+    return told
+
+
+def _share(study, condition, results, cases, sampled):
+    """Of how many cases a condition holds, and of samples its probability.
+
+    ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it leaves open, and
+    ``failed`` those without a result; ``unproven`` of the decided have a result without ±, and ``statistical`` have one
+    that is a draw.
+    """
+    used = [one for one in results if one.name in condition.used]
+    count = dict.fromkeys(("true", "false", "undecided", "failed", "unproven", "statistical", "by_value"), 0)
+    for case, row in cases:
+        if row["status"] in UNDONE:
+            continue
+        told = bounds(row, results, case.values)
+        if row["status"] != "solved" or any(one.name not in told for one in used):
+            count["failed"] += 1
+            continue
+        verdict = condition(told)
+        count[{True: "true", False: "false", None: "undecided"}[verdict]] += 1
+        found = [column_of(row, one) for one in used]
+        count["statistical"] += any(statistical for *_, statistical in found)
+        count["unproven"] += any(error is None and not statistical for _, error, statistical in found)
+        values = {name: value for name, value in told.items()} | {
+            one.name: Interval(value, value) for one, (value, *_) in zip(used, found, strict=True)
+        }
+        count["by_value"] += condition(values) is True
+    decided = count["true"] + count["false"] + count["undecided"]
+    n = decided + count["failed"]
+    share = {"condition": condition.text, **count, "share": count["by_value"] / decided if decided else None}
+    if sampled and n:
+        least, _ = clopper_pearson(count["true"], n, study.confidence)
+        _, most = clopper_pearson(n - count["false"], n, study.confidence)
+        share["interval"] = [least, most]
+        share["by_samples"] = list(clopper_pearson(count["by_value"], decided, study.confidence)) if decided else None
+    return share
+
+
+def clopper_pearson(successes, count, level):
+    """The interval of Clopper and Pearson of a probability, from successes among a count of independent trials."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(successes, count).proportion_ci(level, method="exact")
+    return float(interval.low), float(interval.high)
+
+
+def _indices(study, result, cases):
+    """Sobol's indices of a result, of first order and total, with their intervals; None with the reason.
+
+    Intervals are those of samples with replacement, percentile by percentile; ± is not in them: ``error`` is the
+    largest ± over the spread, and indices mean little where that is not small.
+    """
+    from scipy.stats import sobol_indices
+
+    drawn, n = list(study.drawn), study.count
+    table = {part: np.full(n, np.nan) for part in ("A", "B", *drawn)}
+    errors = []
+    for case, row in cases:
+        value, error, statistical = column_of(row, result)
+        if row["status"] == "solved" and value is not None:
+            table[case.part][case.draw] = value
+            errors.append(0.0 if statistical else error)
+    missing = sum(int(np.isnan(values).sum()) for values in table.values())
+    if missing:
+        return {"reason": f"{missing} of {n * (len(drawn) + 2)} cases have no result"}
+    spread = float(np.std(np.concatenate([table["A"], table["B"]])))
+    if not spread:
+        return {"reason": "all cases have the same result"}
+
+    def of(rows):
+        func = {"f_A": table["A"][None, rows], "f_B": table["B"][None, rows]}
+        func["f_AB"] = np.array([table[path][rows] for path in drawn])[:, None]
+        found = sobol_indices(func=func, n=n)
+        return np.array([np.ravel(found.first_order), np.ravel(found.total_order)])
+
+    generator = np.random.default_rng(study.seed)
+    best = of(np.arange(n))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        again = np.array([of(generator.integers(0, n, n)) for _ in range(RESAMPLES)])
+    tails = 0.5 * (1.0 - study.confidence)
+    low, high = np.nanquantile(again, [tails, 1.0 - tails], axis=0)
+    kinds = ("first", "total")
+    pairs = itertools.product(enumerate(kinds), enumerate(drawn))
+    told: dict = {path: {} for path in drawn}
+    for (k, kind), (p, path) in pairs:
+        told[path][kind] = {"value": float(best[k, p]), "interval": [float(low[k, p]), float(high[k, p])]}
+    known = [error for error in errors if error is not None]
+    return {"of": told, "error": max(known) / spread if len(known) == len(errors) else None}

@@ -1,0 +1,264 @@
+"""Conditions in words, such as ``max_stress > 2e8 and speed < 3``: read by a reader of its own, never by Python's.
+
+A condition holds arithmetic, comparisons, ``and``, ``or``, ``not``, the functions `FUNCTIONS`, numbers, texts in quotes
+and names. Names may have dots and numbers in them, as paths have, ``body.0.mass``, and an index behind them,
+``body.0.velocity[2]``.
+
+A name stands for a value or for an `Interval`: that of a result with its ±. Numbers follow by interval arithmetic, so
+that a comparison is true or false only where it is so of all values in the intervals, and None where ± leaves it
+undecided (Kleene's logic). An interval may come out wider than it is, where a name stands twice, and never narrower,
+but for rounding.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import re
+from typing import NamedTuple
+
+from ..errors import InputError
+from ..messages import nearest, shown
+
+LONGEST = 2000
+"""Largest number of characters of a condition."""
+DEEPEST = 50
+"""Largest depth of what stands in each other."""
+_NAME = re.compile(r"""("[^"]*"|'[^']*')|(?<![\w.])([A-Za-z_][\w-]*(?:\.[\w-]+)+|[A-Za-z_]\w*)""")
+
+
+class Interval(NamedTuple):
+    """Numbers from ``low`` to ``high``."""
+
+    low: float
+    high: float
+
+
+ANY = Interval(-math.inf, math.inf)
+"""Whatever number there is."""
+
+
+def exact(number):
+    """The `Interval` of one number."""
+    return Interval(number, number)
+
+
+def _hull(*values):
+    return ANY if any(map(math.isnan, values)) else Interval(min(values), max(values))
+
+
+def _multiplied(one, other):
+    return _hull(*(a * b if a and b else 0.0 for a in one for b in other))
+
+
+def _divided(one, other):
+    if other.low <= 0.0 <= other.high:
+        return ANY
+    return _hull(*(a / b for a in one for b in other))
+
+
+def _power(one, other):
+    if other.low != other.high:
+        raise InputError("an exponent must be a number without ±")
+    p = other.low
+    if one.low < 0.0 and p != int(p):
+        return ANY
+    if p < 0.0:
+        return _divided(exact(1.0), _power(one, exact(-p)))
+    try:
+        ends = [a**p for a in one]
+    except OverflowError:
+        return ANY
+    inside = [0.0] if one.low < 0.0 < one.high and p % 2 == 0 else []
+    return _hull(*ends, *inside)
+
+
+def _absolute(one):
+    ends = [abs(end) for end in one]
+    return Interval(0.0 if one.low < 0.0 < one.high else min(ends), max(ends))
+
+
+def _root(one):
+    return ANY if one.low < 0.0 else Interval(math.sqrt(one.low), math.sqrt(one.high))
+
+
+FUNCTIONS = {
+    "abs": _absolute,
+    "sqrt": _root,
+    "min": lambda *all: Interval(min(one.low for one in all), min(one.high for one in all)),
+    "max": lambda *all: Interval(max(one.low for one in all), max(one.high for one in all)),
+}
+"""What a condition may call."""
+_SUMS = {
+    ast.Add: lambda a, b: Interval(a.low + b.low, a.high + b.high),
+    ast.Sub: lambda a, b: Interval(a.low - b.high, a.high - b.low),
+    ast.Mult: _multiplied,
+    ast.Div: _divided,
+    ast.Pow: _power,
+}
+_ORDERS = {ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge}
+
+
+class Expression:
+    """A condition that has been read.
+
+    Parameters
+    ----------
+    text : str
+        The condition.
+    names : collection of str
+        Names that it may use; the last part of a path stands for the path where no other has it.
+
+    Raises
+    ------
+    InputError
+        For what is no condition, and for a name that is none of these: names the nearest.
+    """
+
+    def __init__(self, text, names):
+        self.text, self._aliases = text, {}
+        if len(text) > LONGEST:
+            raise InputError(f"a condition must have at most {LONGEST} characters, not {len(text)}")
+        known = _with_short(names)
+        self.used = set()
+
+        def alias(match):
+            quoted, name = match.groups()
+            if quoted or name in ("and", "or", "not", "true", "false", *FUNCTIONS):
+                return {"true": "True", "false": "False"}.get(name, match.group())
+            if name not in known:
+                raise InputError(f"{shown(text)}: {shown(name)} is not known here, {nearest(name, known)}")
+            self.used.add(known[name])
+            key = f"_{len(self._aliases)}"
+            self._aliases[key] = known[name]
+            return key
+
+        plain = _NAME.sub(alias, text)
+        try:
+            self._tree = ast.parse(plain.strip(), mode="eval").body
+        except (SyntaxError, ValueError, RecursionError, MemoryError):
+            raise InputError(f"{shown(text)}: is not a condition, such as max_stress > 2e8") from None
+        self._check(self._tree, 0)
+        if not isinstance(self._tree, ast.Compare | ast.BoolOp) and not (
+            isinstance(self._tree, ast.UnaryOp) and isinstance(self._tree.op, ast.Not)
+        ):
+            raise InputError(f"{shown(text)}: compares nothing: a condition is such as max_stress > 2e8")
+
+    def _check(self, node, depth):
+        """Refuse what a condition must not hold."""
+        good = ast.Compare | ast.BoolOp | ast.UnaryOp | ast.BinOp | ast.Name | ast.Constant | ast.Call | ast.Subscript
+        fine = isinstance(node, good)
+        if isinstance(node, ast.BinOp):
+            fine = type(node.op) in _SUMS
+        elif isinstance(node, ast.UnaryOp):
+            fine = isinstance(node.op, ast.USub | ast.UAdd | ast.Not)
+        elif isinstance(node, ast.Compare):
+            fine = all(type(op) in (*_ORDERS, ast.Eq, ast.NotEq) for op in node.ops)
+        elif isinstance(node, ast.Constant):
+            fine = isinstance(node.value, bool | int | float | str)
+        elif isinstance(node, ast.Call):
+            fine = isinstance(node.func, ast.Name) and node.func.id in FUNCTIONS and node.args and not node.keywords
+        elif isinstance(node, ast.Name):
+            fine = node.id in self._aliases
+        elif isinstance(node, ast.Subscript):
+            fine = isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Constant)
+            fine = fine and isinstance(node.slice.value, int)
+        if not fine or depth > DEEPEST:
+            words = f"arithmetic, comparisons, and, or, not, {', '.join(FUNCTIONS)}, numbers, texts and names"
+            raise InputError(f"{shown(self.text)}: a condition holds {words} alone")
+        for one in ast.iter_child_nodes(node):
+            if isinstance(one, ast.expr) and not (isinstance(node, ast.Call) and one is node.func):
+                self._check(one, depth + 1)
+
+    def __call__(self, values):
+        """Whether it holds of values by name: true, false, or None where intervals leave that undecided.
+
+        Raises
+        ------
+        InputError
+            For a sum of texts, an index that is out of range, and what else cannot be computed.
+        """
+        try:
+            return self._truth(self._tree, values)
+        except (TypeError, AttributeError, ValueError, IndexError):
+            raise InputError(f"{shown(self.text)}: cannot be computed of {_told(values, self.used)}") from None
+
+    def _truth(self, node, values):
+        if isinstance(node, ast.BoolOp):
+            parts = [self._truth(one, values) for one in node.values]
+            decisive = isinstance(node.op, ast.Or)
+            return decisive if decisive in parts else None if None in parts else not decisive
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            inner = self._truth(node.operand, values)
+            return None if inner is None else not inner
+        if isinstance(node, ast.Compare):
+            sides = [self._value(one, values) for one in (node.left, *node.comparators)]
+            parts = [_compared(op, a, b) for op, a, b in zip(node.ops, sides, sides[1:], strict=False)]
+            return False if False in parts else None if None in parts else True
+        value = self._value(node, values)
+        if not isinstance(value, bool):
+            raise TypeError
+        return value
+
+    def _value(self, node, values):
+        if isinstance(node, ast.Constant):
+            return _read(node.value)
+        if isinstance(node, ast.Name):
+            return _read(values[self._aliases[node.id]])
+        if isinstance(node, ast.Subscript):
+            entries = self._value(node.value, values)
+            if not isinstance(entries, list):
+                raise TypeError
+            return _read(entries[node.slice.value])
+        if isinstance(node, ast.BinOp):
+            left, right = (_number(self._value(one, values)) for one in (node.left, node.right))
+            return _SUMS[type(node.op)](left, right)
+        if isinstance(node, ast.Call):
+            return FUNCTIONS[node.func.id](*(_number(self._value(one, values)) for one in node.args))
+        if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not):
+            inner = _number(self._value(node.operand, values))
+            return inner if isinstance(node.op, ast.UAdd) else Interval(-inner.high, -inner.low)
+        return self._truth(node, values)
+
+
+def _with_short(names):
+    """Names, and last parts of paths that only one of them has, by what they stand for."""
+    ends = [name.rpartition(".")[2] for name in names]
+    short = {end: name for end, name in zip(ends, names, strict=True) if ends.count(end) == 1 and end.isidentifier()}
+    return short | {name: name for name in names}
+
+
+def _read(value):
+    """A number as its interval; texts, truths, lists and intervals as they are."""
+    if isinstance(value, tuple) and not isinstance(value, Interval):
+        return list(value)
+    return exact(float(value)) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+def _number(value):
+    if not isinstance(value, Interval):
+        raise TypeError
+    return value
+
+
+def _compared(op, a, b):
+    """Whether a comparison holds of all values, of none (false), or of some (None)."""
+    if isinstance(op, ast.Eq | ast.NotEq):
+        if isinstance(a, Interval) and isinstance(b, Interval):
+            same = None if max(a.low, b.low) <= min(a.high, b.high) else False
+            same = True if a.low == a.high == b.low == b.high else same
+        else:
+            same = a == b
+        return same if isinstance(op, ast.Eq) or same is None else not same
+    a, b = _number(a), _number(b)
+    if isinstance(op, ast.Gt | ast.GtE):
+        a, b, op = b, a, ast.Lt() if isinstance(op, ast.Gt) else ast.LtE()
+    holds = _ORDERS[type(op)]
+    if any(map(math.isnan, (*a, *b))):
+        return None
+    return True if holds(a.high, b.low) else None if holds(a.low, b.high) else False
+
+
+def _told(values, used):
+    return ", ".join(f"{name} = {shown(values[name])}" for name in sorted(used) if name in values) or "these values"

@@ -1,0 +1,147 @@
+"""What a study has found, as a value: its rows, what they say together, and its ``run.json``."""
+
+from __future__ import annotations
+
+import pathlib
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ..results.case_rows import FIRST, LAST, results_among
+from ..results.provenance import versions
+from .chances import chances
+from .design import groups
+from .study import Study
+
+if TYPE_CHECKING:
+    import pandas
+
+
+@dataclass(eq=False, repr=False)
+class Sweep:
+    """Many runs of one scene, as `refweb.sweep` returns them.
+
+    Attributes
+    ----------
+    study : refweb.sweeps.study.Study
+        What was asked.
+    rows : list of dict
+        A row for each case, in the order of the cases: cells by column, None where nothing is known.
+    columns : list of str
+        Names of the columns, see `refweb.results.case_rows`.
+    chances : list of dict
+        What the rows say together, see `refweb.sweeps.chances.chances`.
+    title : str
+        Title of the scene.
+    status : {"running", "solved", "failed", "interrupted"}
+        How it ended: "solved" where every case has a row, also where that says why it failed.
+    message : str
+        Why it has not ended, else empty.
+    warnings : list of str
+        What a reader has to know.
+    cost : dict of str to float
+        What this start of it took [s], ``cpu_s`` without that of its workers; of all rows ``cases_cpu_s`` and, of
+        that, ``cases_compile_s``.
+    path : pathlib.Path, optional
+        Its folder.
+    """
+
+    study: Study
+    cases: list
+    title: str
+    rows: list = field(default_factory=list)
+    columns: list = field(default_factory=list)
+    chances: list = field(default_factory=list)
+    status: str = "running"
+    message: str = ""
+    warnings: list = field(default_factory=list)
+    cost: dict = field(default_factory=lambda: {"cpu_s": 0.0, "wall_s": 0.0, "compile_s": 0.0})
+    path: pathlib.Path | None = None
+    versions: dict = field(default_factory=versions)
+    reasons: list = field(default_factory=list)
+
+    @property
+    def count(self):
+        """How many rows have which status, a dict."""
+        found = dict.fromkeys(("solved", "failed", "refused", "lost", "skipped", "waiting"), 0)
+        for row in self.rows:
+            found[row["status"]] += 1
+        return {status: number for status, number in found.items() if number}
+
+    def gather(self, known):
+        """Let ``rows`` be those of all cases, of what is known by their keys, and find what they say together."""
+        self.rows = [row_of(self.study, case, known) for case in self.cases]
+        self.columns = columns_of(self.study, self.rows)
+        self.chances = chances(
+            self.study, list(zip(self.cases, self.rows, strict=True)), self.columns, groups(self.study)
+        )
+        self.cost |= {
+            f"cases_{key}": float(sum(row.get(key) or 0.0 for row in self.rows)) for key in ("cpu_s", "compile_s")
+        }
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """The rows as a `pandas.DataFrame`, which refweb does not bring."""
+        import pandas
+
+        return pandas.DataFrame(self.rows, columns=self.columns)
+
+    def values(self, name) -> Any:
+        """A result, or a parameter by its path, of all cases, an array; NaN where there is none."""
+        import numpy as np
+
+        from ..errors import InputError
+        from ..messages import nearest, shown
+
+        known = {one.name: f"{one.name} [{one.unit}]" for one in results_among(self.columns)}
+        known |= {path: path for path in self.study.parameters}
+        if name not in known:
+            raise InputError(f"{shown(name)} is neither a result nor a parameter, {nearest(name, known)}")
+        cells = [row.get(known[name]) for row in self.rows]
+        plain = all(cell is None or isinstance(cell, int | float) for cell in cells)
+        return np.array([np.nan if cell is None else cell for cell in cells], dtype=float if plain else object)
+
+    def summary(self):
+        """The content of ``run.json``, a dict of plain values; ``kind`` is "sweep"."""
+        return {
+            "kind": "sweep",
+            "status": self.status,
+            "message": self.message,
+            "scene": self.title,
+            "title": self.study.title,
+            "study": self.study.to_dict(),
+            "cases": len(self.cases),
+            "count": self.count,
+            "reasons": self.reasons,
+            "chances": finite(self.chances),
+            "cost": self.cost,
+            "versions": self.versions,
+            "seed": self.study.seed,
+            "warnings": self.warnings,
+        }
+
+    def __repr__(self):
+        told = ", ".join(f"{number} {status}" for status, number in self.count.items())
+        return f'<Sweep of "{self.title}": {len(self.cases)} cases, {told or "none run"}>'
+
+
+def row_of(study, case, known):
+    """The row of a case: its values, and what is known by its key."""
+    values = {path: case.values[path] for path in study.parameters}
+    if case.given is None:
+        return {"case": "", "status": "skipped", **values, "message": f"skip: {study.skip}"}
+    found = known.get(case.key, {"status": "waiting"})
+    return {"case": case.key, **values, **{k: v for k, v in found.items() if k != "case" and k not in values}}
+
+
+def columns_of(study, rows):
+    """All columns in their order."""
+    middle = dict.fromkeys([*study.parameters, *(name for row in rows for name in row)])
+    return [*FIRST, *(name for name in middle if name not in (*FIRST, *LAST)), *LAST]
+
+
+def finite(given):
+    """Plain values without infinite numbers, which JSON does not have."""
+    if isinstance(given, dict):
+        return {key: finite(value) for key, value in given.items()}
+    if isinstance(given, list | tuple):
+        return [finite(value) for value in given]
+    return None if isinstance(given, float) and given - given != 0.0 else given

@@ -1,0 +1,349 @@
+"""What a study is: a scene, the values in it that vary, how they are chosen, and what is asked of the results."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+import tomllib
+from dataclasses import field as plain_field
+from typing import NamedTuple
+
+from ..accepted import accepts, any_of, array, by_name
+from ..errors import InputError, in_file, refused_at
+from ..messages import nearest, short, shown
+from ..tables import Several, Table, boolean, checked, choice, field, integer, numbers_list, real, table, text
+
+SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
+"""Folder of the studies shipped with refweb."""
+DESIGNS = ("grid", "zip")
+"""Ways to put lists and ranges together."""
+SAMPLES = ("random", "sobol", "halton", "latin-hypercube")
+"""Ways to take samples of ranges and distributions."""
+MOST_CASES = 1_000_000
+"""Largest number of cases."""
+
+
+class Range(NamedTuple):
+    """Numbers from ``low`` to ``high``, ``count`` of them (None: as many as there are samples), or their logarithms."""
+
+    low: float
+    high: float
+    count: int | None
+    log: bool
+
+    def at(self, share):
+        """The number at a share of the way, 0 to 1."""
+        if share in (0.0, 1.0):
+            return self.high if share else self.low
+        if self.log:
+            return math.exp(math.log(self.low) * (1.0 - share) + math.log(self.high) * share)
+        return self.low + (self.high - self.low) * share
+
+
+class Distribution(NamedTuple):
+    """A distribution of scipy, by name, and its parameters."""
+
+    name: str
+    keys: tuple
+
+    @property
+    def frozen(self):
+        """That of `scipy.stats`, with its parameters."""
+        from scipy import stats
+
+        return getattr(stats, self.name)(**dict(self.keys))
+
+    @property
+    def discrete(self):
+        """Whether its values are whole numbers."""
+        from scipy import stats
+
+        return isinstance(getattr(stats, self.name), stats.rv_discrete)
+
+
+def read_parameters(name, given):
+    """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`."""
+    if not isinstance(given, dict) or not given:
+        raise InputError(f'{name} = {shown(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
+    return {path: _parameter(f"{name}: {short(path)}", value) for path, value in _flat(given)}
+
+
+_KEYS = {"from", "to", "count", "spacing", "distribution"}
+
+
+def _flat(given, above=""):
+    """(path, value): dotted keys without quotes are tables in tables to TOML."""
+    for key, value in given.items():
+        path = f"{above}.{key}" if above else str(key)
+        if isinstance(value, dict) and value and all(isinstance(one, dict | list) for one in value.values()):
+            yield from _flat(value, path)
+        else:
+            yield path, value
+
+
+def _parameter(name, value):
+    if isinstance(value, Range | Distribution):
+        return value
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        if not value:
+            raise InputError(f"{name} = [] must hold at least one case")
+        seen = [shown(one) for one in value]
+        if twice := next((one for one in seen if seen.count(one) > 1 and len(one) < 60), None):
+            raise InputError(f"{name}: {twice} stands there twice: each case is run once")
+        return tuple(value)
+    if not isinstance(value, dict):
+        wanted = 'a list of cases, { from = 0, to = 1, count = 5 } or { distribution = "norm", loc = 0, scale = 1 }'
+        raise InputError(f"{name} = {shown(value)} must be {wanted}")
+    with refused_at(f"{name}:"):
+        if "distribution" in value:
+            return _distribution(value)
+        return _range(value)
+
+
+def _range(value):
+    known = ["from", "to", "count", "spacing"]
+    for key in value:
+        if key not in known:
+            raise InputError(
+                f"{short(key)} = {shown(value[key])}: unknown key, {nearest(key, [*known, 'distribution'])}"
+            )
+    for key in ("from", "to"):
+        if key not in value:
+            raise InputError(f"{key} is missing: give {key} = ...")
+    low, high = (checked(key, value[key], real()) for key in ("from", "to"))
+    count = checked("count", value["count"], integer(at_least=1, at_most=MOST_CASES)) if "count" in value else None
+    log = checked("spacing", value.get("spacing", "linear"), choice("linear", "log")) == "log"
+    if low == high:
+        raise InputError(f"to = {high:g} must differ from from = {low:g}")
+    if log and not (low > 0.0 and high > 0.0):
+        raise InputError(f'spacing = "log": from = {low:g} and to = {high:g} must be > 0')
+    return Range(low, high, count, log)
+
+
+def _distribution(value):
+    from scipy import stats
+
+    known = [n for n in dir(stats) if isinstance(getattr(stats, n), stats.rv_continuous | stats.rv_discrete)]
+    name = value["distribution"]
+    if name not in known:
+        raise InputError(f"distribution = {shown(name)} is none of scipy.stats, {nearest(name, known)}")
+    kind = getattr(stats, name)
+    shapes = [one.strip() for one in (kind.shapes or "").split(",") if one.strip()]
+    keys = [*shapes, "loc", *(["scale"] if isinstance(kind, stats.rv_continuous) else [])]
+    for key in value:
+        if key not in keys and key != "distribution":
+            raise InputError(f"{short(key)} = {shown(value[key])}: {name} has no such parameter, {nearest(key, keys)}")
+    for key in shapes:
+        if key not in value:
+            raise InputError(f"{key} is missing: {name} needs {key} = ...")
+    found = Distribution(name, tuple((key, checked(key, value[key], real())) for key in keys if key in value))
+    if not all(math.isfinite(x) for x in (found.frozen.ppf(0.3), found.frozen.ppf(0.7))):
+        raise InputError(f"{name} does not exist with {', '.join(f'{k} = {v:g}' for k, v in found.keys)}")
+    return found
+
+
+def parameters():
+    """Values that vary, by path."""
+    number = {"type": "number"}
+    ranged = {"type": "object", "properties": {"from": number, "to": number}, "additionalProperties": True}
+
+    @accepts(by_name(any_of(array({}, 1), ranged)))
+    def read(name, value):
+        return read_parameters(name, value)
+
+    return field(read)
+
+
+def texts_by_name():
+    """Texts by name."""
+
+    @accepts(by_name({"type": "string"}))
+    def read(name, value):
+        if not isinstance(value, dict):
+            raise InputError(f'{name} = {shown(value)} must be a table of texts, safe = "max_stress < 2e8"')
+        for key, one in value.items():
+            if not isinstance(one, str) or not one.strip():
+                raise InputError(f'{name}: {short(key)} = {shown(one)} must be a text, such as "max_stress < 2e8"')
+        return dict(value)
+
+    return field(read, default_factory=dict)
+
+
+@table
+class Study(Table):
+    """Many runs of one scene.
+
+    Parameters
+    ----------
+    scene : str
+        A scene file, relative to the study, or the name of a scene shipped with refweb.
+    parameters : dict
+        What varies, by the paths of ``--set``: a list of cases, of vectors as well; ``{ from, to, count, spacing }``,
+        ``spacing = "log"`` being that of equal ratios; or ``{ distribution, ... }`` by the names that scipy.stats has
+        for distributions and their parameters.
+    title : str
+        Title, by default the name of the file. Results go to a folder of that name.
+    sample : {"grid", "zip", "random", "sobol", "halton", "latin-hypercube"}
+        Every value with every other; the first ones together, then the second ones; or samples, independent ones
+        or evenly spread, of all ranges and distributions at once, each of them with every combination of the lists.
+    count : int, optional
+        Number of samples.
+    seed : int
+        Seed of the samples.
+    skip : str, optional
+        A condition on the parameters: cases of which it holds are not run.
+    keep : {"none", "json", "all"}
+        Whether a run leaves its row alone, its ``run.json`` as well, or its whole result folder.
+    conditions : dict
+        Conditions on results and parameters by name, of which the share of the cases is told, and of samples the
+        probability.
+    quantiles : sequence of float
+        Of samples: quantiles that are told of each result.
+    confidence : float
+        Level of the confidence intervals.
+    indices : bool
+        Of samples by "sobol": whether to find Sobol's indices, which say how much of the spread comes from which
+        parameter. That takes count × (number of ranges and distributions + 2) cases instead of count.
+
+    Raises
+    ------
+    InputError
+        For wrong parameters, samples without a count or without anything to sample, distributions on a grid, lists of
+        different lengths in a zip, and indices of other samples than "sobol", or of a count that is no power of 2.
+
+    Examples
+    --------
+        scene = "square-impact"
+        [parameters]
+        "body.0.velocity.2" = { distribution = "norm", loc = 1, scale = 0.1 }
+        [conditions]
+        safe = "max_stress < 2e8"
+    """
+
+    scene: str = text()
+    parameters: dict = parameters()
+    title: str = text(default="study", most=200)
+    sample: str = choice(*DESIGNS, *SAMPLES, default="grid")
+    count: int | None = integer(default=None, at_least=1, at_most=MOST_CASES)
+    seed: int = integer(default=0, at_least=0, at_most=2**63 - 1)
+    skip: str | None = text(default=None)
+    keep: str = choice("none", "json", "all", default="none")
+    conditions: dict = texts_by_name()
+    quantiles: Several = numbers_list(default=(0.05, 0.5, 0.95))
+    confidence: float = real(default=0.95, above=0, below=1)
+    indices: bool = boolean(default=False)
+    folder: pathlib.Path | None = plain_field(default=None, compare=False, metadata={"read": lambda name, value: value})
+
+    @property
+    def listed(self):
+        """Parameters that are lists, and in designs ranges, with all their values."""
+        return {path: _values(one) for path, one in self.parameters.items() if path not in self.drawn}
+
+    @property
+    def drawn(self):
+        """Parameters of which samples are taken."""
+        sampled = self.sample in SAMPLES
+        return {p: one for p, one in self.parameters.items() if sampled and isinstance(one, Range | Distribution)}
+
+    def check(self):
+        """Refuse what does not fit together."""
+        for q in self.quantiles:
+            if not 0.0 < q < 1.0:
+                raise InputError(f"quantiles = {q:g} must be between 0 and 1")
+        if self.sample in SAMPLES:
+            self._check_samples()
+        else:
+            self._check_design()
+
+    def _check_samples(self):
+        if not self.drawn:
+            raise InputError(f'sample = "{self.sample}" needs a range or a distribution among the parameters')
+        if self.count is None:
+            raise InputError(f'count is missing: sample = "{self.sample}" needs the number of samples, count = 64')
+        for path, one in self.drawn.items():
+            if isinstance(one, Range) and one.count is not None:
+                raise InputError(
+                    f"parameters: {path}: count = {one.count} has no meaning with sample = {shown(self.sample)}, whose "
+                    "count is that of all samples: leave it out"
+                )
+        if self.indices and self.sample != "sobol":
+            raise InputError(f'indices = true needs sample = "sobol", not {shown(self.sample)}')
+        if self.indices and self.count & (self.count - 1):
+            raise InputError(f"count = {self.count} must be a power of 2 for indices, such as 64")
+
+    def _check_design(self):
+        for path, one in self.parameters.items():
+            if isinstance(one, Distribution):
+                known = ", ".join(f'"{name}"' for name in SAMPLES)
+                raise InputError(f"parameters: {path}: a distribution needs sample = one of {known}, and a count")
+            if isinstance(one, Range) and one.count is None:
+                raise InputError(f"parameters: {path}: count is missing: give the number of values, count = 5")
+        for key, given in (("count", self.count), ("indices", self.indices)):
+            if given:
+                raise InputError(f'{key} = {shown(given)} has no meaning with sample = "{self.sample}": leave it out')
+        lengths = {path: len(values) for path, values in self.listed.items()}
+        if self.sample == "zip" and len(set(lengths.values())) > 1:
+            told = ", ".join(f"{path} has {number}" for path, number in lengths.items())
+            raise InputError(f'sample = "zip" needs as many values of each parameter: {told}')
+
+    def to_dict(self):
+        """The study as plain TOML values."""
+        given = {key: value for key, value in super().to_dict().items() if key not in ("folder", "parameters")}
+        return {key: value for key, value in given.items() if value != {}} | {
+            "parameters": {path: _plain(one) for path, one in self.parameters.items()}
+        }
+
+
+def _values(one):
+    """All values of a list or a range."""
+    if not isinstance(one, Range):
+        return list(one)
+    return [one.at(n / (one.count - 1) if one.count > 1 else 0.0) for n in range(one.count)]
+
+
+def _plain(one):
+    if isinstance(one, Range):
+        return {"from": one.low, "to": one.high} | ({"count": one.count} if one.count else {}) | (
+            {"spacing": "log"} if one.log else {}
+        )  # fmt: skip
+    if isinstance(one, Distribution):
+        return {"distribution": one.name, **dict(one.keys)}
+    return [list(x) if isinstance(x, tuple) else x for x in one]
+
+
+def shipped():
+    """Paths of the studies shipped with refweb, by name."""
+    return {path.stem: path for path in sorted(SHIPPED_STUDIES.glob("*.toml"))}
+
+
+def load(source) -> Study:
+    """The study of a TOML file, or of the name of a study shipped with refweb.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file or study, or it is wrong.
+    """
+    path, known = pathlib.Path(source), shipped()
+    if not path.is_file():
+        if (name := str(path).removesuffix(".toml")) not in known:
+            raise InputError(f"{short(str(source))}: no such file and no shipped study, {nearest(path.stem, known)}")
+        path = known[name]
+    try:
+        given = tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except (ValueError, OSError, RecursionError) as error:
+        raise InputError(f"{path.name}: cannot be read: {error}") from None
+    with in_file(path.name):
+        if "web" in given and "parameters" not in given:
+            raise InputError("is a scene, not a study, which has a scene and [parameters]: use refweb run")
+        unknown = [key for key in given if key not in _study_keys()]
+        if unknown:
+            key = unknown[0]
+            raise InputError(f"{short(key)} = {shown(given[key])}: unknown table or key, {nearest(key, _study_keys())}")
+        return Study(**{"title": path.stem, **given, "folder": path.resolve().parent})
+
+
+def _study_keys():
+    return [key for key in Study.keys({}) if key != "folder"]

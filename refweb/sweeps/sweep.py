@@ -1,0 +1,326 @@
+"""A study from start to end: what is there already, what is missing, and the folder that grows by whole rows.
+
+The folder of a study is in a state to go on from at every moment. What a case leaves is put into its place before its
+row is, and rows are appended whole, so that a study that is killed has lost what its workers had in their hands, and
+nothing else. A row is known by the content of its scene: it is found again by whichever study asks for it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import pathlib
+import shutil
+import time
+import tomllib
+from collections import Counter
+from collections.abc import Callable
+
+from ..errors import InputError, in_file
+from ..messages import short, shown
+from ..results import case_rows
+from ..results.files import as_toml, write_text
+from ..results.folder import check_folder, is_alive, read_summary
+from ..results.progress import followed
+from ..results.run_status import Clock, recorded
+from ..scene import Scene, file_of
+from .case import Job, here, keep_outcome, kept_files
+from .design import Base, cases_of, files_of
+from .expressions import Expression
+from .found import Sweep, columns_of, row_of
+from .study import Study, load
+from .workers import Given, Processes, through
+
+
+def sweep(
+    scene,
+    parameters=None,
+    out=None,
+    executor=None,
+    workers=None,
+    progress: bool | Callable | None = True,
+    announce=None,
+    **options,
+) -> Sweep:
+    """Run a scene with many values.
+
+    Parameters
+    ----------
+    scene : Scene, path-like or str
+        A scene, a scene file or the name of a scene shipped with refweb. Without parameters the file of a study, the
+        name of one shipped with refweb, or a `refweb.Study`.
+    parameters : dict, optional
+        What varies by path, as in a study: ``{"body.0.velocity": [[0, 0, 1], [0, 0, 2]]}``.
+    out : path-like, optional
+        Folder of the study; one that holds rows of a study goes on with what is missing. Without it nothing touches the
+        disk.
+    executor : concurrent.futures.Executor, optional
+        Who runs the cases; by default processes of this machine.
+    workers : int, optional
+        Number of processes, by default one for each processor.
+    progress : bool or callable
+        See `refweb.run`.
+    announce : callable, optional
+        Called with the `Sweep` before anything is run.
+    **options
+        Other keys of a study, such as ``sample="sobol", count=64``.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    InputError
+        For wrong input; nothing has been written.
+    SolverError
+        Where the folder cannot be written or the executor takes no more cases.
+    """
+    clock = Clock()
+    if executor is not None and workers is not None:
+        raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise InputError(f"workers = {shown(workers)} must be a whole number ≥ 1")
+    study, base = _asked(scene, parameters, options)
+    cases = cases_of(study, base)
+    found = Sweep(study, cases, str(base.given.get("title", study.scene)))
+    found.reasons = _reasons(study, cases)
+    _check(study, base, cases)
+    kept = Kept(out, found) if out is not None else Kept(None, found)
+    found.path = kept.path
+    found.gather(kept.rows)
+    if announce is not None:
+        announce(found)
+    crew = executor if isinstance(executor, Given) else Given(executor) if executor else Processes(workers)
+    kept.begin(scene if isinstance(scene, Scene) else None)
+    try:
+        with recorded(found, clock, lambda: _done(found, kept)), followed(progress, "starting workers") as tell:
+            try:
+                _run(found, base, kept, crew, tell)
+            finally:
+                kept.end()
+    finally:
+        kept.summary()
+    return found
+
+
+def _asked(scene, parameters, options):
+    """(Study, base) of what `sweep` is given."""
+    if parameters is None:
+        if not isinstance(scene, Study):
+            if isinstance(scene, Scene):
+                raise InputError('parameters are missing: give what varies, {"solve.duration": [0.1, 0.2]}')
+            study = load(scene)
+        else:
+            study = scene
+        if options:
+            raise InputError(f"{next(iter(options))} has no meaning with a study, which has its own keys: leave it out")
+        path = study.folder / study.scene if study.folder is not None else pathlib.Path(study.scene)
+        return study, _base(path if path.is_file() else study.scene)
+    if isinstance(scene, Scene):
+        given = scene.to_dict()
+        title, base = scene.title, Base(given, scene.folder, scene.file or "scene")
+        return Study(**{"scene": "scene.toml", "title": title, **options, "parameters": parameters}), base
+    base = _base(scene)
+    path = pathlib.Path(scene)
+    name = str(path.resolve() if path.is_file() else scene)
+    title = f"{base.given.get('title', path.stem)}, sweep"[:200]
+    return Study(**{"scene": name, "title": title, **options, "parameters": parameters}), base
+
+
+def _base(source):
+    """The scene of a file or a name."""
+    path = file_of(source)
+    Scene.load(path)  # says what is wrong with it alone
+    given = {"title": path.stem, **tomllib.loads(path.read_bytes().decode("utf-8-sig"))}
+    return Base(given, path.resolve().parent, path.name)
+
+
+def _reasons(study, cases):
+    skipped = sum(case.given is None for case in cases)
+    return [f"{skipped} of {len(cases)} cases are skipped: {study.skip}"] if skipped else []
+
+
+def _check(study, base, cases):
+    """Refuse what would leave no result: no case, a first case that does not fit together, unknown names."""
+    first = next((case for case in cases if case.given is not None), None)
+    if first is None:
+        raise InputError(f"skip = {shown(study.skip)} leaves no case of {len(cases)}")
+    _, scene = base.scene(first.values)
+    scene.build()
+    for name, text in study.conditions.items():
+        with in_file(f"conditions: {short(name)}:"):
+            Expression(text, [*study.parameters, *(one.name for one in scene.observables)])
+
+
+def _run(found, base, kept, workers, tell):
+    """Run what is missing."""
+    missing = {case.key: case for case in found.cases if case.given is not None and not kept.has(case)}
+    again = Counter(case.key for case in found.cases if case.given is not None)
+    by_key = {}
+    for case in found.cases:
+        by_key.setdefault(case.key, []).append(case)
+    total, left, began = sum(again.values()), sum(again[key] for key in missing), None
+    jobs = (_job(found.study, base, case, workers) for case in missing.values())
+    tell(f"{total - left} of {total} cases", (total - left) / total)
+    start = left
+    with contextlib.closing(through(jobs, workers)) as outcomes:
+        for outcome in outcomes:
+            kept.add(outcome, by_key[outcome.key])
+            left -= len(by_key[outcome.key])
+            now = time.monotonic()
+            if began is None:  # the first case has started workers and may have compiled kernels
+                began, start = now, left
+            rest = left * (now - began) / (start - left) if start > left else None
+            bad = sum(row["status"] != "solved" for row in kept.rows.values())
+            words = f"{total - left} of {total} cases" + (f", {bad} without results" if bad else "")
+            tell(words + (f", {_span(rest)} left" if rest is not None and left else ""), (total - left) / total)
+
+
+def _job(study, base, case, workers):
+    folder = None if base.folder is None else str(base.folder)
+    files = {}
+    if not workers.local:
+        given, scene = base.scene(case.values)
+        for path in files_of(scene.to_dict()):
+            with contextlib.suppress(OSError):
+                files[path] = pathlib.Path(path).read_bytes()
+    told = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case.values.items())
+    return Job(case.key, case.given, folder, f"{base.file} with {told}", study.keep, here(), files)
+
+
+def _span(seconds):
+    """A time in words."""
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def _done(found, kept):
+    ran = sum(case.given is not None for case in found.cases)
+    return f"{sum(case.key in kept.rows for case in found.cases if case.given is not None)} of {ran} cases"
+
+
+class Kept:
+    """Rows that are there, and the folder of the study where there is one.
+
+    Parameters
+    ----------
+    folder : path-like, optional
+        The folder.
+    found : Sweep
+        The study.
+
+    Attributes
+    ----------
+    rows : dict
+        Cells by the key of their case.
+    """
+
+    def __init__(self, folder, found):
+        self.path = None if folder is None else pathlib.Path(folder).absolute()
+        self.found, self.rows, self._aside, self._table = found, {}, [], None
+        if self.path is None:
+            return
+        full = _check_folder(folder)
+        asked = {case.key for case in found.cases}
+        stored = [*case_rows.read(self.path / case_rows.ASIDE), *case_rows.read(self.path / case_rows.NAME)]
+        for row in stored if full else ():
+            if row["case"] in asked and row["status"] != "lost":
+                self.rows[row["case"]] = case_rows.own(row)
+        unasked = {row["case"]: row for row in stored if row["case"] and row["case"] not in asked}
+        self._aside = list(unasked.values())
+        if full and (old := (read_summary(self.path) or {}).get("versions")) != found.versions and self.rows:
+            changed = [
+                f"{name} {new} after {old.get(name)}" for name, new in found.versions.items() if old.get(name) != new
+            ]
+            found.warnings.append(f"rows are also those of {', '.join(changed)}: their last digits may differ")
+
+    def has(self, case):
+        """Whether a case has its row, and what it is to keep besides."""
+        row = self.rows.get(case.key)
+        if row is None:
+            return False
+        if self.path is None or self.found.study.keep == "none" or row["status"] != "solved":
+            return True
+        as_json, whole = kept_files(self.path, case.key)
+        return as_json.is_file() if self.found.study.keep == "json" else (whole / "run.json").is_file()
+
+    def begin(self, scene=None):
+        """Write what stands at the beginning; ``scene`` is one that is in no file."""
+        if self.path is None:
+            return
+        with case_rows.written(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            _tidy(self.path)
+            self.summary()
+            if scene is not None:
+                write_text(self.path / "scene.toml", as_toml(scene.to_dict()))
+            write_text(self.path / "study.toml", _as_toml(self.found.study))
+            if self._aside:
+                case_rows.write(self.path / case_rows.ASIDE, self._aside)
+        rows = [row for case in self.found.cases if case.key in self.rows for row in [self._row(case)]]
+        self._table = case_rows.CaseRows(self.path, rows, columns_of(self.found.study, rows))
+
+    def _row(self, case):
+        return row_of(self.found.study, case, self.rows)
+
+    def add(self, outcome, cases):
+        """Keep what came of a case, its files before its row; ``cases`` are all that have this scene."""
+        if self.path is not None:
+            with case_rows.written(self.path):
+                keep_outcome(self.path, outcome)
+        self.rows[outcome.key] = outcome.cells
+        if self._table is not None:
+            self._table.add(*map(self._row, cases))
+
+    def end(self):
+        """Put rows into their order, and say what they say together."""
+        self.found.gather(self.rows)
+        if self._table is not None:
+            whole = [row for row in self.found.rows if row["status"] != "waiting"]
+            self._table.order(whole)
+            self._table.close()
+
+    def summary(self):
+        """Write ``run.json``."""
+        if self.path is not None:
+            text = json.dumps(self.found.summary(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+            with case_rows.written(self.path):
+                write_text(self.path / "run.json", text)
+
+
+def _check_folder(folder):
+    """Whether a folder holds a study already; refuses one that holds something else or cannot be written."""
+    path = pathlib.Path(folder)
+    if path.is_dir() and (read_summary(path) or {}).get("kind") == "sweep":
+        if is_alive(path):
+            raise InputError(
+                f"folder {short(str(folder))}: a study that is alive writes there: wait for it, or stop it"
+            )
+        return True
+    try:
+        check_folder(folder)
+    except InputError as error:
+        if "is not empty" not in str(error):
+            raise
+        raise InputError(
+            f"folder {short(str(folder))}: is not empty and holds no study: choose another with --out"
+        ) from None
+    return False
+
+
+def _tidy(folder):
+    """Remove what a kill has left beside its place."""
+    for path in [*folder.glob(".refweb-*"), *(folder / "cases").glob(".refweb-*")]:
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _as_toml(study):
+    """A study as TOML: its keys, then its tables, values by path in quotes."""
+    import tomli_w
+
+    given = study.to_dict()
+    if study.folder is not None and (study.folder / study.scene).is_file():
+        given["scene"] = str((study.folder / study.scene).resolve())
+    return tomli_w.dumps(dict(sorted(given.items(), key=lambda item: isinstance(item[1], dict))))

@@ -1,0 +1,246 @@
+"""Who runs cases: processes of this machine, or any `concurrent.futures.Executor`, whose workers may die.
+
+`through` hands jobs out and yields what comes of them, each once. A worker that dies takes with it whatever it was
+doing. What was in its hands is then tried again, one job at a time, so that one that kills its worker is told from
+those that were only near it; it is given up when it has done so `TRIES` times.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+import multiprocessing.connection
+import multiprocessing.context
+import os
+import signal
+import sys
+import threading
+import types
+from collections import Counter, deque
+
+from ..errors import SolverError
+from ..messages import one_line
+from .case import Outcome, solve
+
+TRIES = 3
+"""How often a job may kill its worker."""
+GLANCE = 0.5
+"""Largest time between two looks at what has come [s]."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Variables of the environment that say how many threads a library starts."""
+
+
+def cores():
+    """Number of processors that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on macOS and Windows
+        return os.cpu_count() or 1
+
+
+def _watch():
+    """End with the process that started this one, however that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if (parent := multiprocessing.parent_process()) is not None:
+
+        def wait():
+            multiprocessing.connection.wait([parent.sentinel])
+            os._exit(1)
+
+        threading.Thread(target=wait, daemon=True).start()
+
+
+class _Process(multiprocessing.context.SpawnProcess):
+    """A process that does not import the user's script anew: it needs nothing of it, and the script no guard."""
+
+    @staticmethod
+    def _Popen(process_obj):
+        own = sys.modules["__main__"]
+        sys.modules["__main__"] = types.ModuleType("__main__")
+        try:
+            return multiprocessing.context.SpawnProcess._Popen(process_obj)
+        finally:
+            sys.modules["__main__"] = own
+
+
+class _Context(multiprocessing.context.SpawnContext):
+    Process = _Process
+
+
+@contextlib.contextmanager
+def _apart():
+    """Processes started inside use one thread each, and Ctrl-C is not theirs."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    masked = hasattr(signal, "pthread_sigmask") and signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None) if value is None else os.environ.update({name: value})
+        if masked is not False:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
+
+
+class Processes:
+    """Processes of this machine, one thread each."""
+
+    local = True
+
+    def __init__(self, count=None):
+        self.parallel = count or cores()
+        self._pool = None
+
+    def submit(self, job):
+        """Hand out a job; a `concurrent.futures.Future`."""
+        with _apart():
+            if self._pool is None:
+                self._pool = concurrent.futures.ProcessPoolExecutor(self.parallel, _Context(), _watch)
+            try:
+                return self._pool.submit(solve, job)
+            except concurrent.futures.BrokenExecutor as error:  # a worker has died since
+                future = concurrent.futures.Future()
+                future.set_exception(error)
+                return future
+
+    def renew(self):
+        """Begin anew after a worker has died."""
+        self.stop()
+
+    def stop(self):
+        """End all of them at once."""
+        if self._pool is not None:
+            for process in list((getattr(self._pool, "_processes", None) or {}).values()):
+                process.kill()
+            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool = None
+
+
+class Given:
+    """An executor that somebody else has made, and ends."""
+
+    local = False
+
+    def __init__(self, executor, parallel=None):
+        self._executor = executor
+        self.parallel = parallel or getattr(executor, "_max_workers", None) or cores()
+        self._futures = set()
+
+    def submit(self, job):
+        """Hand out a job; a `concurrent.futures.Future`."""
+        try:
+            future = self._executor.submit(solve, job)
+        except Exception as error:
+            name = type(self._executor).__name__
+            raise SolverError(
+                f"the executor, {name}, takes no more cases: {one_line(error)}; the study goes on with what is missing "
+                "when it is started again"
+            ) from None
+        self._futures.add(future)
+        future.add_done_callback(self._futures.discard)
+        return future
+
+    def renew(self):
+        """Nothing: whoever made it renews it."""
+
+    def stop(self):
+        """Take back what has not begun."""
+        for future in list(self._futures):
+            future.cancel()
+
+
+@contextlib.contextmanager
+def cluster(address):
+    """The workers of a Dask cluster that is there, by the address of its scheduler, tcp://HOST:PORT.
+
+    Yields
+    ------
+    Given
+    """
+    from ..errors import InputError
+
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            '--scheduler needs distributed, which is not installed: pip install "refweb[cluster]"'
+        ) from None
+    try:
+        client = Client(address, timeout="10s", set_as_default=False)
+    except Exception as error:
+        raise InputError(f"--scheduler {address}: no scheduler answers there: {one_line(error)}") from None
+    try:
+        workers = Given(client.get_executor(pure=False), sum(client.nthreads().values()))
+        yield workers
+    finally:
+        client.close()
+
+
+def through(jobs, workers):
+    """What comes of jobs, each once, as it comes.
+
+    Parameters
+    ----------
+    jobs : iterable of Job
+        What is to be run.
+    workers : Processes or Given
+        Who runs it; told to stop in the end, also where that comes early.
+
+    Yields
+    ------
+    Outcome
+    """
+    ahead, suspects, tried = deque(jobs), deque(), Counter()
+    running, refused = {}, None
+    try:
+        while running or not refused and (ahead or suspects):
+            try:
+                while suspects and not running:
+                    _hand_out(suspects, running, workers, alone=True)
+                while ahead and not suspects and len(running) <= workers.parallel and not _any_alone(running):
+                    _hand_out(ahead, running, workers)
+            except SolverError as error:  # what is running may end all the same
+                refused = error
+                ahead.clear()
+                suspects.clear()
+            done, _ = concurrent.futures.wait(running, GLANCE, concurrent.futures.FIRST_COMPLETED)
+            broken = [f for f in done if f.cancelled() or f.exception() is not None]
+            for future in done - set(broken):
+                del running[future]
+                yield future.result()
+            if broken:
+                yield from _again(broken, running, workers, suspects, tried)
+        if refused is not None:
+            raise refused
+    finally:
+        workers.stop()
+
+
+def _any_alone(running):
+    return any(alone for _, alone in running.values())
+
+
+def _hand_out(jobs, running, workers, alone=False):
+    running[workers.submit(jobs[0])] = (jobs[0], alone)
+    jobs.popleft()
+
+
+def _again(broken, running, workers, suspects, tried):
+    """Put what has died aside for another try; yields what is given up, and what had ended all the same."""
+    if workers.local:  # with one process all die
+        workers.renew()
+        broken = list(running)
+    for future in broken:
+        job, alone = running.pop(future)
+        if future.done() and not future.cancelled() and future.exception() is None:
+            yield future.result()
+            continue
+        error = None if future.cancelled() or not future.done() else future.exception()
+        tried[job.key] += alone or not workers.local
+        if tried[job.key] < TRIES:
+            suspects.append(job)
+        else:
+            why = type(error).__name__ + (f": {one_line(error)}" if str(error) else "") if error else "cancelled"
+            text = f"its worker died {TRIES} times ({why[:200]}); the study tries again when it is started again"
+            yield Outcome(job.key, {"status": "lost", "message": text})

@@ -1,0 +1,128 @@
+"""Conditions: true, false or left open by intervals as they are of all values inside; read safely."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import refweb
+from refweb.sweeps.expressions import FUNCTIONS, Expression, Interval
+
+NAMES = ("a", "b", "c")
+NUMBERS = st.floats(-4.0, 4.0, allow_nan=False).map(lambda x: round(x, 2))
+TERMS = st.recursive(
+    st.one_of(st.sampled_from(NAMES), NUMBERS.map(lambda x: f"({x!r})")),
+    lambda t: st.one_of(
+        st.tuples(t, st.sampled_from("+-*/"), t).map(lambda p: f"({p[0]} {p[1]} {p[2]})"),
+        st.tuples(t, st.sampled_from(["2", "3"])).map(lambda p: f"({p[0]}) ** {p[1]}"),
+        t.map(lambda x: f"abs({x})"),
+        st.tuples(st.sampled_from(["min", "max"]), t, t).map(lambda p: f"{p[0]}({p[1]}, {p[2]})"),
+    ),
+    max_leaves=4,
+)
+COMPARED = st.tuples(TERMS, st.sampled_from(["<", "<=", ">", ">="]), TERMS).map(" ".join)
+CONDITIONS = st.recursive(
+    COMPARED,
+    lambda c: st.one_of(
+        st.tuples(c, st.sampled_from(["and", "or"]), c).map(lambda p: f"({p[0]}) {p[1]} ({p[2]})"),
+        c.map(lambda x: f"not ({x})"),
+    ),
+    max_leaves=3,
+)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(CONDITIONS, st.lists(st.tuples(NUMBERS, st.floats(0.0, 1.0)), min_size=3, max_size=3), st.data())
+def test_what_is_decided_holds_of_all_values_inside(text, ends, data):
+    """Against Python's own evaluation at points of the intervals, not quite at their ends, which rounding moves."""
+    values = {name: Interval(low, low + width) for name, (low, width) in zip(NAMES, ends, strict=True)}
+    verdict = Expression(text, NAMES)(values)
+    shares = data.draw(st.lists(st.floats(0.05, 0.95), min_size=3, max_size=3))
+    inside = {
+        name: one.low + share * (one.high - one.low) for (name, one), share in zip(values.items(), shares, strict=True)
+    }
+    try:
+        found = eval(text, {"__builtins__": {}, "abs": abs, "min": min, "max": max}, inside)
+    except ZeroDivisionError:
+        return
+    exact = Expression(text, NAMES)(inside)
+    assert exact in (found, None)
+    if verdict is not None and exact is not None and all(width > 1e-6 for _, width in ends):
+        assert verdict == found
+
+
+POINTS = {"x": 2.0, "y": Interval(1.0, 3.0), "mesh": "square", "body.0.velocity": [0.0, 0.0, 2.5], "body.0.mass": 4}
+SAID = {
+    "x < 3": True,
+    "x > 2 or x >= 2": True,
+    "1 < x < 2": False,
+    "y > 0.5": True,
+    "y > 3.5": False,
+    "y > 2": None,
+    "y > 2 and x > 3": False,
+    "y > 2 or x < 3": True,
+    "not y > 2": None,
+    "y == 2": None,
+    "y != 5": True,
+    "x == 2 and 2 == x": True,
+    'mesh == "square" and mass == 4': True,
+    'mesh != "hexagon"': True,
+    "body.0.velocity[2] > 2 and velocity[0] == 0": True,
+    "sqrt(body.0.mass) == x": True,
+    "1 / (y - 2) < 1000": None,
+    "(y - 2) ** 2 >= 0": True,
+    "y ** -1 <= 1": True,
+    "-y < 0": True,
+    "(y - 2) ** 0.5 > -1": None,
+    "1e300 ** 2 > 1": None,
+    "x * y - y > -5": True,
+}
+
+
+@pytest.mark.parametrize("text", SAID)
+def test_verdicts(text):
+    assert Expression(text, list(POINTS))(POINTS) is SAID[text]
+
+
+def test_what_is_not_a_number_decides_nothing():
+    assert Expression("a < 1", ["a"])({"a": math.nan}) is None
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("__import__('os').system('true') > 0", '"__import__" is not known here'),
+        ("max_stres > 1", 'did you mean "max_stress"?'),
+        ("max_stress", "compares nothing"),
+        ("max_stress + 1", "compares nothing"),
+        ("max_stress >", "is not a condition"),
+        ("max_stress > [1][0]", "alone"),
+        ("(lambda: 1)() > 0", "is not known here"),
+        ("max_stress.real > 0", '"max_stress.real" is not known'),
+        ("max_stress if 1 else 2", "is not known here"),
+        ("max_stress > 1 .__class__", "alone"),
+        ("abs(max_stress, key=1) > 0", "is not known here"),
+        ("max_stress % 2 > 0", "alone"),
+        ("max_stress is 1", "is not known here"),
+        ("0 < " + "-" * 60 + "max_stress", "alone"),
+        ("1 < " * 900 + "max_stress", "at most 2000 characters"),
+        ("f'{max_stress}' == 'a'", "is not"),
+    ],
+)
+def test_refusals(text, message):
+    with pytest.raises(refweb.InputError, match=r"^[^\n]*$") as refused:
+        Expression(text, ["max_stress", "deflection"])
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("text", ["mesh + 1 > 0", "mesh > 1", "velocity > 1", "velocity[3] > 1", "x[0] > 1", "x and y"])
+def test_what_cannot_be_computed(text):
+    with pytest.raises(refweb.InputError, match="cannot be computed|compares"):
+        Expression(text, list(POINTS))(POINTS)
+
+
+def test_a_short_name_of_two_paths_is_none():
+    with pytest.raises(refweb.InputError, match='"mass" is not known here'):
+        Expression("mass > 1", ["body.0.mass", "body.1.mass"])
+    assert sorted(FUNCTIONS) == ["abs", "max", "min", "sqrt"]
