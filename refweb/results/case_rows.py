@@ -17,7 +17,7 @@ import io
 import json
 import os
 import pathlib
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import SolverError
 from ..messages import one_line, short
@@ -130,7 +130,8 @@ class CaseRows:
     """
 
     def __init__(self, folder, rows, columns):
-        self.path, self._file = pathlib.Path(folder) / NAME, None
+        self.path = pathlib.Path(folder) / NAME
+        self._file: Any = None
         self.rows = list(rows)
         self._write(columns)
 

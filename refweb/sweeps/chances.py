@@ -151,7 +151,9 @@ def _share(study, condition, results, cases, sampled):
     that is a draw.
     """
     used = [one for one in results if one.name in condition.used]
-    count = dict.fromkeys(("true", "false", "undecided", "failed", "unproven", "statistical", "by_value"), 0)
+    count: dict[str, int] = dict.fromkeys(
+        ("true", "false", "undecided", "failed", "unproven", "statistical", "by_value"), 0
+    )
     for case, row in cases:
         if row["status"] in UNDONE:
             continue

@@ -16,7 +16,7 @@ import ast
 import math
 import operator
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest, shown
@@ -123,10 +123,10 @@ class Expression:
         known = _with_short(names)
         self.used = set()
 
-        def alias(match):
+        def alias(match) -> str:
             quoted, name = match.groups()
             if quoted or name in ("and", "or", "not", "true", "false", *FUNCTIONS):
-                return {"true": "True", "false": "False"}.get(name, match.group())
+                return {"true": "True", "false": "False"}.get(name) or match.group()
             if name not in known:
                 raise InputError(f"{shown(text)}: {shown(name)} is not known here, {nearest(name, known)}")
             self.used.add(known[name])
@@ -145,7 +145,7 @@ class Expression:
         ):
             raise InputError(f"{shown(text)}: compares nothing: a condition is such as max_stress > 2e8")
 
-    def _check(self, node, depth):
+    def _check(self, node: Any, depth):
         """Refuse what a condition must not hold."""
         good = ast.Compare | ast.BoolOp | ast.UnaryOp | ast.BinOp | ast.Name | ast.Constant | ast.Call | ast.Subscript
         fine = isinstance(node, good)
@@ -162,8 +162,8 @@ class Expression:
         elif isinstance(node, ast.Name):
             fine = node.id in self._aliases
         elif isinstance(node, ast.Subscript):
-            fine = isinstance(node.value, ast.Name) and isinstance(node.slice, ast.Constant)
-            fine = fine and isinstance(node.slice.value, int)
+            at = node.slice
+            fine = isinstance(node.value, ast.Name) and isinstance(at, ast.Constant) and isinstance(at.value, int)
         if not fine or depth > DEEPEST:
             words = f"arithmetic, comparisons, and, or, not, {', '.join(FUNCTIONS)}, numbers, texts and names"
             raise InputError(f"{shown(self.text)}: a condition holds {words} alone")
@@ -201,7 +201,7 @@ class Expression:
             raise TypeError
         return value
 
-    def _value(self, node, values):
+    def _value(self, node: Any, values):
         if isinstance(node, ast.Constant):
             return _read(node.value)
         if isinstance(node, ast.Name):
@@ -210,12 +210,12 @@ class Expression:
             entries = self._value(node.value, values)
             if not isinstance(entries, list):
                 raise TypeError
-            return _read(entries[node.slice.value])
+            return _read(entries[ast.literal_eval(node.slice)])
         if isinstance(node, ast.BinOp):
             left, right = (_number(self._value(one, values)) for one in (node.left, node.right))
             return _SUMS[type(node.op)](left, right)
         if isinstance(node, ast.Call):
-            return FUNCTIONS[node.func.id](*(_number(self._value(one, values)) for one in node.args))
+            return FUNCTIONS[ast.unparse(node.func)](*(_number(self._value(one, values)) for one in node.args))
         if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not):
             inner = _number(self._value(node.operand, values))
             return inner if isinstance(node.op, ast.UAdd) else Interval(-inner.high, -inner.low)

@@ -6,7 +6,7 @@ import math
 import pathlib
 import tomllib
 from dataclasses import field as plain_field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError, in_file, refused_at
@@ -296,11 +296,12 @@ class Study(Table):
         }
 
 
-def _values(one):
+def _values(one: Any):
     """All values of a list or a range."""
     if not isinstance(one, Range):
         return list(one)
-    return [one.at(n / (one.count - 1) if one.count > 1 else 0.0) for n in range(one.count)]
+    count = one.count or 1
+    return [one.at(n / max(count - 1, 1)) for n in range(count)]
 
 
 def _plain(one):

@@ -230,11 +230,11 @@ class Kept:
                 self.rows[row["case"]] = case_rows.own(row)
         unasked = {row["case"]: row for row in stored if row["case"] and row["case"] not in asked}
         self._aside = list(unasked.values())
-        if full and (old := (read_summary(self.path) or {}).get("versions")) != found.versions and self.rows:
-            changed = [
-                f"{name} {new} after {old.get(name)}" for name, new in found.versions.items() if old.get(name) != new
-            ]
-            found.warnings.append(f"rows are also those of {', '.join(changed)}: their last digits may differ")
+        before = (read_summary(self.path) or {}).get("versions", {}) if full and self.rows else found.versions
+        if changed := [f"{k} {v} after {before.get(k)}" for k, v in found.versions.items() if before.get(k) != v]:
+            found.warnings.append(
+                f"some rows are of other versions, {', '.join(changed)}: their last digits may differ"
+            )
 
     def has(self, case):
         """Whether a case has its row, and what it is to keep besides."""

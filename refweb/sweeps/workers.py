@@ -17,6 +17,7 @@ import sys
 import threading
 import types
 from collections import Counter, deque
+from typing import Any
 
 from ..errors import SolverError
 from ..messages import one_line
@@ -167,7 +168,7 @@ def cluster(address):
             '--scheduler needs distributed, which is not installed: pip install "refweb[cluster]"'
         ) from None
     try:
-        client = Client(address, timeout="10s", set_as_default=False)
+        client: Any = Client(address, timeout="10s", set_as_default=False)
     except Exception as error:
         raise InputError(f"--scheduler {address}: no scheduler answers there: {one_line(error)}") from None
     try:
