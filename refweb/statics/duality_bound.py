@@ -12,7 +12,11 @@ Lipschitz with k, so Σ |T t − s*|²/2k ≤ Π − Π* ≤ gap, which bounds e
 
 Of curved elements every quadrature point is such a line, a bar of natural length w L whose vector is w dx/dξ.
 
-The balancing correction of the computed forces runs over taut lines first. It is kept in extended precision, where the
+The balancing correction of the computed forces is what a displacement p makes of them, s += D B p with the vectors B p
+of the lines, where Bᵀ D B p is unbalanced. With the tangent, D = k t⊗t + (T/l)(1 − t⊗t), the correction is the one of
+the least gap to second order, and Newton's method leaves a factorization of that or of one near it. Where this does not
+end at rounding, D = k on taut lines and next to nothing on slack ones, with a factorization of its own, does. Any
+solution proves a bound, the smaller of the two is taken. The correction is kept in extended precision, where the
 platform has it, since what it leaves unbalanced enters the gap multiplied by a displacement.
 """
 
@@ -24,7 +28,13 @@ import numpy as np
 
 from ..effects.elasticity import strains
 from ..net.net import AXIAL_STIFFNESS
+from ..system import conjugate_gradients
 from ..system.factorization import Factor
+
+ROUNDS, MOST, CLOSE = 5, 8, 1e-2
+"""Corrections of forces, iterations of conjugate gradients for each by a tangent near theirs, and what these leave."""
+SHARP = 4.0
+"""Gap over what rounding makes of it at least, up to which nothing is to be gained."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,11 +49,14 @@ class DualityBound:
         Bound on the error of each element's tension [N].
     strain_energy : float
         Bound on the error of the strain energy [J].
+    sharp : bool
+        Whether the gap is at most `SHARP` times what rounding makes of it.
     """
 
     gap: float
     tension: np.ndarray
     strain_energy: float
+    sharp: bool = False
 
 
 def duality_bound(system, equilibrium, factor=None):
@@ -56,21 +69,20 @@ def duality_bound(system, equilibrium, factor=None):
     equilibrium : refweb.statics.equilibrium.Equilibrium
         Its state.
     factor : refweb.system.factorization.Factor, optional
-        Used again where there is one.
+        Used again where there is one; where it holds a tangent, ``held`` is its prestress τ [N].
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     bars = _Bars(net, x)
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
-    force, unbalanced = _balanced(system, bars, outer, factor or Factor(system.pattern))
-
-    size = np.sqrt((force**2).sum(axis=1))
-    reach = 2.0 * np.linalg.norm(x, axis=1).max()
-    own = 0.5 * bars.tension**2 / bars.stiffness + size * bars.length * np.finfo(float).eps
-    rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum()) + np.abs(unbalanced).sum() * reach
-    gap = float(_gaps(bars, force, size).sum() + rounding)
-    strain_energy = float(0.5 * (bars.tension**2 / bars.stiffness).sum())
-    tension = np.sqrt(2.0 * bars.stiffness * gap).reshape(-1, len(net.weights)).max(axis=1)
-    return DualityBound(gap, tension, 2.0 * np.sqrt(strain_energy * gap) + gap)
+    factor, bound = factor or Factor(system.pattern), None
+    balance = _Balance(system, bars, x, outer)
+    if factor.held is not None:
+        bound = balance.bound(*balance.by_tangent(factor))
+    if bound is None or not bound.sharp:
+        other = balance.bound(*balance.by_laplacian(factor))
+        equilibrium.stats["nlu"] = equilibrium.stats.get("nlu", 0) + 1
+        bound = other if bound is None or other.gap < bound.gap else bound
+    return bound
 
 
 class _Bars:
@@ -86,33 +98,95 @@ class _Bars:
         self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]
 
 
-def _balanced(system, bars, outer, factor):
-    """Forces of the bars [N] that balance the outer ones, shape (bars, 3), and what they leave, shape (rows, 3)."""
-    net, of_bars = system.net, system.net.bars
-    weight = bars.stiffness * np.where(bars.tension > 0.0, 1.0, 1e-9)
-    unit = np.einsum("q,qa,qb->qab", net.weights**2, net.gradients, net.gradients)
-    blocks = np.einsum("cq,qab->cab", weight.reshape(-1, len(net.weights)), unit)
-    values = system.assemble_lines(np.kron(blocks, np.eye(3)))
-    values[system.pattern.diagonal] += 1e-14 * bars.stiffness.max()
-    factor.update(values)
-    resultant = -of_bars.T.tocsc().astype(np.longdouble)
+class _Balance:
+    """Forces of the bars that balance the outer ones, and what they prove.
 
-    def unbalanced(force):
-        rest = outer + resultant @ force
-        rest[system.supported] = 0.0
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        As it stands at the load step.
+    bars : _Bars
+        Its bars at the displacement x.
+    x, outer : ndarray, shape (rows, 3)
+        The displacement [m] and the outer forces [N].
+    """
+
+    def __init__(self, system, bars, x, outer):
+        self._system, self._bars, self._outer, self._of_bars = system, bars, outer, system.net.bars
+        self._resultant = -self._of_bars.T.tocsc().astype(np.longdouble)
+        self._force = bars.tension[:, None] * bars.direction
+        self._reach = 2.0 * np.linalg.norm(x, axis=1).max()
+        own = 0.5 * bars.tension**2 / bars.stiffness + bars.tension * bars.length * np.finfo(float).eps
+        self._rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum())
+        # Sums of forces leave at least this of them.
+        self._least = self._rounding + np.finfo(np.longdouble).eps * bars.tension.sum() * self._reach
+
+    def by_laplacian(self, factor):
+        """Solution and weights of the bars' own stiffness in every direction, of slack ones nearly none."""
+        system, bars, net = self._system, self._bars, self._system.net
+        weight = bars.stiffness * np.where(bars.tension > 0.0, 1.0, 1e-9)
+        unit = np.einsum("q,qa,qb->qab", net.weights**2, net.gradients, net.gradients)
+        blocks = np.einsum("cq,qab->cab", weight.reshape(-1, len(net.weights)), unit)
+        values = system.assemble_lines(np.kron(blocks, np.eye(3)))
+        values[system.pattern.diagonal] += 1e-14 * bars.stiffness.max()
+        factor.update(values)
+        return factor.solve, lambda change: weight[:, None] * change
+
+    def by_tangent(self, factor):
+        """Solution and weights of the tangent that a factor holds, or nearly holds."""
+        system, bars = self._system, self._bars
+        across = bars.tension / np.where(bars.length > 0.0, bars.length, 1.0)
+        along = np.where(bars.tension > 0.0, bars.stiffness - across, 0.0)[:, None] * bars.direction
+        across = (across + factor.held / bars.natural)[:, None]
+        down = self._of_bars.T.tocsr()
+
+        def weigh(change):
+            return across * change + along * (change * bars.direction).sum(axis=1)[:, None]
+
+        def times(p):
+            return (down @ weigh(self._of_bars @ self._rows(p))).ravel()[system.free]
+
+        def solve(b):
+            return conjugate_gradients.solve(times, factor.precondition, b, CLOSE, MOST).y
+
+        return solve, weigh
+
+    def bound(self, solve, weigh):
+        """The `DualityBound` by a correction of the forces at hand.
+
+        It is what ``weigh`` makes of the changes of the bars' vectors by displacements that ``solve`` finds from what
+        is unbalanced. Both are approximate; what stays unbalanced enters the gap.
+        """
+        bars = self._bars
+        correction, unbalanced = np.zeros(self._force.shape, dtype=np.longdouble), self._unbalanced(self._force)
+        for _ in range(ROUNDS):
+            p = solve(unbalanced.ravel()[self._system.free].astype(float))
+            if p is None:
+                break
+            correction += weigh(self._of_bars @ self._rows(p))
+            unbalanced = self._unbalanced(self._force + correction)
+            if np.abs(unbalanced).sum() * self._reach <= self._least:
+                break
+        force = self._force + correction
+        size = np.sqrt((force**2).sum(axis=1))
+        rounding = self._rounding + np.abs(unbalanced).sum() * self._reach
+        gap = float(_gaps(bars, force, size).sum() + rounding)
+        strain_energy = float(0.5 * (bars.tension**2 / bars.stiffness).sum())
+        tension = np.sqrt(2.0 * bars.stiffness * gap).reshape(-1, len(self._system.net.weights)).max(axis=1)
+        sharp = bool(gap <= SHARP * self._least)
+        return DualityBound(gap, tension, 2.0 * np.sqrt(strain_energy * gap) + gap, sharp)
+
+    def _rows(self, p):
+        """A displacement of the unknowns as one of the rows, shape (rows, 3)."""
+        y = np.zeros((self._system.rows, 3))
+        y.ravel()[self._system.free] = p
+        return y
+
+    def _unbalanced(self, force):
+        """What forces of the bars leave of the outer ones, shape (rows, 3)."""
+        rest = self._outer + self._resultant @ force
+        rest[self._system.supported] = 0.0
         return rest
-
-    force = (bars.tension[:, None] * bars.direction).astype(np.longdouble)
-    correction = np.zeros_like(force)
-    for _ in range(3):
-        p = factor.solve(unbalanced(force + correction).ravel()[system.free].astype(float))
-        if p is None:  # what stays unbalanced enters the gap
-            break
-        y = np.zeros((system.rows, 3))
-        y.ravel()[system.free] = p
-        correction += weight[:, None] * (of_bars @ y)
-    force = force + correction
-    return force, unbalanced(force)
 
 
 def _gaps(bars, force, size):

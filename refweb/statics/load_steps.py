@@ -44,9 +44,9 @@ def solve(system, load_steps, progress=None):
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
     system = system.at_rest()
-    newton, x = Newton(system, progress, load_steps[0]), np.zeros((system.rows, 3))
-    for k, t in enumerate(load_steps):
-        state = _equilibrium(newton, t, x, warm=k > 0)
+    newton, states = Newton(system, progress, load_steps[0]), []
+    for t in load_steps:
+        state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
         if system.convex:
             from .duality_bound import duality_bound
             from .floating import between_slack_lines
@@ -54,8 +54,19 @@ def solve(system, load_steps, progress=None):
             state.duality_bound = duality_bound(system, state, newton.factor)
             state.floating = between_slack_lines(system, state)
         state.deviations = newton.deviations(state)
-        x = state.x
+        states = [*states[-1:], state]
         yield state
+
+
+def _start(system, t, states):
+    """Displacement that a load step starts from: as built, or ahead of the last equilibria where no line pushes."""
+    if not states:
+        return np.zeros((system.rows, 3))
+    if not system.dead or any((state.tension < 0.0).any() for state in states):
+        return states[-1].x
+    from .predictor import predicted
+
+    return predicted(system, t, states)
 
 
 def _equilibrium(newton, t, x, warm):

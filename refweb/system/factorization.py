@@ -93,6 +93,10 @@ class _Qdldl:
         """Solution of A y = b."""
         return self._solver.solve(b)
 
+    def solve_all(self, b):
+        """Solutions of A y = b, shape (n, k)."""
+        return np.column_stack([self._solver.solve(np.ascontiguousarray(column)) for column in b.T])
+
     def times(self, y):
         """A y."""
         upper = self._matrix
@@ -123,6 +127,10 @@ class _Rslab:
         """Solution of A y = b."""
         return self._factor.solve(b)
 
+    def solve_all(self, b):
+        """Solutions of A y = b, shape (n, k), in half the time that one by one takes."""
+        return self._factor.solve_many(b)
+
     def times(self, y):
         """A y."""
         return self._matrix @ y
@@ -135,19 +143,26 @@ class _Rslab:
 
 
 class Factor:
-    """LDLᵀ of matrices of one `refweb.system.sparsity.Pattern`, by the `Library` of that; the ordering is kept."""
+    """LDLᵀ of matrices of one `refweb.system.sparsity.Pattern`, by the `Library` of that; the ordering is kept.
+
+    Attributes
+    ----------
+    held : object
+        What its caller says of the matrix that it holds; None where nothing is said.
+    """
 
     def __init__(self, pattern):
-        self.pattern = pattern
+        self.pattern, self.held = pattern, None
         self._made = {}
         self._by: Any = None
         self._values = np.zeros(0)
 
-    def update(self, values):
-        """Factorize the symmetric matrix of these values."""
+    def update(self, values, held=None):
+        """Factorize the symmetric matrix of these values, and keep what is said of it."""
         self._values = values
         if not self.pattern.size:
             return
+        self.held = held
         try:
             self._take(self.pattern.library.name)
         except RuntimeError:  # singular, of which qdldl leaves what can be used
@@ -178,6 +193,10 @@ class Factor:
                 if error <= FINE:  # which is no fault of the matrix, then
                     self.pattern.library.fall_back(wrong)
         return y if error <= ROUGH else None
+
+    def precondition(self, b):
+        """Solutions of A y = b as they come, shape (n,) or (n, k), for what looks at the residual itself."""
+        return self._by.solve(b) if b.ndim == 1 else self._by.solve_all(b)
 
     def _refined(self, b):
         """Solution of A y = b, and its residual over the right-hand side."""
@@ -225,11 +244,13 @@ def _not_positive(solver):
 class Lu:
     """LU of matrices of one `refweb.system.sparsity.Pattern`, with what a `Factor` has."""
 
+    held = None
+
     def __init__(self, pattern):
         self.pattern = pattern
         self._solver = None
 
-    def update(self, values):
+    def update(self, values, held=None):
         """Factorize the matrix of these values."""
         from scipy.sparse.linalg import splu
 

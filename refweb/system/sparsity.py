@@ -23,6 +23,12 @@ def _scatter(blocks, slots, values):
                 k += 1
 
 
+def _different(keys):
+    """Different values of keys, increasing; sorting them takes a fifth of what `numpy.unique` takes, which hashes."""
+    keys = np.sort(keys)
+    return keys[np.append(True, keys[1:] != keys[:-1])] if len(keys) else keys
+
+
 class Pattern:
     """CSC pattern of the free components of all cells that couple them.
 
@@ -45,8 +51,6 @@ class Pattern:
         The pattern.
     slots : list of ndarray of int32, shape (cells, (3 arity)²)
         Place of each entry of a cell's block, row by row, in the values; −1 where a component is supported.
-    upper : ndarray of int
-        Places of the upper triangle, diagonal included.
     diagonal : ndarray of int
         Places of the diagonal.
     """
@@ -55,28 +59,63 @@ class Pattern:
         self.size = n = len(free)
         self.library = library
         library.choose(n)
-        number = np.full(3 * rows, -1, dtype=np.int64)
-        number[free] = np.arange(n)
-        keys: list[np.ndarray] = [np.arange(n) * (n + 1)]
-        for family in cells:
-            unknowns = number[(3 * family[:, :, None] + np.arange(3)).reshape(len(family), -1)]
-            i, j = unknowns[:, :, None], unknowns[:, None, :]
-            keys.append(np.where((i >= 0) & (j >= 0), j * n + i, -1).reshape(len(family), -1))
-        entries = np.unique(np.concatenate([k.ravel() for k in keys]))
-        entries = entries[entries >= 0]
-        row, col = entries % n if n else entries, entries // n if n else entries
-        self.indices = row.astype(np.int32)
-        self.indptr = np.searchsorted(col, np.arange(n + 1)).astype(np.int32)
-        self.slots = [np.where(k >= 0, np.searchsorted(entries, k), -1).astype(np.int32) for k in keys[1:]]
-        self.diagonal = np.searchsorted(entries, keys[0])
-        self.upper = np.flatnonzero(row <= col)
-        self._upper_indices = self.indices[self.upper]
-        self._upper_indptr = np.searchsorted(col[self.upper], np.arange(n + 1)).astype(np.int32)
+        number = np.full((rows, 3), -1, dtype=np.int32)
+        number.ravel()[free] = np.arange(n, dtype=np.int32)
+        # By blocks of two rows, of which there are a ninth: column × rows + row, in the order of the columns.
+        keys = [np.arange(rows) * (rows + 1)]
+        keys += [(family[:, None, :].astype(np.int64) * rows + family[:, :, None]).reshape(-1) for family in cells]
+        blocks = _different(np.concatenate(keys))
+        of_cells = [np.searchsorted(blocks, key) for key in keys]
+        coupled = np.zeros(len(blocks), dtype=bool)
+        for block in of_cells[1:]:
+            coupled[block] = True
+        places = self._places(number, blocks // max(rows, 1), blocks % max(rows, 1), coupled)
+        self.slots = []
+        for family, block in zip(cells, of_cells[1:], strict=True):
+            arity = family.shape[1]
+            slots = places[block].reshape(len(family), arity, arity, 3, 3).transpose(0, 1, 4, 2, 3)
+            self.slots.append(np.ascontiguousarray(slots).reshape(len(family), 9 * arity**2))
+        self.diagonal = places[of_cells[0]][:, range(3), range(3)].ravel()[free]
+
+    def _places(self, number, column, row, coupled):
+        """Place of each entry of each block, by column and row of it; −1 of what is no entry. Sets the pattern."""
+        inside = (number[column] >= 0)[:, :, None] & (number[row] >= 0)[:, None, :]
+        inside &= coupled[:, None, None] | np.eye(3, dtype=bool)
+        count = inside.sum(axis=2, dtype=np.int32)
+        first = np.searchsorted(column, np.arange(len(number)))  # each has its diagonal block
+        lengths = np.add.reduceat(count, first, dtype=np.int64)
+        self.indptr = np.append(0, np.cumsum(lengths[number >= 0])).astype(np.int32)
+        # Blocks of a column follow each other: what stands before one in it is what stands before it at all, less that
+        # of the column's first.
+        before = np.cumsum(count, axis=0, dtype=np.int64) - count
+        before -= before[first][column]
+        start = np.where(number >= 0, self.indptr[number], 0)[column] + before
+        places = start[:, :, None] + np.cumsum(inside, axis=2) - 1
+        places = np.where(inside, places, -1).astype(np.int32)
+        self.indices = np.empty(self.indptr[-1], dtype=np.int32)
+        self.indices[places[inside]] = np.broadcast_to(number[row][:, None, :], inside.shape)[inside]
+        return places
+
+    @cached_property
+    def _columns(self):
+        """Column of each entry, shape (entries,)."""
+        return np.repeat(np.arange(self.size, dtype=np.int32), np.diff(self.indptr))
 
     @cached_property
     def lower(self):
         """Places of the lower triangle, diagonal included, shape (entries,)."""
-        return np.flatnonzero(self.indices >= np.repeat(np.arange(self.size), np.diff(self.indptr)))
+        return np.flatnonzero(self.indices >= self._columns)
+
+    @cached_property
+    def upper(self):
+        """Places of the upper triangle, diagonal included, shape (entries,)."""
+        return np.flatnonzero(self.indices <= self._columns)
+
+    @cached_property
+    def _upper_pattern(self):
+        """Row of each entry of the upper triangle, and where its columns start."""
+        starts = np.searchsorted(self._columns[self.upper], np.arange(self.size + 1))
+        return self.indices[self.upper], starts.astype(np.int32)
 
     def assemble(self, blocks):
         """Values of the pattern from one array of blocks (cells, 3 arity, 3 arity) per family."""
@@ -97,5 +136,5 @@ class Pattern:
 
     def upper_matrix(self, values):
         """The upper triangle of values as a `scipy.sparse.csc_matrix`, as an LDLᵀ factorization takes it."""
-        part = (values[self.upper], self._upper_indices, self._upper_indptr)
+        part = (values[self.upper], *self._upper_pattern)
         return scipy.sparse.csc_matrix(part, shape=(self.size, self.size))

@@ -1,0 +1,78 @@
+"""Systems of equations by a factorization at hand, that of a matrix near theirs.
+
+Conjugate gradients on A y = b, with a factorization of M in place of M⁻¹, converge as √κ allows, κ the condition of
+M⁻¹A: between two load steps of a web, whose tensions differ by a factor of two or three, a solution to 1 % takes two or
+three of them. Each costs a ninth (rslab) to a fiftieth (qdldl) of a factorization at 118 803 unknowns. What they do not
+reach in a few iterations a factorization of A itself does at less cost, and where A or M shows a direction without
+stiffness only that tells more: both end the iteration.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Found(NamedTuple):
+    """Solutions of A y = b, shape (n,) or (n, k).
+
+    What is ``left`` of them is √(rᵀM⁻¹r) over that of b, the largest of all k; ``enough`` says whether that is within
+    the tolerance.
+    """
+
+    y: np.ndarray
+    left: float
+    enough: bool
+    iterations: int
+
+
+def solve(times, precondition, b, tolerance, most):
+    """Solutions of A y = b, several side by side, as far as they come.
+
+    Parameters
+    ----------
+    times, precondition : callable
+        A y and M⁻¹r, of arrays of the shape of b; A and M symmetric.
+    b : ndarray, shape (n,) or (n, k)
+        Right-hand sides.
+    tolerance : float
+        What may be left.
+    most : int
+        Largest number of iterations. It ends before where those so far show that they will not do.
+
+    Returns
+    -------
+    Found
+    """
+    y, r, left = np.zeros_like(b), b.copy(), 1.0
+    z = precondition(r)
+    size = first = _dot(r, z)
+    if not (np.isfinite(first).all() and (first >= 0.0).all()):
+        return Found(y, np.inf, False, 0)
+    p, k = z.copy(), 0
+    while k < most and left > tolerance:
+        q = times(p)
+        stiffness = _dot(p, q)
+        if not (stiffness[size > 0.0] > 0.0).all():  # or not a number
+            return Found(y, left, False, k)
+        step, k = _over(size, stiffness), k + 1
+        y += step * p
+        r -= step * q
+        z = precondition(r)
+        last, size = size, _dot(r, z)
+        left = float(np.sqrt(np.abs(_over(size, first)).max(initial=0.0)))
+        if not (size >= 0.0).all() or (k > 1 and left ** (most / k) > tolerance):
+            break
+        p = z + _over(size, last) * p
+    return Found(y, left, left <= tolerance, k)
+
+
+def _dot(one, other):
+    """Products of columns."""
+    return (one * other).sum(axis=0)
+
+
+def _over(one, other):
+    """Ratio, 0 of what is 0 already."""
+    return np.where(other > 0.0, one / np.where(other > 0.0, other, 1.0), 0.0)

@@ -1,0 +1,115 @@
+"""Steps, bounds and deviations by a factorization at hand: as few as is stated, and as good as with one for each.
+
+Truth of the solutions of conjugate gradients are those of numpy; of the statics the same webs with a factorization of
+its own for every step, and the condition that forces which balance prove a bound.
+"""
+
+import numpy as np
+import pytest
+from nets import system
+
+from refweb.effects.load import Load
+from refweb.net.cable import Cable
+from refweb.net.lattices import Window
+from refweb.statics import load_steps, newton
+from refweb.statics.equilibrium import LIMIT
+from refweb.system import conjugate_gradients
+from refweb.system.factorization import Factor
+
+STEPS = (1.0, 2.0, 3.0, 4.0, 5.0)
+MOST = {"square": 12, "triangle": 18, "hexagon": 22}
+"""Factorizations of five load steps from flat with their bounds, where one for each takes 35, 36 and 47."""
+
+
+def web(mesh, prestrain=0.0, law="tension-only"):
+    cable = Cable(law=law, modulus=7e7, area=1e-4, density=200.0, prestrain=prestrain)
+    window = Window(mesh=mesh, rows=30, columns=30, side=0.1).web()
+    return system(window, cable, [Load(node="centre", force=(0.0, 0.0, 1.0))])
+
+
+def series(net_system):
+    return list(load_steps.solve(net_system, STEPS))
+
+
+@pytest.mark.parametrize("mesh", MOST)
+def test_few_factorizations_and_the_same_results(mesh, monkeypatch):
+    """Each equilibrium lies within both bounds of the other, gaps and deviations are of the same size."""
+    updates = []
+    update = Factor.update
+    monkeypatch.setattr(Factor, "update", lambda self, *args: (updates.append(1), update(self, *args))[1])
+    net_system = web(mesh)
+    found = series(net_system)
+    assert len(updates) == sum(f.stats["nlu"] for f in found) <= MOST[mesh]
+    monkeypatch.setattr(newton, "SMALL", np.inf)
+    for one, other in zip(found, series(net_system), strict=True):
+        assert one.stats["residual"] <= LIMIT
+        bounds = one.duality_bound, other.duality_bound
+        assert (np.abs(one.tension - other.tension) <= sum(bound.tension for bound in bounds)).all()
+        energies = [net_system.energy(f.step, f.x) for f in (one, other)]
+        rounding = 1e3 * np.finfo(float).eps * abs(energies[0])
+        assert abs(energies[0] - energies[1]) <= max(bound.gap for bound in bounds) + rounding
+        assert bounds[0].gap <= 5.0 * bounds[1].gap and bounds[0].sharp
+        sizes = [np.abs(f.deviations[1:]).max() for f in (one, other)]
+        assert sizes[0] == pytest.approx(sizes[1], rel=0.1)  # which are solved for to a few hundredths
+        assert np.abs(one.x - other.x).max() <= 10.0 * sizes[1] + np.abs(one.deviations[0]).max()
+
+
+def test_a_factorization_of_another_matrix_is_not_trusted():
+    """What is held belongs to a web of a hundredth of the stiffness: bounds and deviations come out as ever."""
+    net_system = web("square", prestrain=-0.01)
+    one, other = newton.Newton(net_system), newton.Newton(net_system)
+    from refweb.statics.duality_bound import duality_bound
+
+    state = one.solve(1.0, np.zeros((net_system.rows, 3)))
+    expected = duality_bound(net_system, state)
+    values = np.zeros(len(net_system.pattern.indices))
+    values[net_system.pattern.diagonal] = np.geomspace(1.0, 1e6, net_system.pattern.size)
+    other.factor.update(values, 1e-3)
+    bound = duality_bound(net_system, state, other.factor)
+    assert bound.gap <= 2.0 * expected.gap
+    assert other.factor.held is None  # it has made its own
+
+
+@pytest.mark.parametrize("columns", [1, 4])
+def test_conjugate_gradients_solve_within_their_iterations(columns):
+    """M differs from A in three directions, so that four iterations end at rounding."""
+    rng = np.random.default_rng(columns)
+    basis = np.linalg.qr(rng.normal(size=(30, 30)))[0]
+    near = basis * np.geomspace(1.0, 1e4, 30) @ basis.T
+    root = basis[:, :3] * np.sqrt(np.geomspace(1.0, 1e4, 30)[:3])
+    matrix = near + root * (1.0, 0.5, 2.0) @ root.T
+    b = rng.normal(size=(30, columns)).squeeze()
+    found = conjugate_gradients.solve(matrix.__matmul__, lambda r: np.linalg.solve(near, r), b, 1e-9, 30)
+    assert found.enough and found.iterations <= 5
+    expected = np.linalg.solve(matrix, b)
+    assert np.abs(found.y - expected).max() <= 1e-7 * np.abs(expected).max()
+
+
+def test_conjugate_gradients_end_where_there_is_no_stiffness():
+    eye = np.eye(5)
+    down = np.diag([1.0, 1.0, -1.0, 1.0, 1.0])
+    for matrix, near in ((down, eye), (eye, down)):
+        found = conjugate_gradients.solve(matrix.__matmul__, near.__matmul__, np.array([0.1, 0, 1, 0, 0.2]), 1e-9, 6)
+        assert not found.enough
+
+
+def test_hopeless_iterations_end_early():
+    matrix, b = np.diag(np.geomspace(1.0, 1e8, 200)), np.ones(200)
+    found = conjugate_gradients.solve(matrix.__matmul__, np.array, b, 1e-6, 50)
+    assert not found.enough and found.iterations < 10
+
+
+def test_the_next_step_starts_near_its_end():
+    """A flat web: the residual of a start by the law F^(1/3) is a part of that of the last state's."""
+    from refweb.statics.predictor import predicted
+
+    net_system = web("square")
+    states = series(net_system)
+
+    def off(x):
+        return np.abs(x - states[3].x).max()
+
+    for before in (states[2:3], states[1:3]):
+        assert off(predicted(net_system, 4.0, before)) < 0.25 * off(states[2].x)
+    # Through the last two where loads are not 0 at 0, and nowhere where load steps return.
+    assert predicted(net_system, states[1].step, states[1:2]) is states[1].x
