@@ -270,6 +270,10 @@ class Lu:
         """No signs of pivots tell of what is not symmetric."""
         raise NotImplementedError
 
+    def precondition(self, b) -> np.ndarray:
+        """Conjugate gradients are for what is symmetric."""
+        raise NotImplementedError
+
 
 def weak_pivot(solver):
     """Index of the first pivot of a `qdldl.Solver` that is not positive, None if all are."""
