@@ -87,6 +87,10 @@ MIRRORS = {
     "studies/spectrum": "studies/test_modes.py",
     "studies/turning": "studies/test_turning.py",
     "studies/pencil": "studies/test_modes.py",
+    "sweeps/expressions": "sweeps/test_expressions.py",
+    "sweeps/chances": "sweeps/test_chances.py",
+    "sweeps": "sweeps/test_sweep.py sweeps/test_chances.py",
+    "results/case_rows": "sweeps/test_sweep.py",
     "studies": "studies/test_cost.py",
     "reference/paths": "reference/test_paths.py",
     "reference": "reference/test_help.py reference/test_schema.py",
@@ -326,6 +330,10 @@ MUTANTS = [
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
     Mutant("results/state", "self.element_strain <= self.system.net.slackness", "self.element_strain <= 0.0"),
     # Studies and modes
+    Mutant("sweeps/chances", "between + float(np.mean(np.square(within)))", "between"),
+    Mutant("sweeps/expressions", "return True if holds(a.high, b.low)", "return True if holds(a.low, b.low)"),
+    Mutant("sweeps/design", "[:, column] = second[:, column]", "[:, column] = first[:, column]"),
+    Mutant("sweeps/sweep", ' and row["status"] != "lost"', ""),
     Mutant("studies/predictability", "ddof=1)", "ddof=0)"),
     Mutant("studies/predictability", "end is not None and r.time > end]", "end is not None]"),
     Mutant(

@@ -91,7 +91,8 @@ def sweep(
     found.gather(kept.rows)
     if announce is not None:
         announce(found)
-    crew = executor if isinstance(executor, Given) else Given(executor) if executor else Processes(workers)
+    crew = Processes(workers) if executor is None else executor
+    crew = crew if isinstance(crew, Given | Processes) else Given(crew)
     kept.begin(scene if isinstance(scene, Scene) else None)
     try:
         with recorded(found, clock, lambda: _done(found, kept)), followed(progress, "starting workers") as tell:
