@@ -14,3 +14,19 @@ def test_missing_extras_are_told(name, monkeypatch, capsys):
     assert ended.value.code == 2
     assert capsys.readouterr().err == f"python -m validation: needs {name}: python -m pip install -e '.[test]'\n"
     assert validation.main(["--list"]) == 0
+
+
+@pytest.mark.parametrize("ratio, status", [(1.0, 0), (1.51, 1)])
+def test_a_cost_above_its_limit_is_no_success(ratio, status, monkeypatch, capsys):
+    """The status of what measures steps beside C tells, and the loop that was too fast is named."""
+    from validation.cost import explicit
+
+    (scene, limits), kinds = next(iter(explicit.LIMITS.items())), explicit.FLAGS
+    rows = [
+        explicit.Row(scene, 9.0, dict.fromkeys(kinds, 9.0), {"same": 1.0, "lean": ratio}, dict.fromkeys(kinds, 1.0),
+                     dict.fromkeys(kinds, 0.0))
+    ]  # fmt: skip
+    monkeypatch.setattr(explicit, "measure", lambda: rows)
+    assert limits["lean"] == 1.5 and explicit.main() == status
+    told = capsys.readouterr().out
+    assert ("EXCEEDED" in told) == (f"{scene}, lean" in told) == bool(status) and "-O3 -march=native" in told
