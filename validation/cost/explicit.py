@@ -350,7 +350,7 @@ def main():
         print(f"\n{row.scene}: refweb {row.own:.2f} ns per element and step")
         for kind, plain in row.plain.items():
             limit = LIMITS[row.scene][kind]
-            over = row.ratio[kind] > limit
+            over = bool(row.ratio[kind] > limit)
             wrong += [f"{row.scene}, {kind}"] * over
             print(
                 f"  {kind:5} {' '.join(FLAGS[kind]):20}{plain:7.2f} ns, ratio {row.ratio[kind]:.2f}, median "
