@@ -276,14 +276,13 @@ class CentralDifference(Integrator):
         """Take the steps from ``before`` [s] again and name the first number that is not finite."""
         net, planned = self.system.net, int(running.clock[0]["planned"])
         running.clock["time"], total = before, np.zeros(running.work.size + 2)
-        model = self._model._replace(nearby=self._model.nearby.without())  # its lists hold for steps in a row
 
         def after(state, begun, count):
             """The state ``count`` steps behind one that ``begun`` steps have led to."""
             state, running.clock["begun"] = state.copy(), begun
             copy = running._replace(x=state[0], v=state[1], f=state[2], events=course.events[:0])
             changing = self._model.reels.lengths.size > 0
-            take_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, total)
+            take_steps(count, float(course.step), changing, self._scheme, self._model, self._observed, copy, total)
             return state
 
         sound, done, ahead = course.before.copy(), 0, planned

@@ -28,14 +28,12 @@ from .energy_book import (
     own_energy,
 )
 from .events import ended_by, note_events
-from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
+from .extremes import begin_anew, correct_within, look, note_time, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, note_momentum, push_on, set_push
-from .nearby import bits_of, follow_near, reaches, show_near, take_all
 from .step import (
     add_forces,
     give_impulse,
-    give_reaction,
     kick_and_drift,
     last_kick,
     move_supports,
@@ -72,7 +70,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
-        set_reaction(held, f.reshape(-1), reaction)
+        set_reaction(held, f, reaction)
         if model.outside.pushing.size:
             set_push(drifted, x, v, model.outside, families, extra, push)
     book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
@@ -115,17 +113,9 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
         begin_powers(t, x, v, extra, families, model.rubbed.families, running.clock[0].nsteps > 0, running.power)
     if changing:
         reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
-    set_reaction(model.inertia.held, running.f.reshape(-1), reaction)
+    set_reaction(model.inertia.held, running.f, reaction)
     if outside.pushing.size:
         set_push(t, x, v, outside, families, extra, push)
-
-
-@kernel(forceinline=True)
-def change_lengths(t, x, reels, was, lines, length_force, work):
-    """Give what changes its natural lengths at time t, and book the work of that."""
-    note_lengths(reels, was)
-    set_lengths(t, reels, lines)
-    book_lengths(t, x, reels, was, length_force, work)
 
 
 @kernel()
@@ -142,7 +132,6 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
-    plain, scales, known = observed.plain, observed.scales, np.zeros(3)
     signs, followed, sums, touches = observed.signs, observed.followed, observed.sums, np.empty((0, model.rubbed.width))
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
@@ -154,7 +143,6 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
-    nearby, bits = model.nearby, bits_of(flat_v, model, stages > 0)
     inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if moved else 0, 3))
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
@@ -163,19 +151,20 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_state(x, v, f, inverse, inside.before)
         if stages:
             inner_stages(now, h, scheme, model, running, reaction, push, extra)
-        note_motion(driven, mass, x, v, f, before)
+        if moved:
+            note_motion(driven, mass, x, v, f, before)
         kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
         if stages:
             book_potential(-1.0, now - kicks[stages + 1], x, families, work)
         if moved:
             move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            change_lengths(now, x, reels, was, data[0], length_force, work)
-        follow_near(drifts[0], x, bits, before, driven, nearby, families)
+            note_lengths(reels, was)
+            set_lengths(now, reels, data[0])
+            book_lengths(now, x, reels, was, length_force, work)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])
-        show_near(nearby, families)
         if rubbing.size:
             touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
         elif viscous.size:
@@ -184,18 +173,19 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
-        book_motion(driven, mass, x, v, f, before, work)
-        give_reaction(kicks[stages], kicks[stages + 1], held, flat_f, reaction, impulse)
+        if moved:
+            book_motion(driven, mass, x, v, f, before, work)
+        give_impulse(kicks[stages], reaction, impulse)
+        set_reaction(held, f, reaction)
+        give_impulse(kicks[stages + 1], reaction, impulse)
         if pushing:
             push_on(now, kicks[stages], kicks[stages + 1], x, v, model.outside, families, extra, push, pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, inside, where, total, model, observed, running)
-        turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
+        turned, ending = False, begun + step == planned or math.isnan(looked[0])
         note_time(looked, now)
         for i in followed:
-            if not plain_value(i, flat_x, lines, plain, scales, known):
-                known[0] = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
-            value = known[0]
+            value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
             turned = turns_back(i, value, signs[i], values[i], recent, ending) or turned
             if signs[i] * value > signs[i] * values[i]:
                 take_over(i, value, now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
@@ -223,8 +213,6 @@ def steps_until(end, changing, scheme, model, running):
         a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
         push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
-    if not reaches(2.0 * interval * fastest, model.nearby):
-        take_all(model.nearby, model.families)
     return interval / (
         scheme.safety * safe_step(time, end, changing, 2.0 * interval * fastest, fastest, running.x, model)
     )
@@ -305,14 +293,6 @@ def end_of_steps(corners, time, row):
 
 
 @kernel()
-def leave(done, model):
-    """Look at all that may act, as whoever comes next does, and forget how it moved; the rows that are ``done``."""
-    take_all(model.nearby, model.families)
-    model.nearby.skin[0].steps = 0
-    return done
-
-
-@kernel()
 def advance_rows(times, breath, limit, scheme, model, observed, running, history):
     """Advance to each of some times, and write a row of ``history`` there.
 
@@ -335,7 +315,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
             if not begun:
                 clock.since = clock.time
                 if not plan(end, changing, scheme, model, running):
-                    return leave(-1, model)
+                    return -1
             clock.step = total[-1] = (end - clock.time) / clock.planned
             halved = 0.25 * clock.step**2 if model.outside.damped.size else 0.0
             if halved > 0.0 and not begun:
@@ -346,7 +326,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
             clock.nsteps += taken
             clock.begun = begun + taken
             if clock.begun < clock.planned and not stopped:
-                return leave(n, model)
+                return n
             clock.time = end if clock.begun == clock.planned else clock.time + clock.begun * clock.step
             clock.begun = 0
             if halved > 0.0:
@@ -360,10 +340,10 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
                 clock.largest = max(clock.largest, largest)
         energy, stored = write_row(history[n], model, observed, running, total)
         if drifts_away(clock, energy, stored, total[-2], limit):
-            return leave(n, model)
+            return n
         if stopped:
-            return leave(n + 1, model)
-    return leave(times.size, model)
+            return n + 1
+    return times.size
 
 
 @kernel()
