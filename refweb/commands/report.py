@@ -1,5 +1,9 @@
 """One page of a result folder: results, plots, pictures, and the web in space to turn and play."""
 
+import pathlib
+
+from ..errors import InputError
+
 
 def add_arguments(parser):
     """The folder, where the page goes, and how much of the motion is on it."""
@@ -13,9 +17,15 @@ def add_arguments(parser):
 
 def run(arguments):
     """Write it, and print where it is."""
-    from ..pages.page import report
+    from ..pages import page, study
+    from ..results.folder import read_summary
     from ..results.progress import followed
 
+    if (read_summary(pathlib.Path(arguments.folder)) or {}).get("kind") == "sweep":
+        if arguments.frames is not None:
+            raise InputError(f"--frames {arguments.frames} has no meaning for a study, which has none: leave it out")
+        print(study.report(arguments.folder, out=arguments.out))
+        return
     with followed(True, "drawing") as tell:
-        path = report(arguments.folder, out=arguments.out, frames=arguments.frames, progress=tell)
+        path = page.report(arguments.folder, out=arguments.out, frames=arguments.frames, progress=tell)
     print(path)

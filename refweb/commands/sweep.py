@@ -20,6 +20,8 @@ def add_arguments(parser):
 def run(arguments):
     """Print what is run, run what is missing, print what the rows say together."""
 
+    from ..pages.study import report
+    from ..pictures.studies import plot
     from ..results.progress import followed
     from ..scene import slug
     from ..sweeps import study, sweep, workers
@@ -37,7 +39,8 @@ def run(arguments):
             options = {"executor": there, "workers": arguments.workers, "progress": tell}
             found = sweep.sweep(asked, out=out, announce=print_sweep_begins, **options)
     print_sweep(found.summary())
-    print(f"rows in {out / 'results.csv'}")
+    plot(out)
+    print(f"rows in {out / 'results.csv'}, page in {report(out)}")
 
 
 def show(summary):

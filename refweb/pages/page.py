@@ -91,13 +91,18 @@ def page_of(record, frames=None, progress=None, unread=""):
     parts += [sections.simulated(record), drawings.plots(record), drawings.pictures(record)]
     parts += [make(record) for make in (sections.cost, sections.scene, sections.versions)]
     parts = [part for part in parts if part]
+    return filled(record.title, _status(record, unread), parts, "\n".join(map(_read, SCRIPTS)))
+
+
+def filled(title, status, parts, script):
+    """A page as text: its title, how it ended, its sections and its script."""
     contents = [re.match(r'<section id="([^"]*)"><h2>(.*?)</h2>', part) for part in parts]
-    script = "\n" + "\n".join(map(_read, SCRIPTS))
+    script = "\n" + script
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return string.Template(_read("page.html")).substitute(
-        title=html(record.title),
+        title=html(title),
         version=html(__version__),
-        status=_status(record, unread),
+        status=status,
         style=_read("page.css"),
         contents=html([tag("a", Html(found[2]), href=f"#{found[1]}") for found in contents if found]),
         main="\n".join(parts),

@@ -22,7 +22,10 @@ from .frames import Frame, frame_of, listed, number_of, read
 CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}
 """How the time of a frame reads, by kind of run."""
 
-OTHERS = {"cost": "its diagram is cost.png there, by refweb cost"}
+OTHERS = {
+    "cost": "its diagram is cost.png there, by refweb cost",
+    "sweep": "its plots are there already, by refweb sweep, one a result; refweb report writes its page",
+}
 """What is said of folders that hold something else."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..messages import shown
-from .units import readable, with_error
+from .units import readable, scale_of
 from .words import Rows
 
 
@@ -46,28 +46,19 @@ def of_group(of):
 
 
 def rows_of_spread(entry):
-    """A row for each result: its mean with the share of ± and of the samples in it, its spread, its quantiles."""
-    found = entry["results"]
-    if not any("mean" in one for one in found.values()):
-        rows = [
-            [name, *(readable(one[key], None, one["unit"]) for key in ("least", "largest")), _error(one["error"], one)]
-            for name, one in found.items()
-        ]
-        return Rows(["result", "least", "largest", "± at most"], rows, [])
-    quantiles = next(iter(found.values()))["quantiles"]
-    columns = ["result", "mean", "by samples", "spread", *(f"{100.0 * q['q']:g} %" for q in quantiles), "± at most"]
-    rows = []
-    for name, one in found.items():
-        unit = one["unit"]
-        sampled = "" if one["standard_error"] is None else f"± {readable(one['standard_error'], None, unit)}"
-        row = [name, readable(one["mean"], one["mean_error"], unit), sampled, readable(one["deviation"], None, unit)]
-        row += [readable(q["value"], None, unit) for q in one["quantiles"]]
-        rows.append([*row, _error(one["error"], one)])
+    """A row for each result: its mean, the shares of ± and of the samples in that, its spread, its quantiles."""
+    rows, columns = [], []
+    for name, one in entry["results"].items():
+        factor, unit = scale_of(max(abs(one["least"]), abs(one["largest"])), one["unit"])
+        keys = ("mean", "mean_error", "standard_error", "deviation") if "mean" in one else ("least", "largest")
+        values = [one[key] for key in keys] + [q["value"] for q in one.get("quantiles", ())] + [one["error"]]
+        short = ("mean_error", "standard_error")
+        forms = [".2g" if key in short else ".4g" for key in keys] + [".4g"] * len(one.get("quantiles", ())) + [".2g"]
+        told = ["not known" if v is None else f"{v / factor:{form}}" for v, form in zip(values, forms, strict=True)]
+        rows.append([f"{name} [{unit}]" if unit else name, *told])
+        heads = ("mean", "its ±", "by samples ±", "spread") if "mean" in one else keys
+        columns = ["result", *heads, *(f"{100.0 * q['q']:g} %" for q in one.get("quantiles", ())), "± at most"]
     return Rows(columns, rows, [])
-
-
-def _error(error, one):
-    return "not known" if error is None else readable(error, None, one["unit"])
 
 
 def on_spread(entry):
@@ -101,9 +92,7 @@ def rows_of_indices(entry):
     rows = []
     for name, found in (entry.get("indices") or {}).items():
         for path, kinds in found.get("of", {}).items():
-            told = [
-                with_error(one["value"], None) + " ({:.2f} … {:.2f})".format(*one["interval"]) for one in kinds.values()
-            ]
+            told = ["{:.2f} ({:.2f} … {:.2f})".format(one["value"], *one["interval"]) for one in kinds.values()]
             rows.append([name, path, *told])
     return Rows(["result", "parameter", "alone", "with others"], rows, [])
 

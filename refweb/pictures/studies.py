@@ -1,0 +1,175 @@
+"""Plots of a study: each result over what varies, with ± and chances, one figure a result."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..messages import short, shown
+from ..results.case_rows import NAME, read, results_among
+from ..results.folder import read_summary
+from ..results.units import scale_of
+from .plots import write
+from .sheet import DARK, PALE, Ink, Panel, label, legend, sheet
+
+MOST_PANELS = 6
+"""Largest number of parameters that a result is drawn over."""
+MOST_GROUPS = 8
+"""Largest number of groups that are told apart by their ink."""
+
+
+class Rows(NamedTuple):
+    """What is drawn of a study.
+
+    Attributes
+    ----------
+    summary : dict
+        The content of its ``run.json``.
+    rows : list of dict
+        Its rows with a result.
+    columns : list of str
+        Names of columns.
+    """
+
+    summary: dict
+    rows: list
+    columns: list
+
+    @property
+    def results(self):
+        """Its results, each a `refweb.results.case_rows.Named`."""
+        return results_among(self.columns)
+
+    @property
+    def groups(self):
+        """(Words, rows) of each combination of what is no number."""
+        named = [path for path, one in self.summary["study"]["parameters"].items() if _is_named(one)]
+        found = {}
+        for row in self.rows:
+            words = ", ".join(f"{path.rpartition('.')[2]} = {_word(row[path])}" for path in named)
+            found.setdefault(words, []).append(row)
+        return list(found.items())
+
+
+def _is_named(one):
+    """Whether a parameter is a list of several things that are no numbers."""
+    return isinstance(one, list) and len(one) > 1 and not all(isinstance(v, int | float) for v in one)
+
+
+def _word(value):
+    return value if isinstance(value, str) else shown(value)
+
+
+def of_folder(folder):
+    """The `Rows` of the folder of a study; refuses one that holds none."""
+    folder = Path(folder)
+    summary = read_summary(folder)
+    if summary is None or summary.get("kind") != "sweep":
+        raise InputError(f"{short(str(folder))}: holds no study: use refweb sweep")
+    rows = read(folder / NAME)
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    return Rows(summary, [row for row in rows if row["status"] == "solved"], columns)
+
+
+def draw(study, result):
+    """A result of a study over each number that varies, and of samples the share of cases below a value.
+
+    Parameters
+    ----------
+    study : Rows
+        What is drawn.
+    result : refweb.results.case_rows.Named
+        The result.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    column = f"{result.name} [{result.unit}]"
+    values = [row[column] for row in study.rows if row.get(column) is not None]
+    factor, unit = scale_of(max(map(abs, values), default=1.0), result.unit)
+    paths = [path for path, one in study.summary["study"]["parameters"].items() if _is_number(one)]
+    panels = [_over(study, result, column, path, factor, unit) for path in paths[:MOST_PANELS]]
+    if study.summary["study"]["sample"] not in ("grid", "zip") or not panels:
+        panels.append(_shares(study, result, column, factor, unit))
+    left = len(paths) - MOST_PANELS
+    notes = ["Bars: ± of each case."] + ([f"{left} more parameters are not drawn"] if left > 0 else [])
+    return sheet(panels, f"{study.summary['title']}: {result.name}"[:200], notes)
+
+
+def _is_number(one):
+    """Whether a parameter is several numbers."""
+    return isinstance(one, dict) or (len(one) > 1 and all(isinstance(v, int | float) for v in one))
+
+
+def _inked(study):
+    """(Words, rows, `Ink`) of each group, as many as can be told apart."""
+    return [(words, rows, Ink.of(n)) for n, (words, rows) in enumerate(study.groups[:MOST_GROUPS])]
+
+
+def _over(study, result, column, path, factor, unit):
+    """The panel of a result over a parameter."""
+    spread = study.summary["study"]["parameters"][path]
+    ratio = isinstance(spread, dict) and spread.get("spacing") == "log"
+
+    def plot(axes):
+        entries = []
+        for words, rows, ink in _inked(study):
+            there = [row for row in rows if row.get(column) is not None and isinstance(row[path], int | float)]
+            x, y = ([row[name] for row in there] for name in (path, column))
+            error = np.array([row.get(f"{result.name} ±") or 0.0 for row in there]) / factor
+            look = {"color": ink.colour, "markersize": 4.0, "elinewidth": 1.0, "capsize": 2.0}
+            drawn = axes.errorbar(x, np.array(y) / factor, error, fmt=ink.marker, linestyle="none", **look)
+            entries += [(drawn, words)] if words else []
+        if ratio:
+            axes.set_xscale("log")
+        label(axes, result.name, unit)
+        legend(axes, entries, columns=2)
+
+    return Panel(plot, path)
+
+
+def _shares(study, result, column, factor, unit):
+    """The panel of the share of cases below a value; its band is what ± leaves."""
+
+    def plot(axes):
+        for _, rows, ink in _inked(study):
+            there = [row for row in rows if row.get(column) is not None]
+            y = np.array([row[column] for row in there]) / factor
+            error = np.array([row.get(f"{result.name} ±") or 0.0 for row in there]) / factor
+            steps = np.arange(1, len(y) + 1) / max(len(y), 1)
+            axes.step(np.sort(y), steps, where="post", color=ink.colour, linestyle=ink.style)
+            axes.fill_betweenx(steps, np.sort(y - error), np.sort(y + error), color=ink.colour, alpha=0.2, step="pre")
+        for text in study.summary["study"].get("conditions", {}).values():
+            if (at := _limit(text, result.name)) is not None:
+                axes.axvline(at / factor, color=PALE, linestyle=":")
+        axes.set_ylim(0.0, 1.02)
+        axes.set_ylabel("share of cases below", color=DARK)
+
+    return Panel(plot, f"{result.name} [{unit}]" if unit else result.name)
+
+
+def _limit(text, name):
+    """The number that a condition compares a result with, where it does no more."""
+    found = re.fullmatch(rf"\s*{re.escape(name)}\s*[<>]=?\s*([-+\d.eE]+)\s*", text)
+    try:
+        value = float(found[1]) if found else math.nan
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def plot(folder):
+    """Write a plot of each result of a study, ``NAME.png``, into its folder; returns the files."""
+    folder, study = Path(folder), of_folder(folder)
+    written = []
+    for result in study.results if study.rows else []:
+        path = folder / f"{re.sub(r'[^A-Za-z0-9_-]+', '-', result.name)}.png"
+        write(draw(study, result), path)
+        written.append(path)
+    return written
