@@ -56,7 +56,9 @@ MIRRORS = {
     "system/conjugate_gradients": "statics/test_factor_at_hand.py",
     "statics": "statics/test_factor_at_hand.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "test_faults.py dynamics/test_accuracy.py",
-    "dynamics/twin_error": "dynamics/test_one_row.py dynamics/test_events.py dynamics/test_dynamics.py",
+    "dynamics/twin_error": "dynamics/test_by_chance.py dynamics/test_one_row.py "
+    "dynamics/test_events.py dynamics/test_dynamics.py",
+    "dynamics/history": "dynamics/test_by_chance.py dynamics/test_dynamics.py",
     "dynamics/initial_state": "dynamics/test_starts.py",
     "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_dynamics.py",
     "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py",
@@ -276,7 +278,11 @@ MUTANTS = [
     Mutant("dynamics/integrators/tolerances", "near = 1e-3 * length.min()", "near = 1e-1 * length.min()"),
     Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
-    Mutant("dynamics/twin_error", "factor = 1.0 / (1.0 - share)", "factor = 1.0"),
+    Mutant("dynamics/twin_error", "MOST_CHANCE, TELLING = 10.0", "MOST_CHANCE, TELLING = 1.0"),
+    Mutant("dynamics/history", "found[name] = 0.5 * time * float(along)", "found[name] = 0.0"),
+    Mutant(
+        "dynamics/twin_error", "factor = 1.0 / (1.0 - simulation.integrator.error_share(one, other))", "factor = 1.0"
+    ),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
     Mutant("dynamics/history", 'scales["stress"] = 0, 1.0 / net.area', 'scales["stress"] = 0, net.area'),
     Mutant(

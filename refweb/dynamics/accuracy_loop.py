@@ -104,8 +104,7 @@ def run_within_drift(simulation, folder, tell):
     if ended is not None:
         from .twin_error import add_errors
 
-        rows = simulation.compared(folder)
-        add_errors(solution, run, ended, rows, simulation.integrator.error_share(run.course, ended.course))
+        add_errors(simulation, run, ended, simulation.compared(folder))
         if folder is not None:
             folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:

@@ -117,6 +117,10 @@ class Watch:
         self._vectors = len(VECTORS) - all(family.internal for family in system.families)
         self.columns += [f"{name}_{axis} [N s]" for name in VECTORS[: self._vectors] for axis in AXES]
         self._weights = self._weights_of_columns(energies)
+        balance = {"total_energy [J]": 1.0, "dissipated_energy [J]": 1.0, "work [J]": -1.0}
+        first = 1 + len(self._observables)  # an observable may have the name of a column
+        self._booked = [i for i in range(first, len(self.columns)) if self.columns[i] in balance]
+        self._signs = np.array([balance[self.columns[i]] for i in self._booked])
 
     def _add_events(self, events):
         """The scene's events as `Event`; probes of those that no observable tells come behind the others."""
@@ -153,9 +157,14 @@ class Watch:
         """
         return (history.values[:, :, None] * self._weights).sum(axis=1)
 
-    def of_observables(self, table):
-        """Time and observables alone of rows of ``history.csv``."""
-        return table[:, : 1 + len(self._observables)]
+    def compared(self, table):
+        """What a run and its twin are compared by, of rows of ``history.csv``.
+
+        Time, observables in their order, and energy less work [J]: that stays what it is at the start, so that its
+        error is known in either run.
+        """
+        observed = table[:, : 1 + len(self._observables)]
+        return np.column_stack([observed, (table[:, self._booked] * self._signs).sum(axis=1)])
 
     def results(self, course, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
@@ -179,18 +188,35 @@ class Watch:
         extreme = [o for o in self._probed if o.average is not None and o.reduce != "final"]
         return [o.name for o in extreme if np.isinf(values[self._slot(o)])]
 
-    def corrections(self, course, tolerance=0.0):
-        """What extremes exceed the values at steps by, by name of the observable; ± is no less.
+    def corrections(self, course, relative=0.0, absolute=None):
+        """What ± of results is no less than, by name of the observable.
 
-        A method that keeps a relative ``tolerance`` may find an extreme of an instant no better than that: run and twin
-        that agree more closely do so by chance.
+        That is what extremes exceed the values at steps by. A method that keeps a ``relative`` tolerance may find an
+        extreme of an instant no better than that, and one with ``absolute`` tolerances, by unit, a displacement or a
+        velocity: run and twin that agree more closely do so by chance. What a web at rest moves by is such a result.
         """
-        slots = {o.name: self._slot(o) for o in self._observables if o.reduce != "final"}
-        extremes = course.extremes
-        return {
-            name: max(float(extremes.corrections[at]), SPREAD * tolerance * abs(float(extremes.values[at])))
-            for name, at in slots.items()
-        }
+        extremes, absolute = course.extremes, absolute or {}
+        found = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
+        for o in self._observables:
+            if o.reduce != "final":
+                at = self._slot(o)
+                peak = max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
+                found[o.name] = max(found[o.name], peak)
+        return found
+
+    def drifts(self, course, twin, time):
+        """How far bodies whose velocities differ in a run and its twin come apart in half a time [s], by observable.
+
+        Only of places of bodies: nodes swing, and what their velocities differ by is turned around in less time.
+        """
+        rows = {body.name: body.row for body in self.system.net.bodies}
+        placed = {o.name: o for o in self._observables if o.body is not None and o.unit == "m"}
+        found = {}
+        for name, o in placed.items():
+            apart = (course.v - twin.v)[rows[o.body]]
+            along = np.linalg.norm(apart) if o.component is None else abs(apart[o.component])
+            found[name] = 0.5 * time * float(along)
+        return found
 
     def _slot(self, observable):
         """Number of the probe or, behind the probes, of the sum of an observable; None where none is looked at."""

@@ -182,7 +182,7 @@ class Simulation:
             for first, history, compared in blocks(integrator, course, self.schedule, ahead):
                 table = self.watch.table(history)
                 if len(self.schedule.between):
-                    self._compared += self.watch.of_observables(self.watch.table(compared)).tolist()
+                    self._compared += self.watch.compared(self.watch.table(compared)).tolist()
                 self._refuse_overlap(course)
                 last = first + len(table) - 1
                 if folder is None:
@@ -199,15 +199,15 @@ class Simulation:
             raise
         finally:
             self._note(course)
-        tolerance = self.standing.knob if integrator.knob == "rtol" else 0.0
-        corrections = self.watch.corrections(course, tolerance)
+        relative = self.standing.knob if integrator.knob == "rtol" else 0.0
+        corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
         return Ended(self.watch.results(course, self._tables[-1][-1]), corrections, course)
 
     def compared(self, folder):
-        """Rows that are compared with those of a twin: time, then the observables in their order."""
+        """Rows that are compared with those of a twin, see `refweb.dynamics.history.Watch.compared`."""
         if len(self.schedule.between):
             return np.array(self._compared)
-        return self.watch.of_observables(self.rows if folder is None else folder.rows())
+        return self.watch.compared(self.rows if folder is None else folder.rows())
 
     def again(self, folder):
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""

@@ -77,6 +77,8 @@ class StepObserver(Integrator):
     ----------
     unknowns : int
         Number of displacements that are free, and of velocities.
+    tolerances : dict of str to float
+        Absolute ones by unit: what moves by less is the method's own.
     stats : dict
         What has been spent: ``nfev``, ``njev`` and ``nlu``.
 
@@ -118,6 +120,7 @@ class StepObserver(Integrator):
         near, fast = scales(system)
         self.atol_position = rtol * near if atol_position is None else atol_position
         self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
+        self.tolerances = {"m": self.atol_position, "m/s": self.atol_velocity}
         self.stats = dict(nfev=0, njev=0, nlu=0)
         self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
         still = max(fast, self.atol_velocity / rtol)
