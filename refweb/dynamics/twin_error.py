@@ -174,8 +174,8 @@ def with_errors(results, least, twin, own, other, order=2.0, drifts=None, energy
     error is at least what they make of it in half of the last row (``drifts``).
 
     By the twin alone 7 of 7452 results of 207 random impacts are off by more than three times ±, with both of these
-    and ``least`` none; of 1992 results of explicit steps of 83 more impacts, by which nothing was chosen, 5 and 1: the
-    speed of a web that is first touched in the last row, 3.4 times. What else was tried: by energy in all the time to
+    and ``least`` none; of 1992 results of explicit steps of 83 more impacts 5 and 1: the speed of a web that is first
+    touched in the last row, 3.4 times. What else was tried: by energy in all the time to
     the result at once a first touch that agrees is hidden by what comes later (3.05 times ±); the largest ratio of all
     times from the start on has more misses, and a wider ±. A third run of 1.75 times the steps leaves nothing off by
     more than 1.4 times ±, but costs 1.7 times as much; with 1.2 times the steps it costs 1.5 times, and the median of ±
