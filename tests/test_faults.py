@@ -238,6 +238,7 @@ def test_a_repeated_run_goes_on_with_its_accuracy(tmp_path, monkeypatch):
 def test_a_run_that_goes_on_has_no_more_attempts(tmp_path, monkeypatch, pays, attempts, cut_at):
     """A book that never closes ends the run after as many attempts, wherever one of them was interrupted."""
     monkeypatch.setattr(refweb.dynamics.accuracy_loop, "MOST_ATTEMPTS", 5)
+    monkeypatch.setattr(refweb.dynamics.schedule, "MOST_ROWS", 1)  # what is told is counted in blocks, not by the clock
     own, interrupting = central_difference.CentralDifference.advance, []
 
     def advance(self, course, times):

@@ -19,7 +19,8 @@ def _lengths(name, value):
         if value != "distance":
             raise InputError(f'{name} = {shown(value)} must be "distance", one number or one for each line [m]')
         return value
-    if isinstance(value, (list, tuple)) or hasattr(value, "tolist"):
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, (list, tuple)):
         return tuple(checked(f"{name}[{i}]", one, LENGTH) for i, one in enumerate(value))
     return checked(name, value, LENGTH)
 

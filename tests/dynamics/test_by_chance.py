@@ -9,7 +9,7 @@ import refweb
 from refweb.dynamics.history import Watch
 
 
-def snap(gap, end=0.1):
+def snap(gap, end=0.07):
     """1 kg that snaps a slack line of 1 m + gap taut at 1 m/s and is thrown back, by steps of order 6."""
     return refweb.run(
         refweb.Scene(
@@ -30,13 +30,13 @@ def snap(gap, end=0.1):
 def test_energy_tells_of_kinks_that_lie_alike():
     """It flies back as fast as it came, half a period π √(L m/EA) after the line was taut.
 
-    What is off comes of two kinks alone. Wherever they lie in their steps, ± is not passed by more than three times.
+    What is off comes of two kinks alone. Wherever they lie in their steps ± holds; by the twin alone it is passed at
+    some places by a half, where both runs have the kinks alike.
     """
-    for gap in np.linspace(0.02, 0.024, 40):
+    for gap in np.linspace(0.02, 0.024, 100).tolist():
         results, half = snap(gap), np.pi * np.sqrt((1.0 + gap) / 7e3)
-        for name, exact in (("x", gap - (0.1 - gap - half)), ("v", -1.0)):
-            off = abs(results[name].value - exact)
-            assert off <= 3.0 * results[name].error, (gap, name, results[name])
+        for name, exact in (("x", gap - (0.07 - gap - half)), ("v", -1.0)):
+            assert abs(results[name].value - exact) <= results[name].error, (gap, name, results[name])
 
 
 @pytest.mark.parametrize("component, along", [(None, 5.0), (0, 3.0), (2, 4.0)])
@@ -58,7 +58,7 @@ def test_a_web_at_rest_stays_within_tolerances():
     """A prestressed flat web is in equilibrium: what Adams methods make it move by is their own, and ± holds it."""
     solution = refweb.run(
         refweb.Scene(
-            web=refweb.Window(mesh="triangle", rows=3, columns=3, side=0.2),
+            web=refweb.Window(mesh="square", rows=3, columns=3, side=0.2),
             cable=refweb.Cable(law="smooth", smoothing=1e-3, prestrain=2e-3, modulus=7e7, area=1e-4, density=200.0),
             observe=[
                 refweb.Observe(name="far", quantity="displacement", reduce="max"),
