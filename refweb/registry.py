@@ -82,6 +82,7 @@ SHAPES = {
     "ring": "refweb.net.shapes.ring:Ring",
     "box": "refweb.net.shapes.box:Box",
     "cylinder": "refweb.net.shapes.cylinder:Cylinder",
+    "capsule": "refweb.net.shapes.capsule:Capsule",
 }
 """Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
 

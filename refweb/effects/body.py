@@ -34,10 +34,10 @@ class Body(Table):
     ----------
     name : str
         Name in observables and files.
-    shape : {"sphere", "ring", "box", "cylinder"}
+    shape : {"sphere", "ring", "box", "cylinder", "capsule"}
         Its shape, of `refweb.registry.SHAPES`; "sphere" by default.
     radius : float
-        Radius of a sphere, a ring or a cylinder [m], > 0.
+        Radius of a sphere, a ring, a cylinder or a capsule [m], > 0.
     normal : sequence of 3 float
         Normal of a ring.
     size : sequence of 3 float
@@ -45,9 +45,9 @@ class Body(Table):
     axes : list of 2 vectors, optional
         Directions of the first two edges of a box, at right angles; by default x and y.
     length : float
-        Length of a cylinder [m], > 0.
+        Length of a cylinder, or of a capsule between the centres of its ends [m], > 0.
     axis : sequence of 3 float
-        Axis of a cylinder.
+        Axis of a cylinder or a capsule.
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
     mass : float, optional
@@ -68,8 +68,8 @@ class Body(Table):
     InputError
         For a key that the shape lacks or does not have, sizes or a mass that are not > 0, axes that are zero or not at
         right angles, a rounding above half the smallest size, and a name that is no file name; for a free body that has
-        no mass or is a box or a cylinder, a fixed one that moves, and a ring that turns about another axis than its
-        normal; from ``extend``, for a name that is listed twice, and a free body in statics.
+        no mass or is a box, a cylinder or a capsule, a fixed one that moves, and a ring that turns about another axis
+        than its normal; from ``extend``, for a name that is listed twice, and a free body in statics.
 
     Examples
     --------

@@ -2,47 +2,67 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..errors import InputError
 from ..tables import Several, Table, nodes, table, vector
 
 
 @table
 class Velocity(Table):
-    """Initial velocity of each of some nodes; "all" are all nodes that are free.
+    """Initial velocity of some nodes, alike or as they turn about a point; "all" are all nodes that are free.
 
     Parameters
     ----------
     node : int, str or list
         Nodes, by number or name. Of several velocities of one node the last counts: first those of "all".
-    value : sequence of 3 float
+    value : sequence of 3 float, optional
         Velocity [m/s].
+    spin : sequence of 3 float, optional
+        Angular velocity [rad/s] at which they turn about a point, as a rigid body does: ω × (x − about) adds to
+        ``value``.
+    about : sequence of 3 float
+        That point [m].
 
     Raises
     ------
     InputError
-        For a velocity that is not three finite numbers; from ``start``, in statics, for a node that the web does not
-        have, and for one that is named and supported along a component that is not 0.
+        For vectors that are not three finite numbers, and where neither ``value`` nor ``spin`` is given; from
+        ``start``, in statics, for a node that the web does not have, and for one that is named and supported along a
+        component that is not 0.
 
     Examples
     --------
         [[velocity]]
         node = "all"
         value = [0.0, 0.0, 4.0]
+        spin = [0.0, 0.0, 2.0]
     """
 
     several = True
 
     node: Several = nodes()
-    value: Several = vector(unit="m/s")
+    value: Several = vector(default=None, unit="m/s")
+    spin: Several = vector(default=None, unit="rad/s")
+    about: Several = vector(default=(0.0, 0.0, 0.0), unit="m")
+
+    def check(self):
+        """Refuse what gives no velocity."""
+        if self.value is None and self.spin is None:
+            raise InputError("value is missing: a velocity needs value = [...] [m/s], spin = [...] [rad/s], or both")
+        if self.spin is None and any(self.about):
+            raise InputError(f"about = {list(self.about)} has no meaning without spin = [...] [rad/s]")
 
     def start(self, net, supported, v):
         """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""
         if net.quasi_static:
             raise InputError("a velocity cannot be used in statics: leave it out")
+        value, spin = np.array(self.value or (0.0, 0.0, 0.0)), self.spin or (0.0, 0.0, 0.0)
         for node in net.find(self.node):
+            velocity = value + np.cross(spin, net.points[node] - self.about)
             allowed = [axis for axis in range(3) if not supported[node, axis]]
-            stopped = [axis for axis in range(3) if supported[node, axis] and self.value[axis] != 0.0]
+            stopped = [axis for axis in range(3) if supported[node, axis] and velocity[axis] != 0.0]
             if stopped and self.node != "all":
                 axis = "xyz"[stopped[0]]
                 raise InputError(f"node = {node} is supported along {axis}: it cannot have a velocity there")
-            v[node, allowed] = [self.value[axis] for axis in allowed]
+            v[node, allowed] = velocity[allowed]

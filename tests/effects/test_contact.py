@@ -44,6 +44,7 @@ SHAPES = {
     "ring": dict(radius=0.3, normal=(0.0, 0.0, 1.0)),
     "box": dict(size=(0.6, 0.8, 1.0), rounding=0.1),
     "cylinder": dict(radius=0.3, length=0.8, axis=(0.0, 0.0, 1.0), rounding=0.1),
+    "capsule": dict(radius=0.3, length=0.6, axis=(0.0, 0.0, 1.0)),
 }
 
 
@@ -63,6 +64,8 @@ def support(shape, n):
         return np.where(a[..., 2] == 0.0, 0.3, np.inf)
     if shape == "box":
         return a @ [0.2, 0.3, 0.4] + 0.1
+    if shape == "capsule":
+        return 0.3 * a[..., 2] + 0.3
     return 0.2 * np.hypot(a[..., 0], a[..., 1]) + 0.3 * a[..., 2] + 0.1
 
 
@@ -99,7 +102,8 @@ def cloud(shape, count=300):
 
     Behind half of the rounding that is where one face is much nearer than the others, see `refweb.net.grown_core`.
     """
-    core = {"sphere": (0, 0, 0), "ring": (0, 0, 0), "box": (0.2, 0.3, 0.4), "cylinder": (0.2, 0.2, 0.3)}[shape]
+    point, line = (0, 0, 0), (0, 0, 0.3)
+    core = dict(sphere=point, ring=point, box=(0.2, 0.3, 0.4), cylinder=(0.2, 0.2, 0.3), capsule=line)[shape]
     p = np.random.default_rng(1).uniform(-0.8, 0.8, (20 * count, 3))
     l = np.abs(p)  # noqa: E741
     if shape == "cylinder":
@@ -601,7 +605,9 @@ def test_integrators_agree_on_a_hit_with_losses():
 def test_shape_under_a_heavy_cable(shape):
     """A cable that hangs over a fixed body: supports and body carry its weight, and it is hardly inside of the body."""
     web = refweb.SingleCable(start=(-1.0, 0.0, 0.0), end=(1.0, 0.0, 0.0), elements=40, length=2.3)
-    own = dict(ring=dict(normal=(0.0, 1.0, 0.0)), cylinder=dict(axis=(0.0, 1.0, 0.0))).get(shape, {})
+    own = dict(
+        ring=dict(normal=(0.0, 1.0, 0.0)), cylinder=dict(axis=(0.0, 1.0, 0.0)), capsule=dict(axis=(0.0, 1.0, 0.0))
+    ).get(shape, {})
     top = -0.45  # above the cable as it begins
     body = rigid(shape, position=(0.05, 0.0, top - (0.5 if shape == "box" else 0.3)), **own)
     solution = refweb.run(
@@ -621,7 +627,7 @@ def test_shape_under_a_heavy_cable(shape):
     assert found["push"] < -0.1 * weight
     points = solution.positions[:41] - np.array(body.position)
     axes = body.extend(nets.skew_net()).bodies[0].shape.frame()
-    turned = points @ axes.T if shape in ("ring", "cylinder") else points
+    turned = points @ axes.T if shape in ("ring", "cylinder", "capsule") else points
     deep = brute_depth(shape, turned)
     assert deep.max() <= 1.05 * -found["push"] / 1e4
 
@@ -730,7 +736,7 @@ def overlapping(shape, contact, mass, seed):
     web, size = nets.skew_web(), rng.choice([1.0, 0.3, 0.05])
     web = replace(web, points=size * web.points, natural_length=size * web.natural_length)
     where = web.points[4] + min(1.0, 3.0 * size) * rng.uniform(-0.2, 0.2, 3)
-    own = {} if shape in ("box", "cylinder") else dict(mass=mass, fixed=False)
+    own = dict(mass=mass, fixed=False) if shape in ("sphere", "ring") else {}
     body = rigid(shape, position=tuple(where), **own)
     cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1.0)
     system = nets.system(web, cable, [body, contact], False, np.zeros((6, 3), dtype=bool))

@@ -1,0 +1,48 @@
+"""Capsules: a straight line that has grown."""
+
+from __future__ import annotations
+
+from ...tables import Several, real, table, vector
+from ..rigid_body import Grown, Shape, axes_about
+
+
+@table
+class Capsule(Shape):
+    """A cylinder that ends in half spheres of its own radius; its axis is its third direction.
+
+    Parameters
+    ----------
+    radius : float
+        Its radius [m], > 0.
+    length : float
+        Distance of the centres of its half spheres [m], > 0; from end to end it is longer by two radii.
+    axis : sequence of 3 float
+        Its axis.
+
+    Examples
+    --------
+        [[body]]
+        name = "tank"
+        shape = "capsule"
+        radius = 0.2
+        length = 0.6
+        axis = [0.0, 1.0, 0.0]
+        position = [0.0, 0.0, -0.3]
+        fixed = true
+    """
+
+    radius: float = real(above=0, unit="m")
+    length: float = real(above=0, unit="m")
+    axis: Several = vector()
+
+    def check(self):
+        """Refuse an axis that is zero."""
+        self.frame()
+
+    def grown(self):
+        """Its axis, grown by the radius."""
+        return Grown(self.radius, (0.0, 0.0, 0.5 * self.length))
+
+    def frame(self):
+        """Unit vectors of its axes, its own third."""
+        return axes_about("axis", self.axis)
