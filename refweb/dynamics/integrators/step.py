@@ -11,9 +11,12 @@ from ...net.net import LENGTH
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
-SWEEPS = 32
-"""Largest number of sweeps over contacts in a step, which goes on where that before it came to: how contacts that stick
-at one point share their force may take more, and moves nothing but their creep below the slip velocity."""
+SWEEPS = 8
+"""Largest number of sweeps over contacts in a step, which goes on where that before it came to. Where slip is resolved,
+the eighth changes velocities by 1e-10 of the fastest, and by 1e-6 in a first step. Of many contacts that stick to one
+body hundreds of sweeps do not settle which of them bears how much: what is left moves nothing but their creep below the
+slip velocity, and the book closes without. A web of 288 lines that comes to rest on a table takes 0.45 to 0.8 of the
+time of 32 sweeps, for slip velocities from 1e-9 to 1e-2 m/s."""
 SETTLED = 1e-12
 """Change of velocities, over the fastest and over what other forces give, at which sweeps over contacts end."""
 
