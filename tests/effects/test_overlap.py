@@ -94,7 +94,7 @@ SHAPES = {
     "ring": (dict(radius=0.3, normal=(0.0, 0.0, 1.0)), 0.03),
     "box": (dict(size=(0.6, 0.8, 1.0)), 0.06),
     "cylinder": (dict(radius=0.3, length=0.4, axis=(0.0, 0.0, 1.0)), 0.04),
-    "capsule": (dict(radius=0.3, length=0.1, axis=(0.0, 0.0, 1.0)), 0.03),
+    "capsule": (dict(radius=0.3, length=0.1, axis=(0.0, 0.0, 1.0)), 0.06),
 }
 
 
