@@ -122,6 +122,7 @@ def test_no_scheduler_is_one_line(tmp_path, capsys, monkeypatch):
     assert "has no meaning with --scheduler" in capsys.readouterr().err and not (tmp_path / "study").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_of_which_a_worker_is_killed(tmp_path, whole):
     """Separate processes that Dask has started; one dies when three rows are there."""
