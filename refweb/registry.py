@@ -54,6 +54,8 @@ LISTS = {
     "event": "refweb.settings:Event",
 }
 """Those that may stand several times."""
+STUDY = "refweb.sweeps.study:Study"
+"""What a file for ``refweb sweep`` holds."""
 OBSERVABLES = {
     "displacement": "refweb.results.observables.nodal:Displacement",
     "position": "refweb.results.observables.nodal:Position",
@@ -153,7 +155,7 @@ EXPORTS = (
     "refweb.studies.cost:Cost",
     "refweb.sweeps.sweep:sweep",
     "refweb.sweeps.found:Sweep",
-    "refweb.sweeps.study:Study",
+    STUDY,
     "refweb.scene:Scene",
     "refweb.settings:Static",
     "refweb.settings:Dynamic",

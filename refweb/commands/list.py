@@ -1,4 +1,4 @@
-"""List the scenes that are shipped with refweb."""
+"""List the scenes and studies that are shipped with refweb."""
 
 import tomllib
 
@@ -8,10 +8,17 @@ def add_arguments(parser):
 
 
 def run(arguments):
-    """Print name, title and first comment of each."""
+    """Print name, title and first comment of each; of studies, which ``refweb sweep`` runs, behind an empty line."""
     from ..scene import shipped
+    from ..sweeps.study import shipped as studies
 
-    texts = {name: path.read_text(encoding="utf-8") for name, path in shipped().items()}
+    _print(shipped())
+    print("\nFor refweb sweep:")
+    _print(studies())
+
+
+def _print(paths):
+    texts = {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
     titles = {name: tomllib.loads(text).get("title", name) for name, text in texts.items()}
     name_width, title_width = (max(map(len, words)) for words in (titles, titles.values()))
     for name, text in texts.items():

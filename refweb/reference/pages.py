@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest
-from ..registry import EFFECTS, INTEGRATORS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, WEBS, load
+from ..registry import EFFECTS, INTEGRATORS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
 from ..settings import Head
 from .docstrings import example, parameters, prose, refusals, summary
 from .schema import accepted
@@ -26,6 +26,7 @@ SUMMARIES = {
     "solve": f"What is solved, and how: {', '.join(SOLVES)}.",
     "supports": "Supports in place of the web's own.",
     "support": "Supports in addition to others.",
+    "study": "Many runs of one scene: a file of its own, for `refweb sweep`.",
 }
 """What tables are that share a class, or have one for each kind."""
 
@@ -81,9 +82,9 @@ class Page(NamedTuple):
 
 
 def names():
-    """Names of the tables of a scene, in the order of the reference."""
+    """Names of the tables of a scene, in the order of the reference, and of a study."""
     rest = [name for name in (*PARTS, *LISTS) if name not in FIRST]
-    return ["scene", *FIRST, *EFFECTS, "solve", *rest]
+    return ["scene", *FIRST, *EFFECTS, "solve", *rest, "study"]
 
 
 def pages_of(name):
@@ -121,6 +122,8 @@ def header_of(name):
     """How a table stands in a scene file."""
     if name == "scene":
         return "schema, title, seed"
+    if name == "study":
+        return "study"
     several = name in LISTS or (name in EFFECTS and load(EFFECTS[name]).several)
     return f"[[{name}]]" if several else f"[{name}]"
 
@@ -168,6 +171,8 @@ def takes(schema):
         return f"{most} {one}s" if most else f"[{one}, ...]"
     if kind == "object":
         own = schema["additionalProperties"]
+        if own is True:
+            return "{" + ", ".join([*schema["properties"], "..."]) + "}"
         return "tables by name" if "properties" in own else f"{{name = {takes(own)}}}"
     return {"boolean": "true, false", "string": "text"}.get(kind, "value")
 
@@ -196,8 +201,12 @@ def _inner(name, kind):
 
 def _scene(name):
     example = 'schema = 1\ntitle = "Net with a weight"\nseed = 7'
-    rows = [[f"`{header_of(one)}`", line_of(one)] for one in names()[1:]]
+    rows = [[f"`{header_of(one)}`", line_of(one)] for one in names() if one not in ("scene", "study")]
     yield _page("scene", header_of("scene"), Head, example=example, listing=Listing(("table", "what it is"), rows))
+
+
+def _study(name):
+    yield _page(name, header_of(name), load(STUDY), without=["folder"], summary=SUMMARIES[name])
 
 
 def _web(name):
@@ -237,4 +246,4 @@ def _solve(name):
     yield _page("solve.dynamic", '[solve] kind = "dynamic"', load(SOLVES["dynamic"]), **more)
 
 
-_PAGES = {"scene": _scene, "web": _web, "body": _body, "observe": _observe, "solve": _solve}
+_PAGES = {"scene": _scene, "web": _web, "body": _body, "observe": _observe, "solve": _solve, "study": _study}

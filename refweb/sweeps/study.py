@@ -216,6 +216,8 @@ class Study(Table):
     Examples
     --------
         scene = "square-impact"
+        sample = "random"
+        count = 64
         [parameters]
         "body.0.velocity.2" = { distribution = "norm", loc = 1, scale = 0.1 }
         [conditions]

@@ -9,6 +9,7 @@ import refweb
 from refweb.__main__ import main
 from refweb.commands.new import START
 from refweb.scene import SHIPPED_SCENES
+from refweb.sweeps.study import shipped as studies
 
 SHIPPED = {path.stem: path.read_text(encoding="utf-8") for path in sorted(SHIPPED_SCENES.glob("*.toml"))}
 
@@ -20,14 +21,16 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_list_has_a_line_for_each_shipped_scene(capsys):
+def test_list_has_a_line_for_each_shipped_scene_and_study(capsys):
     assert main(["list"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    for line, (name, text) in zip(lines, SHIPPED.items(), strict=True):
+    lines, empty = capsys.readouterr().out.splitlines(), len(SHIPPED)
+    assert lines[empty : empty + 2] == ["", "For refweb sweep:"]
+    texts = SHIPPED | {name: path.read_text(encoding="utf-8") for name, path in studies().items()}
+    for line, (name, text) in zip(lines[:empty] + lines[empty + 2 :], texts.items(), strict=True):
         title = tomllib.loads(text)["title"]
         assert line.split("  ")[0] == name and title in line and len(line) <= 140
         said = line.split(title)[1].strip()
-        assert said == text.splitlines()[0].removeprefix("# ") and re.fullmatch(r"[A-Z].{20,80}\.", said)
+        assert said == text.splitlines()[0].removeprefix("# ") and re.fullmatch(r"[A-Z].{20,100}[.?]", said)
 
 
 def test_new_writes_a_scene_that_passes_the_check(here, capsys):
