@@ -59,9 +59,8 @@ def main(cases):
     print(f"{cases} impacts on the square web, {workers} workers, {whole.wall:.0f} s")
     print(f"  runs              {whole.cases:8.1f} s CPU, {1e3 * whole.cases / cases:.0f} ms each")
     print(f"  start of workers  {start.beside:8.1f} s CPU")
-    print(
-        f"  beside the runs   {beside:8.1f} s CPU, {1e3 * beside / cases:.1f} ms a case, {beside / more:.1%} of the runs"
-    )
+    each = f"{1e3 * beside / cases:.1f} ms a case, {beside / more:.1%} of the runs"
+    print(f"  beside the runs   {beside:8.1f} s CPU, {each}")
     return beside <= LIMIT * more
 
 
