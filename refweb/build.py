@@ -59,7 +59,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
         For whatever does not fit together.
     """
     web = _web(web, folder)
-    _check_memory(len(web.lines), cable, effects, solve, output)
+    _check_memory(len(web.lines), cable, effects, solve)
     _check_history(solve, output, len(observables))
     net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
     supported = _supported(net, supports, support)
@@ -99,13 +99,12 @@ def _check_bare(system):
         raise InputError(f"[web] node {bare[0]}{more} is used by no line and no [[link]]")
 
 
-def _check_memory(lines, cable, effects, solve, output):
+def _check_memory(lines, cable, effects, solve):
     """Refuse what does not fit into memory, before it is made."""
-    steps = len(solve.load_steps) if solve.kind == "static" else 0
     bodies = sum(name_of(EFFECTS, effect) == "body" for effect in effects)
     explicit = solve.method in INTEGRATORS and INTEGRATORS[solve.method].knob == "safety"
-    size = memory.needed(lines * cable.subdivide, cable.order, explicit, bodies, steps // output.frames)
-    more = f", {bodies} bodies" * (bodies > 0) + f" and {steps} load steps" * (steps > 1)
+    size = memory.needed(lines * cable.subdivide, cable.order, explicit, bodies)
+    more = f", {bodies} bodies" * (bodies > 0)
     name = f"[web] {lines} lines with [cable] subdivide = {cable.subdivide}, order = {cable.order}"
     memory.check(size, f"{name}{more}")
 

@@ -11,9 +11,8 @@ import sys
 
 from .errors import InputError
 
-BYTES_EXPLICIT, BYTES_IMPLICIT, BYTES_PER_BODY, BYTES_PER_STATE = 1e3, 6e3, 3e2, 2e2
-"""Bytes for each element of order 1: of explicit methods and of others, for each body that it may touch, and of each
-state that is kept."""
+BYTES_EXPLICIT, BYTES_IMPLICIT, BYTES_PER_BODY = 1e3, 6e3, 3e2
+"""Bytes for each element of order 1: of explicit methods and of others, and for each body that it may touch."""
 BYTES_PER_ROW, NUMBERS_PER_ROW = 24, 24
 """Bytes of a number of a history row, of the run and of its twin and while they are put together; and how many numbers
 a row has besides the observables."""
@@ -44,7 +43,7 @@ def check(needed, what):
         raise InputError(f"{what} need about {needed / 1e9:.3g} GB of memory, {free}")
 
 
-def needed(elements, order, explicit, bodies, states):
+def needed(elements, order, explicit, bodies):
     """Memory for a run [bytes].
 
     Parameters
@@ -55,8 +54,20 @@ def needed(elements, order, explicit, bodies, states):
         Whether no matrices are made.
     bodies : int
         Number of bodies that the web may touch.
-    states : int
-        Number of states that are kept to the end.
     """
     each = BYTES_EXPLICIT if explicit else BYTES_IMPLICIT * (0.5 * (order + 1)) ** 2
-    return elements * (each + BYTES_PER_BODY * bodies + BYTES_PER_STATE * order * states)
+    return elements * (each + BYTES_PER_BODY * bodies)
+
+
+def of_states(count, rows, elements, read):
+    """Memory of states that are kept [bytes].
+
+    Parameters
+    ----------
+    count, rows, elements : int
+        Number of states, and of the rows and elements of each.
+    read : bool
+        Whether results have been read off each, which it then keeps: positions, forces, and of elements tension, stress
+        and strain; else it is displacements and velocities alone.
+    """
+    return count * (48.0 * rows + (48.0 * rows + 40.0 * elements if read else 0.0))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from . import memory
 from .errors import InputError, TooSoft, in_file
 from .messages import short
 from .results.folder import Folder, check_folder, fingerprint, is_alive
@@ -126,6 +127,8 @@ def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
     ``told`` are warnings to begin with; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on.
     """
     system = scene.build()
+    if out is None:
+        _check_frames(scene, system)
     if announce is not None:
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=versions())
@@ -150,7 +153,7 @@ def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
     finally:
         if folder is None or scene.solve.kind == "static":
             solution.table = as_history(solution.columns, simulation.rows)
-        else:
+        if folder is not None:
             solution.path = folder.path.absolute()
         solution.cost["by_effect"] = _cpu_by_effect(system, solution)
         solution.warnings += simulation.remarks()
@@ -158,6 +161,15 @@ def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
             folder.close()
             folder.summary(solution.summary())
     return solution
+
+
+def _check_frames(scene, system):
+    """Refuse frames that do not fit into memory, which has to keep them all where no folder takes them."""
+    solve, every = scene.solve, scene.output.frames
+    static = solve.kind == "static"
+    count = 1 + (len(solve.load_steps) - 1 if static else int(solve.duration / scene.output.interval)) // every
+    size = memory.of_states(count, system.rows, len(system.net.cells), read=static)
+    memory.check(size, f"[output] frames = {every}: {count} frames of a run that writes no result folder")
 
 
 def _refine(scene, solution):

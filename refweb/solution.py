@@ -257,7 +257,7 @@ class Solution(SolutionData):
         from .results.folder import Folder, check_folder, copy
 
         check_folder(folder, force)
-        if self.table is None:
+        if self.path is not None:
             copy(self.path, folder)
             return
         out = Folder(folder, self.scene, self.columns, {**self.summary(), "status": "running"})

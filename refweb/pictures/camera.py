@@ -13,6 +13,8 @@ LEFT, WIDTH, BOTTOM, HEIGHT, LEAST = 0.07, 0.79, 0.07, 0.79, 0.12
 """Of two views that stand one above the other, and the least height of the lower one [share of the page]."""
 BESIDE = (0.02, 0.06, 0.40, 0.82), (0.48, 0.08, 0.37, 0.80)
 """Where two views stand side by side [share of the page]."""
+MANY = 50_000
+"""Points above which a view is fitted to the `outermost` of them."""
 VIEWS = ("oblique", "side", "front", "top")
 """Names of views: in perspective, from two sides along the web, and along its normal."""
 
@@ -93,6 +95,21 @@ class View:
         return x - w, x + w, y - h, y + h
 
 
+def outermost(points):
+    """Those of points [m], shape (n, 3), that lie farthest in one of many directions."""
+    if len(points) <= 300:
+        return points
+    if len(points) > MANY:
+        return outermost(np.concatenate([outermost(points[i : i + MANY]) for i in range(0, len(points), MANY)]))
+    count = 150
+    height = 1 - 2 * (np.arange(count) + 0.5) / count
+    turn = np.pi * (1 + 5**0.5) * np.arange(count)
+    ring = np.sqrt(1 - height**2)
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
+    return points[np.unique((directions.astype("f4") @ points.T.astype("f4")).argmax(axis=1))]
+
+
 def nearby(points, solid, extent):
     """Points of the web and those of bodies, shape (n, 3) [m], that lie within 0.3 of an extent around it."""
     low, high = points.min(axis=0) - 0.3 * extent, points.max(axis=0) + 0.3 * extent
@@ -128,7 +145,8 @@ def choose(origin, points, solid, moved, tree, aspect, named=None):
         Shares of the page.
     """
     extent = np.linalg.norm(np.ptp(points, axis=0))
-    near = nearby(points, solid, extent)
+    outer = points if len(points) <= MANY else outermost(points)
+    near = nearby(outer, solid, extent)
     side = _side(origin)
     if named is not None:
         if isinstance(named, str) and named == "oblique":
@@ -137,7 +155,7 @@ def choose(origin, points, solid, moved, tree, aspect, named=None):
     normal = _plane(np.concatenate([origin, points]), extent)
     if normal is not None and (abs(normal[2]) < 0.9 or tree or moved > 1e-3 * extent):
         return [View.fit(_facing(normal), near, aspect * ALONE[2] / ALONE[3], margin=1.12)], [ALONE]
-    return _pair(_oblique(side), side, near, points, aspect)
+    return _pair(_oblique(side), side, near, outer, aspect)
 
 
 def _named(named, side):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import io
 import re
 import xml.etree.ElementTree as ElementTree
@@ -16,6 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..results.vtu import SHAPE_SIZE
+from ..results.vtu_file import Reader
 
 CELLS = ("line", "line3", "line4")
 POINTS_ALONG_A_CURVE = 9
@@ -178,8 +180,10 @@ def frame_of(number, time, meshes, supported):
     paths, start = (np.concatenate([_curves(x[cells], samples) for _, cells in blocks]) for x in (web.points, origin))
     fields = _fields(web, blocks)
     slack = np.asarray(fields.get("slack", np.zeros(len(paths)))) > 0.5
-    edges = sum(cells.shape[0] * (cells.shape[1] - 1) for _, cells in blocks)
-    tree = edges < len(np.unique(np.concatenate([cells.ravel() for _, cells in blocks])))
+    edges, used = 0, np.zeros(len(web.points), dtype=bool)
+    for _, cells in blocks:
+        edges, used[cells] = edges + cells.shape[0] * (cells.shape[1] - 1), True
+    tree = edges < np.count_nonzero(used)
     bodies = {name: _surface(mesh) for name, mesh in meshes.items() if name != "web"}
     ends = np.concatenate([cells[:, :2] for _, cells in blocks])
     lifted = np.broadcast_to(web.points - origin, web.points.shape)[supported]
@@ -206,6 +210,8 @@ def _amplitude(points, shape):
 
 
 def _mesh(path):
+    with contextlib.suppress(OSError, ValueError):
+        return Reader(path).mesh()
     import meshio
 
     said = io.StringIO()
@@ -236,13 +242,17 @@ def _fields(mesh, blocks):
     """Cell data, and point data as the largest over the nodes of each line; of vectors the magnitude."""
     fields = {name: np.concatenate([_size(data[i]) for i, _ in blocks]) for name, data in mesh.cell_data.items()}
     for name, data in mesh.point_data.items():
-        fields.setdefault(name, np.concatenate([_size(data)[cells].max(axis=1) for _, cells in blocks]))
+        if name not in fields:
+            size = _size(data)
+            fields[name] = np.concatenate([functools.reduce(np.maximum, size[cells].T) for _, cells in blocks])
     return fields
 
 
 def _curves(nodes, samples):
     """Points along elements of any order, shape (elements, samples, 3), whose two end nodes come first."""
     count = nodes.shape[1]
+    if count == samples == 2:
+        return nodes
     where = np.array([0.0, 1.0, *np.arange(1, count - 1) / (count - 1)])
     powers = np.arange(count)
     weights = np.linspace(0, 1, samples)[:, None] ** powers @ np.linalg.inv(where[:, None] ** powers)

@@ -12,6 +12,10 @@ from .render import FINE, Balls, Surface
 
 SUPERSAMPLING = 2
 AMBIENT, DIFFUSE, POWER = 0.45, 0.62, 20.0
+MOST_CORNERS = 1_000_000
+"""Corners of tubes above which lines are drawn as wires: they are then a few pixels wide, and no roundness is seen."""
+MOST_OF_BALLS = 200_000
+"""Corners of all balls together; many are coarser."""
 
 
 def serve():
@@ -69,7 +73,7 @@ class Window:
         """A model in each view, RGB, shape (height, width, 3), uint8."""
         for number, part in enumerate(model):
             if number == len(self._meshes):
-                self._meshes.append(_mesh_of(part, self._sides))
+                self._meshes.append(_mesh_of(part, self._sides, self._pixels))
                 for renderer, _ in self._renderers:
                     renderer.AddActor(self._meshes[-1].actor)
             self._meshes[number].show(part)
@@ -77,6 +81,15 @@ class Window:
             _aim(renderer, view)
         self._window.Render()
         return self._read(bool(model))
+
+    def _pixels(self, place):
+        """Pixels of the window that a metre takes at a place [m], shape (3,): the mean over views."""
+        return SUPERSAMPLING * np.mean(
+            [
+                view.project(place)[2] * height / (2 * view.half[1])
+                for (_, view), (_, height) in zip(self._renderers, self._sizes, strict=True)
+            ]
+        )
 
     def _read(self, filled):
         from PIL import Image
@@ -124,10 +137,12 @@ def _aim(renderer, view):
     renderer.ResetCameraClippingRange()
 
 
-def _mesh_of(part, sides):
+def _mesh_of(part, sides, pixels):
     if isinstance(part, Surface):
         return _SurfaceMesh()
-    return _BallMesh(sides) if isinstance(part, Balls) else _TubeMesh(sides)
+    if isinstance(part, Balls):
+        return _BallMesh(sides)
+    return _WireMesh(pixels) if sides * part.paths[..., 0].size > MOST_CORNERS else _TubeMesh(sides)
 
 
 class _Mesh:
@@ -156,12 +171,16 @@ class _Mesh:
 
     def _faces(self, faces):
         """Triangles or quadrangles, shape (faces, corners)."""
+        self.data.SetPolys(self._cells(faces))
+
+    def _cells(self, corners):
+        """Cells with the same number of corners each, shape (cells, corners)."""
         from vtkmodules.vtkCommonDataModel import vtkCellArray
 
         cells = vtkCellArray()
-        ends = np.arange(0, faces.size + 1, faces.shape[1])
-        cells.SetData(self._array("ends", ends, np.int64), self._array("corners", faces.ravel(), np.int64))
-        self.data.SetPolys(cells)
+        ends = np.arange(0, corners.size + 1, corners.shape[1])
+        cells.SetData(self._array("ends", ends, np.int64), self._array("corners", corners.ravel(), np.int64))
+        return cells
 
     def _array(self, name, values, kind):
         from vtkmodules.util.numpy_support import numpy_to_vtk
@@ -206,6 +225,36 @@ class _TubeMesh(_Mesh):
         return (start[..., None, None] + first).reshape(-1, 4)
 
 
+class _WireMesh(_Mesh):
+    """Lines of one width in pixels, that of a tube of the same radius in the middle of the web.
+
+    A tube takes a hundred times the work of a wire, by OpenGL in software.
+    """
+
+    def __init__(self, pixels):
+        super().__init__(specular=0.0)
+        self.actor.GetProperty().SetDiffuse(0.8 * DIFFUSE)  # half of a tube is turned away from the light
+        self._pixels, self._shape = pixels, None
+
+    def show(self, part):
+        paths = np.asarray(part.paths)
+        self.actor.SetVisibility(bool(len(paths)))
+        if not len(paths):
+            return
+        points = paths.reshape(-1, 3)
+        width = 2 * np.median(part.radius) * self._pixels(points.mean(axis=0))
+        self.actor.GetProperty().SetLineWidth(max(1.0, float(width)))
+        self._points(points)
+        colours = np.round(255 * np.asarray(part.colours)).astype(np.uint8)
+        self.data.GetPointData().SetScalars(
+            self._array("colours", np.repeat(colours, paths.shape[1], axis=0), np.uint8)
+        )
+        if self._shape != paths.shape:
+            self._shape = paths.shape
+            self.data.SetLines(self._cells(np.arange(len(points)).reshape(paths.shape[:2])))
+        self.data.Modified()
+
+
 def _across(paths):
     """Two unit vectors across the lines at each of their points, shape (2, lines, points, 3)."""
     along = np.gradient(paths, axis=1)
@@ -246,7 +295,7 @@ class _BallMesh(_Mesh):
 
     def __init__(self, sides):
         super().__init__(specular=0.15)
-        self._resolution, self._last = 16 if sides >= FINE else 10, None
+        self._finest, self._last = 16 if sides >= FINE else 10, None
 
     def show(self, part):
         from vtkmodules.vtkFiltersCore import vtkGlyph3D
@@ -259,8 +308,9 @@ class _BallMesh(_Mesh):
         self._points(part.centres)
         ball, glyphs = vtkSphereSource(), vtkGlyph3D()
         ball.SetRadius(part.radius)
-        ball.SetThetaResolution(self._resolution)
-        ball.SetPhiResolution(self._resolution)
+        resolution = int(np.clip(np.sqrt(MOST_OF_BALLS / len(part.centres)), 6, self._finest))
+        ball.SetThetaResolution(resolution)
+        ball.SetPhiResolution(resolution)
         glyphs.SetInputData(self.data)
         glyphs.SetSourceConnection(ball.GetOutputPort())
         glyphs.ScalingOff()

@@ -16,7 +16,7 @@ from ..messages import short
 from ..results.folder import TABLES, read_summary
 from ..results.solution import as_history
 from ..results.units import readable
-from .arrays import cell_arrays
+from ..results.vtu_file import cell_arrays
 from .frames import Frame, frame_of, listed, number_of, read
 
 CLOCKS = {"modes": "mode {:g}", "static": "step {:g}", "dynamic": "t = {:.6g} s"}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..results.units import prefixed
-from .camera import choose
+from .camera import MANY, choose, outermost
 from .render import Balls, Surface, Tubes
 
 DARK, PALE, BEFORE, SUPPORT, SLACK = "#333333", "#888888", "#999999", (0.25, 0.25, 0.27), (0.80, 0.80, 0.81)
@@ -20,6 +20,8 @@ TWO = {"taut": (0.11, 0.37, 0.55), "slack": (0.90, 0.62, 0.10)}
 GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
+MOST_UNDEFORMED = 20_000
+"""Undeformed lines that are drawn as lines of matplotlib; more are first looked at, and marked pixel by pixel."""
 
 
 class Look(NamedTuple):
@@ -85,12 +87,16 @@ class Seen(NamedTuple):
         moved = float(np.abs(frame.paths - frame.origin).max())
         slack = bool(frame.slack.any() if field == "slack" else grey.any())
         points = frame.paths.reshape(-1, 3)
+        if len(points) > MANY and frame.paths.shape[1] == 2:  # each node once, not with every line that ends there
+            place = np.zeros(frame.ends.max() + 1, dtype=int)
+            place[frame.ends.ravel()] = np.arange(len(points))
+            points = points[place]
         return cls(points, frame.supports, bodies, frame.origin, moved, frame.tree, slack, least, most)
 
     def spanned(self):
         """The same with only those points that span the others, to two hundredths of their extent."""
-        bodies = {name: _outermost(points) for name, points in self.bodies.items()}
-        return self._replace(points=_outermost(self.points), supports=_outermost(self.supports), bodies=bodies)
+        bodies = {name: outermost(points) for name, points in self.bodies.items()}
+        return self._replace(points=outermost(self.points), supports=outermost(self.supports), bodies=bodies)
 
     def joined(self, other):
         """What both hold."""
@@ -131,7 +137,8 @@ class Stage:
         """The stage that shows what has been seen, on a page of this width/height."""
         solid = np.concatenate([np.zeros((0, 3)), *seen.bodies.values()])
         origin = seen.origin
-        chosen = choose(origin.reshape(-1, 3), seen.points, solid, seen.moved, seen.tree, aspect, look.view)
+        some = origin[:: 1 + len(origin) // MANY].reshape(-1, 3)
+        chosen = choose(some, seen.points, solid, seen.moved, seen.tree, aspect, look.view)
         extent = np.linalg.norm(np.ptp(seen.points, axis=0))
         length = np.median(np.linalg.norm(np.diff(origin, axis=1), axis=2).sum(axis=1))
         thinnest = 0.0018 if len(chosen[0]) == 1 else 0.0008
@@ -175,8 +182,13 @@ class Stage:
             length = _round(-0.1 / axes.get_position().width * view.half[0] * depth)
             _triad(axes, view, view.point(-0.88, -0.72, depth), length)
             return
-        below = 0.5 if self.beneath else 2
-        axes.add_collection(LineCollection(view.project(self.origin)[0], colors=BEFORE, linewidths=0.8, zorder=below))
+        below, origin = 0.5 if self.beneath else 2, _different(view.project(self.origin)[0])
+        if len(origin) <= MOST_UNDEFORMED:
+            axes.add_collection(LineCollection(origin, colors=BEFORE, linewidths=0.8, zorder=below))
+        else:
+            height, width = np.ceil(axes.get_window_extent().size[::-1]).astype(int)
+            drawn = _marked(origin, view.extent, width, height)
+            axes.imshow(drawn, extent=view.extent, aspect="auto", interpolation="none", zorder=below)
         axes.spines[["top", "right"]].set_visible(False)
         axes.tick_params(labelsize=12, colors=DARK)
         axes.set_xlabel(f"{_axis_name(view.axes[0])} [m]", size=13, color=DARK)
@@ -223,6 +235,35 @@ class Stage:
         bar.ax.set_title(name + (f" [{unit}]" if unit else ""), size=15, pad=14, color=DARK)
 
 
+def _different(lines):
+    """Those of lines on a page, shape (lines, points, 2), that lie beside each other, to a few thousandths of it.
+
+    A flat web from its side is a single line, on which a million lie.
+    """
+    if len(lines) <= MOST_UNDEFORMED:
+        return lines
+    low, size = lines.min(axis=(0, 1)), np.ptp(lines, axis=(0, 1)).max()
+    steps = np.floor((lines[:, [0, -1]] - low) / size * (2**12 - 1)).astype(np.int64)
+    order = np.array([2**36, 2**24, 2**12, 1])
+    return lines[np.unique(steps.reshape(-1, 4) @ order, return_index=True)[1]]
+
+
+def _marked(lines, extent, width, height):
+    """An image, RGBA, shape (height, width, 4), of lines on a page, shape (lines, points, 2): the pixels they meet."""
+    from matplotlib.colors import to_rgb
+
+    left, right, bottom, top = extent
+    ends = np.concatenate([np.stack([lines[:, i], lines[:, i + 1]], axis=1) for i in range(lines.shape[1] - 1)])
+    ends = (ends - [left, top]) / [right - left, bottom - top] * [width, height]
+    image = np.zeros((height, width, 4), dtype=np.uint8)
+    longest = np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)
+    for share in np.linspace(0, 1, 2 + int(min(longest.max(), 9 * (width + height)))):
+        at = np.floor(ends[:, 0] + share * (ends[:, 1] - ends[:, 0])).astype(int)
+        column, row = at[((at >= 0) & (at < [width, height])).all(axis=1)].T
+        image[row, column] = 255 * np.array([*to_rgb(BEFORE), 1.0])
+    return image
+
+
 def _cut(name, most=14):
     return name if len(name) <= most else name[: most - 1] + "…"
 
@@ -230,19 +271,6 @@ def _cut(name, most=14):
 def _grey(frame, field):
     """Which lines are drawn as slack, shape (lines,)."""
     return frame.slack & (field in GREY_WHERE_SLACK)
-
-
-def _outermost(points):
-    """Those of points [m], shape (n, 3), that lie farthest in one of many directions."""
-    if len(points) <= 300:
-        return points
-    count = 150
-    height = 1 - 2 * (np.arange(count) + 0.5) / count
-    turn = np.pi * (1 + 5**0.5) * np.arange(count)
-    ring = np.sqrt(1 - height**2)
-    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    directions = np.concatenate([directions, np.eye(3), -np.eye(3)])
-    return points[np.unique((directions.astype("f4") @ points.T.astype("f4")).argmax(axis=1))]
 
 
 def _triad(axes, view, corner, length):

@@ -98,7 +98,7 @@ class SolutionData:
     warnings : list of str
         What a reader of the results has to know.
     table : dict of str to ndarray, optional
-        The history, where it is held in memory.
+        The history, where it is held in memory; of load steps always.
     path : pathlib.Path, optional
         The result folder that a run wrote while it went.
     utilisation : (float, int), optional
@@ -114,7 +114,8 @@ class SolutionData:
     events : list of dict
         Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
     frames : list of (int, refweb.results.state.State)
-        Row numbers and states that stand as VTU in a result folder.
+        Row numbers and states of a run that writes no folder. One that does keeps none: its frames are files, which
+        are read when they are looked at.
     """
 
     scene: Scene

@@ -25,7 +25,8 @@ class Simulation:
     system : refweb.system.system.System
         That of the scene.
     solution : refweb.Solution
-        Its ``steps``, ``state``, ``solver``, ``utilisation`` and ``frames`` grow as load steps are solved.
+        Its ``steps``, ``state``, ``solver``, ``utilisation`` and, without a folder, ``frames`` grow as load steps are
+        solved.
 
     Attributes
     ----------
@@ -37,7 +38,7 @@ class Simulation:
 
     def __init__(self, scene, system, solution):
         self.scene, self.system, self.solution = scene, system, solution
-        self.rows, self._remarks = [], Remarks()
+        self.rows, self._remarks, self._framed = [], Remarks(), -1
         self._passage = _passage_of(scene, system)
         self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
@@ -62,7 +63,7 @@ class Simulation:
                 if (len(self.rows) - 1) % scene.output.frames == 0:
                     self._frame(folder)
         finally:
-            if self.rows and (not solution.frames or solution.frames[-1][0] < len(self.rows) - 1):
+            if self._framed < len(self.rows) - 1:
                 self._frame(folder)
 
     def remarks(self):
@@ -128,9 +129,12 @@ class Simulation:
         }
 
     def _frame(self, folder):
-        self.solution.frames.append((len(self.rows) - 1, self.solution.state))
-        if folder is not None:
-            folder.frame(*self.solution.frames[-1])
+        """Keep the last state, in the folder where there is one."""
+        self._framed = len(self.rows) - 1
+        if folder is None:
+            self.solution.frames.append((self._framed, self.solution.state))
+        else:
+            folder.frame(self._framed, self.solution.state)
 
 
 def _load(system, found):

@@ -161,7 +161,7 @@ def peak(size):
 print(-peak(3) + peak(100))
 """
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    estimate = memory.needed(19_800, 1, False, 0, 1)
+    estimate = memory.needed(19_800, 1, False, 0)
     assert 0.3 * estimate < float(found.stdout) < estimate
 
 

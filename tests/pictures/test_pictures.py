@@ -16,12 +16,12 @@ from refweb.errors import InputError
 from refweb.pictures import film as films
 from refweb.pictures import moving, pictures
 from refweb.pictures import render as drawing
-from refweb.pictures.arrays import cell_arrays
 from refweb.pictures.camera import View, choose
 from refweb.pictures.frames import read
 from refweb.pictures.record import of_folder, of_solution
 from refweb.pictures.stage import SLACK, TWO, Look, Seen, Stage, colour_map, limits_of, scaled_unit
 from refweb.results.units import readable
+from refweb.results.vtu_file import cell_arrays
 
 OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 FACES = np.array([[i, j, k] for i in (0, 1) for j in (2, 3) for k in (4, 5)])

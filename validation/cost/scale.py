@@ -98,7 +98,9 @@ def explicit(mesh, cells, library):
 
 
 def peak():
-    """Largest memory of this process so far [GB]."""
+    """Largest memory of this process so far [GB]; nan on Windows, which does not say."""
+    if sys.platform == "win32":
+        return np.nan
     import resource
 
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1e-9 if sys.platform == "darwin" else 1.024e-6)

@@ -1,0 +1,171 @@
+"""VTU files: arrays compressed by zlib behind a short head of XML, each of which can be read by itself.
+
+The arrays stand as raw bytes at the end of the file (``appended``, encoding ``raw``), in blocks of `BLOCK` bytes that
+VTK decompresses one by one. Of a web of 980 000 lines, 106 MB, the file has 31 MB; base64 within the XML, as meshio
+writes it, 44 MB, in 1.5 times the CPU time and read in 2.5 times. At its own default level zlib takes twice the time of
+`LEVEL`, for 3 % less.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+import zlib
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+BLOCK, LEVEL = 1 << 18, 1
+"""Bytes that are compressed at a time, and how hard zlib tries, 1 to 9."""
+TYPES = {"Float64": "<f8", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1"}
+CELLS = {"line": 3, "line3": 21, "line4": 35, "triangle": 5}
+"""VTK's numbers of cells."""
+LINES = (3, 21, 35)
+HEAD, MARK = "<VTKFile ", b'<AppendedData encoding="raw">_'
+
+
+def write(path, mesh):
+    """Write a mesh of floats.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    mesh : meshio.Mesh
+        Points, cells and their data.
+    """
+    whole = np.int32 if max(len(mesh.points), sum(block.data.size for block in mesh.cells)) < 2**31 else np.int64
+    nodes = [block.data.shape[1] for block in mesh.cells]
+    counts = [len(block.data) for block in mesh.cells]
+    sections = {
+        "Points": {"Points": mesh.points},
+        "Cells": {
+            "connectivity": np.concatenate([block.data.ravel() for block in mesh.cells]).astype(whole),
+            "offsets": np.cumsum(np.repeat(nodes, counts)).astype(whole),
+            "types": np.repeat([CELLS[block.type] for block in mesh.cells], counts).astype(np.uint8),
+        },
+        "PointData": mesh.point_data,
+        "CellData": {name: np.concatenate(values) for name, values in mesh.cell_data.items()},
+    }
+    packed, offset, text = [], 0, []
+    for section, arrays in sections.items():
+        text.append(f"<{section}>")
+        for name, values in arrays.items():
+            kind = values.dtype.str if values.dtype.kind in "iu" else "<f8"
+            kind = next(known for known, code in TYPES.items() if np.dtype(code) == np.dtype(kind))
+            size = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
+            text.append(f'<DataArray type="{kind}" Name={quoteattr(name)}{size} format="appended" offset="{offset}"/>')
+            packed += _packed(np.ascontiguousarray(values, TYPES[kind]))
+            offset = sum(map(len, packed))
+        text.append(f"</{section}>")
+    size = f'NumberOfPoints="{len(mesh.points)}" NumberOfCells="{sum(counts)}"'
+    with open(path, "wb") as file:
+        file.write(
+            f'<?xml version="1.0"?>\n{HEAD}type="UnstructuredGrid" version="0.1" byte_order="LittleEndian" '
+            f'header_type="UInt32" compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n<Piece {size}>\n'.encode()
+        )
+        file.write("\n".join([*text, "</Piece>", "</UnstructuredGrid>", ""]).encode() + MARK)
+        file.writelines(packed)
+        file.write(b"\n</AppendedData>\n</VTKFile>\n")
+
+
+def _packed(values):
+    """An array as VTK has it compressed: number of blocks, their bytes, those of a last short one, sizes; blocks."""
+    data = memoryview(values.reshape(-1)).cast("B") if values.size else b""
+    blocks = [zlib.compress(data[start : start + BLOCK], LEVEL) for start in range(0, len(data), BLOCK)]
+    head = [len(blocks), BLOCK, len(data) % BLOCK, *map(len, blocks)]
+    return [np.array(head, "<u4").tobytes(), *blocks]
+
+
+class Reader:
+    """A file that `write` wrote.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        The file.
+
+    Raises
+    ------
+    ValueError
+        For a file that is otherwise; from `array` and `mesh` also where it is spoilt.
+    OSError
+        Where it cannot be read.
+    """
+
+    def __init__(self, path):
+        with open(path, "rb") as file:
+            start = file.read(1 << 16)
+        end = start.find(MARK)
+        if end < 0 or b'compressor="vtkZLibDataCompressor"' not in start[:end]:
+            raise ValueError("is not what refweb writes")
+        self._path, self._data = path, end + len(MARK)
+        try:
+            root = ElementTree.fromstring(start[:end] + b"</VTKFile>")
+            if root.get("header_type") != "UInt32" or root.get("byte_order") != "LittleEndian":
+                raise ValueError("is not what refweb writes")
+            self._sections = {
+                section.tag: {array.attrib["Name"]: array.attrib for array in section} for section in root[0][0]
+            }
+        except (ElementTree.ParseError, IndexError, KeyError) as error:
+            raise ValueError(str(error)) from None
+
+    def array(self, section, name):
+        """The array of a name in a section such as ``CellData``, shape (n,) or (n, components)."""
+        try:
+            about = self._sections[section][name]
+            with open(self._path, "rb") as file:
+                file.seek(self._data + int(about["offset"]))
+                count, _, _ = np.frombuffer(file.read(12), "<u4")
+                sizes = np.frombuffer(file.read(4 * int(count)), "<u4").tolist()
+                data = b"".join([zlib.decompress(file.read(size)) for size in sizes])
+            values = np.frombuffer(bytearray(data), TYPES[about["type"]])
+            return values.reshape(-1, int(about["NumberOfComponents"])) if "NumberOfComponents" in about else values
+        except (KeyError, zlib.error) as error:
+            raise ValueError(f"{section} {name}: {error}") from None
+
+    def mesh(self):
+        """The whole as a meshio.Mesh."""
+        import meshio
+
+        types, corners = self.array("Cells", "types"), self.array("Cells", "connectivity")
+        ends = np.concatenate([[0], self.array("Cells", "offsets")])
+        cuts = [0, *(np.flatnonzero(np.diff(types)) + 1), len(types)] if len(types) else [0]
+        names, blocks, cells = {number: name for name, number in CELLS.items()}, [], self._all("CellData")
+        for first, last in zip(cuts[:-1], cuts[1:], strict=True):
+            blocks.append(
+                (names[int(types[first])], corners[ends[first] : ends[last]].reshape(last - first, -1)),
+            )
+        cell_data = {
+            name: [values[first:last] for first, last in zip(cuts[:-1], cuts[1:], strict=True)]
+            for name, values in cells.items()
+        }
+        return meshio.Mesh(
+            self.array("Points", "Points"), blocks, point_data=self._all("PointData"), cell_data=cell_data
+        )
+
+    def _all(self, section):
+        return {name: self.array(section, name) for name in self._sections.get(section, {})}
+
+
+def cell_arrays(path, names):
+    """Cell data of one number a line, without the rest of the file.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        A ``.vtu``.
+    names : sequence of str
+
+    Returns
+    -------
+    dict of str to ndarray, shape (lines,), or None
+        None of a file that `write` did not write, that has no such data, or has other cells than lines.
+    """
+    try:
+        file = Reader(path)
+        if not np.isin(file.array("Cells", "types"), LINES).all():
+            return None
+        found = {name: file.array("CellData", name) for name in names}
+    except (OSError, ValueError):
+        return None
+    return found if all(values.ndim == 1 for values in found.values()) else None
