@@ -183,7 +183,7 @@ def frame_of(number, time, meshes, supported):
     edges, used = 0, np.zeros(len(web.points), dtype=bool)
     for _, cells in blocks:
         edges, used[cells] = edges + cells.shape[0] * (cells.shape[1] - 1), True
-    tree = edges < np.count_nonzero(used)
+    tree = bool(edges < np.count_nonzero(used))
     bodies = {name: _surface(mesh) for name, mesh in meshes.items() if name != "web"}
     ends = np.concatenate([cells[:, :2] for _, cells in blocks])
     lifted = np.broadcast_to(web.points - origin, web.points.shape)[supported]

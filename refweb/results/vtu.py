@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from .files import write_atomically
-from .vtu_file import write
 
 POINT_DATA: tuple[str, ...] = ("displacement", "velocity", "reaction", "mass", "support")
 """Names of what is known of nodes; ``support`` is 1 where all components are held, else 0."""
@@ -61,6 +60,8 @@ def body_mesh(body, state):
 
 def write_mesh(path, mesh):
     """Write a mesh as VTU, atomically."""
+    from .vtu_file import write
+
     write_atomically(path, lambda name: write(name, mesh))
 
 

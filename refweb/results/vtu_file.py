@@ -135,13 +135,12 @@ class Reader:
             blocks.append(
                 (names[int(types[first])], corners[ends[first] : ends[last]].reshape(last - first, -1)),
             )
-        cell_data = {
+        cell_data: dict = {
             name: [values[first:last] for first, last in zip(cuts[:-1], cuts[1:], strict=True)]
             for name, values in cells.items()
         }
-        return meshio.Mesh(
-            self.array("Points", "Points"), blocks, point_data=self._all("PointData"), cell_data=cell_data
-        )
+        point_data: dict = self._all("PointData")
+        return meshio.Mesh(self.array("Points", "Points"), blocks, point_data=point_data, cell_data=cell_data)
 
     def _all(self, section):
         return {name: self.array(section, name) for name in self._sections.get(section, {})}
