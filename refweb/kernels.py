@@ -24,6 +24,8 @@ all its digits, which it loses when positions are the unknowns.
                forces change by to f; the largest change of a velocity in a kick [m/s]
 `GIVE`         ``(number, memory, v, touches, begin, end, out)``: notes forces in the ``memory`` of a step, and writes
                the power of each cell to ``out`` [W]
+`NEAR`         ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come nearer
+               by ``skin`` [m] to ``chosen``; their number
 =============  ==========================================================================================
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
@@ -64,6 +66,8 @@ def _array(scalar, dimensions):
 
 VECTOR, MATRIX, INDICES = _array(_f, 1), _array(_f, 2), _array(_i, 2)
 """Types of numbers per cell, of the data and of the cells of a family."""
+INTEGERS = _array(types.int64, 1)
+"""Type of row numbers."""
 _common = (_f, _array(_f, 2), _array(_f, 2))
 FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2))
 ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
@@ -77,6 +81,7 @@ MEET = types.int64(
 SWEEP = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
 KEPT = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
 GIVE = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
+NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 
 def _cache_folder():

@@ -87,6 +87,9 @@ class Family:
         −∂f/∂v by cell; None where the force does not depend on velocity.
     damping_bound : kernel, optional
         Bound on the row sums of |−∂f/∂v|; None where kicks are solved by ``rubbing``.
+    near : kernel, optional
+        Finds the cells that may act soon, for an explicit method: the others add nothing and show 0; None where all
+        are looked at.
     rubbing : Rubbing, optional
         How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
     internal : bool
@@ -120,6 +123,7 @@ class Family:
     angular_velocity: tuple | None = None
     damping: Callable | None = None
     damping_bound: Callable | None = None
+    near: Callable | None = None
     rubbing: Rubbing | None = None
     internal: bool = False
     impulse: Callable | None = None

@@ -16,10 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from ..kernels import MATRIX, kernel
+from ..kernels import INTEGERS, MATRIX, kernel
 
-INTEGERS = types.Array(types.int64, 1, "C")
-"""Type of a probe's rows."""
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
 MAGNITUDE = 3
 """Component number of a magnitude."""
@@ -89,9 +87,67 @@ def largest_of(a, data, rows, where):
         where[0] = -1
         for n in range(data.shape[0]):
             r = first + n if first >= 0 else rows[3 + n]
-            if where[0] < 0 and _value(a, data, r, n, component) >= best - 1e-15 * abs(best):
+            if _value(a, data, r, n, component) >= best - 1e-15 * abs(best):
                 where[0] = r
+                break
     return math.sqrt(best) if component == MAGNITUDE else best
+
+
+NODES, LINES = 1, 2
+"""Kinds of what `plain_of` tells: the largest magnitude of displacements, the largest of a column over elements."""
+
+
+@kernel(forceinline=True)
+def largest_in(lines, column, first, last):
+    """Largest of a column over the elements from ``first`` to ``last`` − 1: four maxima at once."""
+    a = b = c = d = -math.inf
+    k, whole = np.uint64(column), (last - first) // 4 * 4
+    for n in range(first, first + whole, 4):
+        m = np.uint64(n)
+        a, b = _larger(a, lines[m, k]), _larger(b, lines[m + np.uint64(1), k])
+        c, d = _larger(c, lines[m + np.uint64(2), k]), _larger(d, lines[m + np.uint64(3), k])
+    for n in range(first + whole, last):
+        a = _larger(a, lines[np.uint64(n), k])
+    return _larger(_larger(a, b), _larger(c, d))
+
+
+@kernel(forceinline=True)
+def farthest(x, first, last):
+    """Largest magnitude of x, given in a row, over the rows from ``first`` to ``last`` − 1, four at once."""
+    a = b = c = d = -math.inf
+    whole = (last - first) // 4 * 4
+    for n in range(first, first + whole, 4):
+        q = np.uint64(3 * n)
+        a = _larger(a, _size(x, q))
+        b = _larger(b, _size(x, q + np.uint64(3)))
+        c = _larger(c, _size(x, q + np.uint64(6)))
+        d = _larger(d, _size(x, q + np.uint64(9)))
+    for n in range(first + whole, last):
+        a = _larger(a, _size(x, np.uint64(3 * n)))
+    return math.sqrt(_larger(_larger(a, b), _larger(c, d)))
+
+
+@kernel(forceinline=True)
+def _size(x, q):
+    return x[q] * x[q] + x[q + np.uint64(1)] * x[q + np.uint64(1)] + x[q + np.uint64(2)] * x[q + np.uint64(2)]
+
+
+def plain_of(probe):
+    """What a probe looks at, where that is so plain that a loop does without its kernel.
+
+    Returns
+    -------
+    tuple of 4 int
+        `NODES`, the first row and the last + 1, and 0; `LINES`, the column, the first element and the last + 1; or 0.
+    float
+        Factor on that; the largest of all products with one factor is that of the largest.
+    """
+    rows, data, none = list(probe.rows), probe.data, ((0, 0, 0, 0), 1.0)
+    if probe.kernel is displacement and rows[0] == MAGNITUDE and rows[1] >= 0:
+        return none if data.any() else ((NODES, *rows[1:], 0), 1.0)
+    if probe.kernel is line and len(data) and data[0, 0] > 0.0 and (data[:, 0] == data[0, 0]).all():
+        return (LINES, *rows), float(data[0, 0])
+    return none
 
 
 @kernel(PROBE)
@@ -160,9 +216,10 @@ def line(t, x, v, f, lines, rows, data, where):
         best = _larger(best, values[n] * scales[n])
     if where[1] == PLACE:
         where[0] = first
-        for n in range(values.size - 1, -1, -1):
+        for n in range(values.size):
             if values[n] * scales[n] == best:
                 where[0] = first + n
+                break
     return best
 
 
@@ -206,7 +263,8 @@ def deepest(t, x, v, f, lines, rows, data, where):
     best = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
     if where[1] == PLACE:
         where[0] = -1
-        for n in range(values.size - 1, -1, -1):
-            if best > 0.0 and values[n] == best:
+        for n in range(values.size if best > 0.0 else 0):
+            if values[n] == best:
                 where[0] = n
+                break
     return best

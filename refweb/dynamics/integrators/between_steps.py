@@ -8,6 +8,7 @@ forces: nothing is kept for it in all the steps that have no peak.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ...kernels import copy_rows, kernel
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
 from .extremes import EDGE, Extremes, correction, look, look_at_sums, take_over, time_of_top
-from .records import Inside
+from .nearby import show_near
 from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
 
 LOOKS = PARTS
@@ -24,6 +25,22 @@ SAME_PEAK = 1e-3
 """Share of a step within which peaks of two observables are looked at at once."""
 BEHIND = 0.51
 """Share of a step by which its motion is taken to go on before its start, where a peak about that is looked for."""
+
+
+class Inside(NamedTuple):
+    """Space to look at the inside of a long step with.
+
+    Attributes
+    ----------
+    before, state : ndarray, shape (3, rows, 3)
+        Position, velocity and acceleration at its start; position, velocity and force at a place within.
+    lines : ndarray, shape (cells, columns)
+        What lines show there.
+    """
+
+    before: np.ndarray
+    state: np.ndarray
+    lines: np.ndarray
 
 
 @kernel()
@@ -78,6 +95,7 @@ def forces_at(t, x, v, f, lines, model):
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
     for i in model.rubbed.families:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
+    show_near(model.nearby, families)
 
 
 @kernel()
@@ -121,6 +139,7 @@ def show_again(now, inside, model, observed, running):
         families.forces[i](
             now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
         )  # fmt: skip
+    show_near(model.nearby, families)
 
 
 @kernel()

@@ -26,6 +26,7 @@ from .explicit_loop import BREATH, advance_rows, begin, take_steps
 from .extremes import Extremes
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
+from .nearby import look_at_all
 from .records import CLOCK, Model, Observed, Running, Scheme
 from .step_bound import safe_step
 
@@ -261,6 +262,7 @@ class CentralDifference(Integrator):
                 course.x[:], course.v[:], course.force[:] = course.before
             raise
         finally:
+            look_at_all(self.system, self._model)
             for name in SHARED:
                 setattr(course, name, clock[name].item())
         if done and course.stopped and history.time[done - 1] == course.time:
@@ -276,13 +278,14 @@ class CentralDifference(Integrator):
         """Take the steps from ``before`` [s] again and name the first number that is not finite."""
         net, planned = self.system.net, int(running.clock[0]["planned"])
         running.clock["time"], total = before, np.zeros(running.work.size + 2)
+        model = self._model._replace(nearby=self._model.nearby.without())  # its lists hold for steps in a row
 
         def after(state, begun, count):
             """The state ``count`` steps behind one that ``begun`` steps have led to."""
             state, running.clock["begun"] = state.copy(), begun
             copy = running._replace(x=state[0], v=state[1], f=state[2], events=course.events[:0])
             changing = self._model.reels.lengths.size > 0
-            take_steps(count, float(course.step), changing, self._scheme, self._model, self._observed, copy, total)
+            take_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, total)
             return state
 
         sound, done, ahead = course.before.copy(), 0, planned

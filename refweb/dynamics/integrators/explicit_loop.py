@@ -28,12 +28,14 @@ from .energy_book import (
     own_energy,
 )
 from .events import ended_by, note_events
-from .extremes import begin_anew, correct_within, look, note_time, take_over, turns_back
+from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, note_momentum, push_on, set_push
+from .nearby import bits_of, follow_near, reach_all, show_near
 from .step import (
     add_forces,
     give_impulse,
+    give_reaction,
     kick_and_drift,
     last_kick,
     move_supports,
@@ -70,7 +72,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
-        set_reaction(held, f, reaction)
+        set_reaction(held, f.reshape(-1), reaction)
         if model.outside.pushing.size:
             set_push(drifted, x, v, model.outside, families, extra, push)
     book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
@@ -113,9 +115,17 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
         begin_powers(t, x, v, extra, families, model.rubbed.families, running.clock[0].nsteps > 0, running.power)
     if changing:
         reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
-    set_reaction(model.inertia.held, running.f, reaction)
+    set_reaction(model.inertia.held, running.f.reshape(-1), reaction)
     if outside.pushing.size:
         set_push(t, x, v, outside, families, extra, push)
+
+
+@kernel(forceinline=True)
+def change_lengths(t, x, reels, was, lines, length_force, work):
+    """Give what changes its natural lengths at time t, and book the work of that."""
+    note_lengths(reels, was)
+    set_lengths(t, reels, lines)
+    book_lengths(t, x, reels, was, length_force, work)
 
 
 @kernel()
@@ -132,6 +142,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
+    plain, scales, known = observed.plain, observed.scales, np.zeros(3)
     signs, followed, sums, touches = observed.signs, observed.followed, observed.sums, np.empty((0, model.rubbed.width))
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
@@ -143,6 +154,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
+    nearby, bits = model.nearby, bits_of(flat_v, model, stages > 0)
     inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if moved else 0, 3))
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
@@ -151,20 +163,19 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_state(x, v, f, inverse, inside.before)
         if stages:
             inner_stages(now, h, scheme, model, running, reaction, push, extra)
-        if moved:
-            note_motion(driven, mass, x, v, f, before)
+        note_motion(driven, mass, x, v, f, before)
         kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
         if stages:
             book_potential(-1.0, now - kicks[stages + 1], x, families, work)
         if moved:
             move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            note_lengths(reels, was)
-            set_lengths(now, reels, data[0])
-            book_lengths(now, x, reels, was, length_force, work)
+            change_lengths(now, x, reels, was, data[0], length_force, work)
+        follow_near(drifts[0], x, bits, before, driven, nearby, families)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])
+        show_near(nearby, families)
         if rubbing.size:
             touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
         elif viscous.size:
@@ -173,19 +184,18 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
-        if moved:
-            book_motion(driven, mass, x, v, f, before, work)
-        give_impulse(kicks[stages], reaction, impulse)
-        set_reaction(held, f, reaction)
-        give_impulse(kicks[stages + 1], reaction, impulse)
+        book_motion(driven, mass, x, v, f, before, work)
+        give_reaction(kicks[stages], kicks[stages + 1], held, flat_f, reaction, impulse)
         if pushing:
             push_on(now, kicks[stages], kicks[stages + 1], x, v, model.outside, families, extra, push, pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, inside, where, total, model, observed, running)
-        turned, ending = False, begun + step == planned or math.isnan(looked[0])
+        turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
         note_time(looked, now)
         for i in followed:
-            value = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
+            if not plain_value(i, flat_x, lines, plain, scales, known):
+                known[0] = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
+            value = known[0]
             turned = turns_back(i, value, signs[i], values[i], recent, ending) or turned
             if signs[i] * value > signs[i] * values[i]:
                 take_over(i, value, now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
@@ -213,6 +223,7 @@ def steps_until(end, changing, scheme, model, running):
         a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
         push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
+    reach_all(2.0 * interval * fastest, running.x, model.nearby, model.families)
     return interval / (
         scheme.safety * safe_step(time, end, changing, 2.0 * interval * fastest, fastest, running.x, model)
     )

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import kernel
-from ...results.probes import PLACE
+from ...results.probes import NODES, PLACE, farthest, largest_in
 
 EDGE = 2.0**-16
 """Share of a step at whose distance from an end it is looked at for the rate there."""
@@ -109,6 +109,24 @@ def correction(extremes, i, sign, t, value, smooth):
         (slope, curve), late = parabola(extremes, i), t - extremes.looked[1]
         return abs(value - recent[1] - late * (slope + late * curve))
     return sign * value - max(sign * recent[0], sign * recent[1], sign * recent[2])
+
+
+@kernel(forceinline=True)
+def plain_value(i, x, lines, plain, scales, known):
+    """Write the value of a plain probe, see `refweb.results.probes.plain_of`, to ``known[0]``; whether it is one.
+
+    Displacements x are in a row. ``known`` holds behind that the probe before it of a column in this step, −1 for none,
+    and the largest of that, which may be of the same elements.
+    """
+    kind = plain[i, 0]
+    if kind == NODES:
+        known[0] = farthest(x, plain[i, 1], plain[i, 2])
+    elif kind > 0:
+        j = int(known[1])
+        if j < 0 or plain[i, 1] != plain[j, 1] or plain[i, 2] != plain[j, 2] or plain[i, 3] != plain[j, 3]:
+            known[1], known[2] = i, largest_in(lines, plain[i, 1], plain[i, 2], plain[i, 3])
+        known[0] = scales[i] * known[2]
+    return kind > 0
 
 
 @kernel()

@@ -11,12 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from numba.typed import List
 
-from ...kernels import BOUND, ENERGY, FORCE, GIVE, INDICES, KEPT, LINES, MATRIX, MEET, SWEEP, VECTOR, record, typed_list
-from ...results.probes import INTEGERS, PROBE
+from ... import kernels as k
+from ...kernels import INDICES, INTEGERS, MATRIX, VECTOR, record, typed_list
+from ...results.probes import PROBE, plain_of
 from .averages import Averages, Windows
 from .energy_book import no_energy
 from .extremes import Extremes
 from .momentum_book import Ledger, Outside
+from .nearby import Nearby, near_of
 from .step_bound import no_bound
 
 CLOCK = np.dtype(
@@ -100,10 +102,13 @@ class Inertia(NamedTuple):
 class Families(NamedTuple):
     """What acts; that of the lines is the first family.
 
+    Of those that act only near something, lists have the cells that are looked at; all stand behind all families.
+
     Attributes
     ----------
     forces, cells, data, outs : List
-        Kernel of each family, its cells, its numbers, and what it writes per cell.
+        Kernel of each family, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
+        column, the numbers of cells that are looked at instead of all, none where all are.
     still, viscous : ndarray of int
         Families behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
@@ -140,19 +145,21 @@ class Families(NamedTuple):
         viscous = [i for i in fast if families[i].rubbing is None]
         still = [i for i in range(1, len(families)) if i not in fast]
         powers = [(i, f.power, i in fast) for i, f in enumerate(families) if f.power is not None]
+        near, stored = near_of(system), [np.zeros(len(family.cells)) for family in families]
+        cells = [*(families[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         return cls(
-            forces=typed_list(FORCE, [family.force for family in families]),
-            cells=typed_list(INDICES, [family.cells for family in families]),
-            data=typed_list(MATRIX, numbers),
-            outs=typed_list(MATRIX, outs),
+            forces=typed_list(k.FORCE, [family.force for family in families]),
+            cells=typed_list(INDICES, [*(family.cells for family in families), *cells]),
+            data=typed_list(MATRIX, [*numbers, *(numbers[i] for i in near)]),
+            outs=typed_list(MATRIX, [*outs, *(outs[i] for i in near)]),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
-            energies=typed_list(ENERGY, [family.energy or no_energy for family in families]),
-            stored=typed_list(VECTOR, [np.zeros(len(family.cells)) for family in families]),
+            energies=typed_list(k.ENERGY, [family.energy or no_energy for family in families]),
+            stored=typed_list(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
-            bounds=typed_list(BOUND, [family.bound or no_bound for family in families]),
-            dampings=typed_list(BOUND, [families[i].damping_bound or no_bound for i in viscous]),
+            bounds=typed_list(k.BOUND, [family.bound or no_bound for family in families]),
+            dampings=typed_list(k.BOUND, [families[i].damping_bound or no_bound for i in viscous]),
         )
 
 
@@ -187,10 +194,10 @@ class Rubbed(NamedTuple):
         own = [family.rubbing for family in rubbing]
         return cls(
             families=np.array(families, dtype=np.int64),
-            meets=typed_list(MEET, [one.meet for one in own]),
-            recalls=typed_list(KEPT, [one.recall for one in own]),
-            sweeps=typed_list(SWEEP, [one.sweep for one in own]),
-            gives=typed_list(GIVE, [one.give for one in own]),
+            meets=typed_list(k.MEET, [one.meet for one in own]),
+            recalls=typed_list(k.KEPT, [one.recall for one in own]),
+            sweeps=typed_list(k.SWEEP, [one.sweep for one in own]),
+            gives=typed_list(k.GIVE, [one.give for one in own]),
             memories=typed_list(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
             width=max((one.width for one in own), default=0),
         )
@@ -209,7 +216,7 @@ class Motions(NamedTuple):
         """That of a system."""
         drives = system.drives
         return cls(
-            kernels=typed_list(FORCE, [drive.kernel for drive in drives]),
+            kernels=typed_list(k.FORCE, [drive.kernel for drive in drives]),
             cells=typed_list(INDICES, [drive.cells for drive in drives]),
             data=typed_list(MATRIX, [drive.data for drive in drives]),
             outs=typed_list(MATRIX, [np.zeros((len(drive.cells), 0)) for drive in drives]),
@@ -255,14 +262,14 @@ class Reels(NamedTuple):
         elements = np.unique(np.concatenate([[], *(drive.cells[:, 0] for drive in drives)])).astype(np.int64)
         corners = sorted({time for drive in drives for time in drive.times})
         return cls(
-            kernels=typed_list(LINES, [drive.kernel for drive in drives]),
+            kernels=typed_list(k.LINES, [drive.kernel for drive in drives]),
             cells=typed_list(INDICES, [np.searchsorted(elements, drive.cells).astype(np.int32) for drive in drives]),
             data=typed_list(MATRIX, [drive.data for drive in drives]),
             lengths=net.natural_length[elements],
             elements=elements,
             lines=net.line_data[elements],
             nodes=net.cells[elements],
-            by_length=typed_list(ENERGY, [system.length_force_kernel] if drives else []),
+            by_length=typed_list(k.ENERGY, [system.length_force_kernel] if drives else []),
             corners=np.array([*corners, *([np.inf] if drives else []), -np.inf]),
         )
 
@@ -278,13 +285,14 @@ class Model(NamedTuple):
     reels: Reels
     corners: np.ndarray
     outside: Outside
+    nearby: Nearby
 
     @classmethod
     def of(cls, system, outs):
         """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
         inertia, families, rubbed = Inertia.of(system), Families.of(system, outs), Rubbed.of(system)
         motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
-        return cls(inertia, families, rubbed, motions, reels, system.corners, outside)
+        return cls(inertia, families, rubbed, motions, reels, system.corners, outside, Nearby.of(system))
 
 
 @record
@@ -305,6 +313,10 @@ class Observed(NamedTuple):
         Windows of the probes that are averaged.
     shown : ndarray of int
         Families whose values per cell are the data of probes.
+    plain : ndarray of int, shape (probes, 4)
+        What the loop looks at itself, see `refweb.results.probes.plain_of`.
+    scales : ndarray, shape (probes,)
+        Factor on that.
     """
 
     probes: List
@@ -315,6 +327,8 @@ class Observed(NamedTuple):
     followed: np.ndarray
     windows: Windows
     shown: np.ndarray
+    plain: np.ndarray
+    scales: np.ndarray
 
     @classmethod
     def of(cls, probes, sums, outs):
@@ -322,6 +336,7 @@ class Observed(NamedTuple):
         numbers = [outs[p.family] if p.family >= 0 else np.ascontiguousarray(p.data, dtype=float) for p in probes]
         windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
         signs[windows.slots] = 0.0
+        plain = [plain_of(probe) for probe in probes]
         return cls(
             probes=typed_list(PROBE, [probe.kernel for probe in probes]),
             rows=typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
@@ -331,6 +346,8 @@ class Observed(NamedTuple):
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
             shown=np.unique([probe.family for probe in probes if probe.family >= 0]).astype(np.int64),
+            plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
+            scales=np.array([scale for _, scale in plain], dtype=float),
         )
 
 
@@ -377,19 +394,3 @@ class Running(NamedTuple):
     averages: Averages
     power: np.ndarray
     length_force: np.ndarray
-
-
-class Inside(NamedTuple):
-    """Space to look at the inside of a long step with.
-
-    Attributes
-    ----------
-    before, state : ndarray, shape (3, rows, 3)
-        Position, velocity and acceleration at its start; position, velocity and force at a place within.
-    lines : ndarray, shape (cells, columns)
-        What lines show there.
-    """
-
-    before: np.ndarray
-    state: np.ndarray
-    lines: np.ndarray

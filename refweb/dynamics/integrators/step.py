@@ -48,11 +48,12 @@ def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
 
 @kernel(forceinline=True)
 def set_reaction(held, f, reaction):
-    """Write the force of the supports on the net, which takes that on them away, to ``reaction``."""
+    """Write the force of the supports on the net, which takes that on them away, to ``reaction``; f in a row."""
     for k in range(3):
         reaction[k] = 0.0
-    for q in held:
-        reaction[q % 3] -= f[q // 3, q % 3]
+    for n in range(held.size):
+        q = np.uint64(held[n])
+        reaction[q % np.uint64(3)] -= f[q]
 
 
 @kernel(forceinline=True)
@@ -60,6 +61,14 @@ def give_impulse(time, reaction, impulse):
     """Add the impulse of a force over a time."""
     for k in range(3):
         impulse[k] += time * reaction[k]
+
+
+@kernel(forceinline=True)
+def give_reaction(before, behind, held, f, reaction, impulse):
+    """Add the impulse of the supports in two kicks, a time ahead of a drift and one behind it; f in a row."""
+    give_impulse(before, reaction, impulse)
+    set_reaction(held, f, reaction)
+    give_impulse(behind, reaction, impulse)
 
 
 @kernel(forceinline=True)

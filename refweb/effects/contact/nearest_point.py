@@ -8,9 +8,10 @@ calls 20 ns.
 
 from __future__ import annotations
 
+import functools
 import math
 
-from ...kernels import kernel
+from ...kernels import NEAR, kernel
 from ..vectors import dot
 from .pair import AWAY, RADIUS
 
@@ -122,3 +123,27 @@ def touched(x, cells, data, first, pieces, nodes, functions):
             if square < best:
                 nearest, where, best = c, place, square
     return (nearest if best < data[first, RADIUS] ** 2 else -1), where, best
+
+
+@functools.cache
+def near(pieces, nodes, functions):
+    """The kernel that finds the lines near bodies, of signature `refweb.kernels.NEAR`.
+
+    A line is taken whole, and held against the sphere around a body. The arguments are those of
+    `refweb.effects.contact.sphere.kernels`.
+    """
+
+    @kernel(NEAR)
+    def near(skin, x, cells, data, chosen):
+        count = 0
+        for first in range(0, cells.shape[0], pieces):
+            reach, beyond = data[first, RADIUS] + skin, True
+            for c in range(first, first + pieces):
+                beyond = beyond and closest(x, cells, data, c, nodes, functions)[1] >= reach * reach
+            if not beyond:  # what is not a number is near
+                for c in range(first, first + pieces):
+                    chosen[count] = c
+                    count += 1
+        return count
+
+    return near

@@ -17,6 +17,7 @@ from ...errors import InputError
 from ...messages import nearest, shown
 from ...tables import Table, field, real, table
 from ..base import Family
+from .nearest_point import near
 from .pair import AWAY, pair_data
 
 
@@ -183,6 +184,7 @@ class Contact(Table):
             energy=energy,
             stiffness=stiffness,
             bound=bound,
+            near=near(*element) if net.order == 1 else None,  # explicit steps take no other elements
             book="contact_energy",
             observed=1,
             internal=True,

@@ -1,0 +1,197 @@
+"""Contact of what is near: lines that a body cannot reach yet are not looked at in every step.
+
+A list of the lines within a skin of a body holds until something may have come as far as the skin is deep: in a step
+nothing moves by more than the fastest row, and a line comes nearer to a body by no more than twice that. So nothing is
+missed, and the numbers are those of all lines to the last bit, since lines that do not touch add nothing to any sum.
+
+A list is deep enough for the `LASTS` steps ahead, and for the bound on the steps of the next row where that reaches no
+more than `LONGEST` of them. So it is made once in some rows, by a look at all lines.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import types
+from numba.typed import List
+
+from ...kernels import INDICES, MATRIX, VECTOR, kernel, typed_list
+
+LASTS = 64.0
+"""Number of steps that a list is to last at the speed of its first."""
+LONGEST = 256.0
+"""The same where a bound on the next row's steps asks for a deeper skin."""
+COVERED = 3
+"""Number of steps whose ways are known before a list is made: peaks are looked for in that many."""
+SHARE = 0.999
+"""Share of a skin that may be used up: the rest is for rounding."""
+SIGN = np.int64(0x7FFFFFFFFFFFFFFF)
+"""All bits of a number but its sign: those of numbers ≥ 0 are in the order of these, and many are compared at once."""
+
+SKIN = np.dtype(
+    {
+        "names": ["depth", "used", "last", "before", "earlier", "wished", "steps", "top", "fastest"],
+        "formats": [*(6 * [float]), np.int64, np.int64, float],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 56],
+    }
+)
+"""Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
+bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
+of steps of which that is known; the largest component of a velocity, as a whole number and as what it is [m/s]."""
+TAKE, SHOW = 0, 1
+"""What is asked for: the cells within the skin, all where it is infinitely deep, or to show what those show."""
+NOWHERE = np.zeros((0, 3))
+"""Displacements where none are looked at."""
+_lists = (types.ListType(item) for item in (INDICES, MATRIX, MATRIX, VECTOR))
+SWAP = types.void(types.int64, types.int64, types.int64, types.float64, MATRIX, *_lists)
+"""``(what, i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the
+lists of `refweb.dynamics.integrators.records.Families`."""
+
+
+class Nearby(NamedTuple):
+    """Families whose cells act only near something.
+
+    Attributes
+    ----------
+    swaps : List
+        Kernel of each that swaps its cells, see `swap_of`.
+    families : ndarray of int
+        Their numbers.
+    skin : ndarray of `SKIN`, shape (1,)
+        How long what is chosen will do.
+    """
+
+    swaps: List
+    families: np.ndarray
+    skin: np.ndarray
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        near, skin = near_of(system), np.zeros(1, dtype=SKIN)
+        skin["depth"] = np.inf
+        swaps = typed_list(SWAP, [swap_of(system.families[i].near) for i in near])
+        return cls(swaps, np.array(near, dtype=np.int64), skin)
+
+    def without(self):
+        """That of no families."""
+        return self._replace(families=self.families[:0])
+
+
+def near_of(system):
+    """Numbers of the families of a system whose cells act only near something."""
+    return [i for i, family in enumerate(system.families) if family.near is not None]
+
+
+@functools.cache
+def swap_of(near):
+    """The kernel that swaps the cells of a family, found by its kernel ``near``, of signature `SWAP`.
+
+    Loops call it by its address: machine code that is called by name is optimized again in each kernel above, and
+    lists that are written to are long.
+    """
+
+    @kernel(SWAP)
+    def swap(what, i, m, depth, x, cells, data, outs, stored):
+        more, own = len(cells) - len(data), outs[i]
+        whole, numbers = len(data) - more + m, len(data) + m
+        all_cells, all_data, shown, chosen_before = cells[whole], data[whole], outs[whole], cells[numbers]
+        if what == SHOW:
+            for n in range(chosen_before.shape[0]):
+                for k in range(own.shape[1]):
+                    shown[chosen_before[n, 0], k] = own[n, k]
+            return
+        if depth == math.inf:
+            cells[i], data[i], outs[i], stored[i] = all_cells, all_data, shown, stored[whole]
+            cells[numbers] = np.empty((0, 1), dtype=np.int32)
+            return
+        found = np.empty(all_cells.shape[0], dtype=np.int64)
+        count = near(depth, x, all_cells, all_data, found)
+        some, some_data = np.empty((count, all_cells.shape[1]), dtype=np.int32), np.empty((count, all_data.shape[1]))
+        chosen = np.empty((count, 1), dtype=np.int32)
+        for n in range(count):
+            c = found[n]
+            chosen[n, 0] = c
+            for k in range(some.shape[1]):
+                some[n, k] = all_cells[c, k]
+            for k in range(some_data.shape[1]):
+                some_data[n, k] = all_data[c, k]
+        shown[:] = 0.0
+        cells[i], data[i], cells[numbers] = some, some_data, chosen
+        outs[i], stored[i] = np.zeros((count, shown.shape[1])), np.zeros(count)
+
+    return swap
+
+
+@kernel()
+def ask(what, x, nearby, families):
+    """Swap the cells of all families for those within the skin at displacement x, or write what these show."""
+    for m in range(nearby.families.size):
+        nearby.swaps[m](
+            what, nearby.families[m], m, nearby.skin[0].depth, x, families.cells, families.data, families.outs,
+            families.stored,
+        )  # fmt: skip
+
+
+def look_at_all(system, model):
+    """Look at all cells, as whoever comes next does, and forget how things moved."""
+    skin, families = model.nearby.skin[0], model.families
+    if skin["depth"] < np.inf:
+        for m, i in enumerate(near_of(system)):
+            swap_of(system.families[i].near)(
+                TAKE, i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
+            )
+    skin["depth"], skin["steps"] = np.inf, 0
+
+
+@kernel(forceinline=True)
+def bits_of(v, model, idle):
+    """The velocities of all places, in a row, as whole numbers; none where it is ``idle`` or nothing acts nearby."""
+    return v[: 0 if idle or not model.nearby.families.size else 3 * model.inertia.linear].view(np.int64)
+
+
+@kernel(forceinline=True)
+def show_near(nearby, families):
+    """Write what the chosen cells show where it is looked for, among that of all cells."""
+    if nearby.skin[0].depth < math.inf:
+        ask(SHOW, families.outs[0], nearby, families)
+
+
+@kernel(forceinline=True)
+def reach_all(reach, x, nearby, families):
+    """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m]."""
+    skin = nearby.skin[0]
+    skin.wished = 2.0 * reach
+    if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
+        skin.depth = math.inf
+        ask(TAKE, x, nearby, families)
+
+
+@kernel(forceinline=True)
+def follow_near(drift, x, bits, before, driven, nearby, families):
+    """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
+
+    ``bits`` are the velocities of places as whole numbers, see `bits_of`. Motion that is prescribed is held against the
+    places ``before``. States between the last three steps are covered as well, which is what is looked at for peaks.
+    """
+    if not bits.size:
+        return
+    skin, most = nearby.skin[0], np.int64(0)
+    for q in range(bits.size):
+        most = max(most, bits[q] & SIGN)
+    skin.top = most
+    way = abs(drift) * skin.fastest
+    for d in range(driven.size):
+        for k in range(3):
+            way = max(way, abs(x[driven[d], k] - before[d, k]))
+    way *= 2.0 * math.sqrt(3.0)
+    skin.earlier, skin.before, skin.last = skin.before, skin.last, way
+    skin.used += way
+    skin.steps += 1
+    if skin.steps > COVERED and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
+        recent = skin.last + skin.before + skin.earlier
+        skin.depth, skin.used = max(LASTS * way, 4.0 * recent, min(skin.wished, LONGEST * way)), 0.0
+        ask(TAKE, x, nearby, families)

@@ -1,0 +1,111 @@
+"""Lists of what bodies can reach: nothing is missed, and a run is the same to the last bit as one that looks at all."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.dynamics.simulation import Simulation
+
+BALL = refweb.Body(name="ball", radius=0.08, mass=0.4, position=(0.03, 0.02, -0.1), velocity=(1.5, 0.5, 3.0))
+BOX = refweb.Body(name="box", shape="box", size=(0.1, 0.12, 0.08), fixed=True, position=(0.1, 0.0, 0.035))
+AT_REST = refweb.Body(name="post", radius=0.05, fixed=True, position=(0.2, 0.2, 0.051))
+SHAKEN = refweb.Motion(node="rim", displacement=[(0.0, 0.0, 0.0, 0.0), (0.01, 0.02, 0.0, 0.1), (0.03, 0.0, 0.0, -0.1)])
+
+
+def case(*effects, subdivide=1, **contact):
+    """A window that bodies fly through for 30 ms, or that is shaken beside them."""
+    return refweb.Scene(
+        web=refweb.Window(mesh="square", rows=8, columns=8, side=0.1),
+        cable=refweb.Cable(law="tension-only", modulus=1e7, area=1e-5, density=200.0, subdivide=subdivide),
+        effects=[*effects, refweb.Contact(stiffness=3e3, **contact)],
+        solve=refweb.Dynamic(duration=0.03),
+        output=refweb.Output(interval=2e-3),
+        accuracy=refweb.Accuracy(error="none"),
+        observe=[
+            refweb.Observe(name="deflection", quantity="displacement", reduce="max"),
+            refweb.Observe(name="tension", quantity="tension", reduce="max"),
+            refweb.Observe(name="energy", quantity="contact_energy", reduce="max"),
+        ],
+    )
+
+
+def solver_of(scene, everything):
+    system = scene.build()
+    if everything:
+        system.families = [replace(family, near=None) for family in system.families]
+    solver = Simulation(scene, scene.build(), refweb.Solution(scene)).integrator
+    return CentralDifference(system, *solver.observed)
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        case(BALL),
+        case(BALL, BOX, AT_REST, subdivide=3),
+        case(BALL, exponent=1.5),
+        case(AT_REST, SHAKEN),
+    ],
+    ids=["ball", "bodies", "exponent", "shaken"],
+)
+def test_lists_change_no_bit(scene):
+    """Of the last state, the history and all peaks: the same run with every line looked at in every step."""
+    times, courses, rows = np.linspace(2e-3, 0.03, 15), [], []
+    for everything in (False, True):
+        solver = solver_of(scene, everything)
+        courses.append(solver.start())
+        rows.append(solver.advance(courses[-1], times).values)
+    np.testing.assert_array_equal(*rows)
+    assert rows[0][:, 1:].any() and courses[0].extremes.values.min() > 0.0  # something has touched
+    for name, array in courses[0].arrays().items():
+        np.testing.assert_array_equal(array, courses[1].arrays()[name], err_msg=name)
+
+
+def distances(net, body, x):
+    """From the middle of a body to each line, as segments between its nodes."""
+    a, b = ((net.points + x)[net.cells[:, k]] - (net.points + x)[body.row] for k in (0, 1))
+    place = np.clip(-((b - a) * a).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0.0, 1.0)
+    return np.linalg.norm(a + place[:, None] * (b - a), axis=1)
+
+
+def test_what_is_near_is_what_is_near():
+    """The kernel against distances in numpy, at random displacements: the same lines, and whole ones."""
+    scene, rng = case(BALL, BOX, subdivide=3), np.random.default_rng(7)
+    system = scene.build()
+    net, counts = system.net, []
+    for family in (one for one in system.families if one.near is not None):
+        body = next(body for body in net.bodies if body.row == family.cells[0, -1])
+        for skin in (0.0, 0.05, 0.3):
+            x, chosen = rng.normal(0.0, 0.02, (system.rows, 3)), np.empty(len(family.cells), dtype=np.int64)
+            count = family.near(skin, x, family.cells, family.data, chosen)
+            lines = net.line[distances(net, body, x) < body.extent + skin]
+            np.testing.assert_array_equal(chosen[:count], np.flatnonzero(np.isin(net.line, lines)))
+            counts.append(count)
+    assert 0 < sorted(counts)[1] and max(counts) < len(net.cells)
+
+
+def test_far_from_a_body_few_lines_are_looked_at():
+    """A ball that is a tenth as wide as the web: what stands in the lists at any step is a part of all lines."""
+    from refweb.dynamics.integrators import nearby
+
+    solver = solver_of(case(BALL), False)
+    course, model = solver.start(), solver._model
+    solver.advance(course, [2e-3])
+    skin, lists = model.nearby.skin, model.families
+    everything = len(lists.cells[1])
+    assert everything == 2 * 8 * 7 and skin["depth"] == np.inf and not skin["steps"]  # whoever comes next looks at all
+    family = solver.system.families[1]
+    swap, arrays = nearby.swap_of(family.near), (lists.cells, lists.data, lists.outs, lists.stored)
+    swap(nearby.TAKE, 1, 0, 0.05, course.x, *arrays)
+    chosen = lists.cells[-1][:, 0]
+    assert 0 < len(chosen) < 0.5 * everything
+    np.testing.assert_array_equal(lists.cells[1], family.cells[chosen])
+    np.testing.assert_array_equal(lists.data[1], family.data[chosen])
+    lists.outs[1][:] = 1.0
+    swap(nearby.SHOW, 1, 0, 0.05, course.x, *arrays)
+    np.testing.assert_array_equal(np.flatnonzero(lists.outs[-1][:, 0]), chosen)
+    skin["depth"] = 0.05
+    nearby.look_at_all(solver.system, model)
+    assert len(lists.cells[1]) == len(lists.outs[1]) == len(lists.stored[1]) == everything

@@ -1,0 +1,58 @@
+"""Probes that loops look at themselves: their values are those of numpy, and of their own kernels, to the last bit."""
+
+import numpy as np
+import pytest
+
+from refweb.results import probes
+
+
+def valued(probe, x, lines):
+    where, rows = np.zeros(2, dtype=np.int64), np.array(probe.rows, dtype=np.int64)
+    values = [probe.kernel(0.0, x, x, x, lines, rows, probe.data, where)]
+    where[1] = probes.PLACE
+    probe.kernel(0.0, x, x, x, lines, rows, probe.data, where)
+    return values[0], where[0]
+
+
+@pytest.mark.parametrize("count", range(1, 11))
+def test_plain_values(count):
+    """Of any number of rows, from any first one on, wherever the largest is; −0 and not a number among them."""
+    rng = np.random.default_rng(count)
+    for first in (0, 3):
+        x, lines = rng.normal(size=(first + count + 2, 3)), rng.normal(size=(first + count + 2, 2))
+        x[:first] *= 100.0
+        lines[:first] = 100.0
+        last = first + count
+        data = np.full((count, 1), 0.3)
+        node = probes.Probe(probes.displacement, [probes.MAGNITUDE, first, last], np.zeros((count, 3)))
+        line = probes.Probe(probes.line, [1, first, last], np.full((last, 1), 0.3))
+        kind, scale = probes.plain_of(node)
+        assert kind == (probes.NODES, first, last, 0) and scale == 1.0
+        value, place = valued(node, x, lines)
+        assert probes.farthest(x.ravel(), first, last) == value and place == first + np.argmax(
+            (x[first:last] ** 2).sum(1)
+        )
+        np.testing.assert_allclose(value, np.linalg.norm(x[first:last], axis=1).max(), rtol=1e-15)
+        kind, scale = probes.plain_of(line)
+        assert kind == (probes.LINES, 1, first, last) and scale == 0.3
+        value, place = valued(line, x, lines)
+        assert scale * probes.largest_in(lines, 1, first, last) == value == (data[:, 0] * lines[first:last, 1]).max()
+        assert place == first + np.argmax(lines[first:last, 1])
+
+
+def test_what_is_not_plain():
+    """A component, some rows, places in space, and scales that differ or turn the order round."""
+    zero, one = np.zeros((4, 3)), np.ones((4, 1))
+    rows = [probes.MAGNITUDE, 0, 4]
+    assert probes.plain_of(probes.Probe(probes.displacement, rows, zero))[0][0] == probes.NODES
+    others = [
+        probes.Probe(probes.displacement, [2, 0, 4], zero),
+        probes.Probe(probes.displacement, [probes.MAGNITUDE, -1, -1, 0, 2], zero[:2]),
+        probes.Probe(probes.displacement, rows, np.eye(4, 3)),
+        probes.Probe(probes.velocity, rows, zero),
+        probes.Probe(probes.line, [0, 0, 4], -one),
+        probes.Probe(probes.line, [0, 0, 4], np.arange(1.0, 5.0)[:, None]),
+        probes.Probe(probes.line_of, [0, 1, 3], one),
+    ]
+    for probe in others:
+        assert probes.plain_of(probe) == ((0, 0, 0, 0), 1.0)
