@@ -64,6 +64,7 @@ TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium", "system.unsupported_parts"}
 LOAD_STEPS = {"statics.simulation", "statics.remarks"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.floating", "statics.energy_search"}
+NEWTON |= {"system.conjugate_gradients"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book")}
