@@ -153,6 +153,8 @@ def called(given):
             modules |= TANGENT | {"statics.duality_bound", "statics.floating"}
         if given.keys() & {"pressure", "thrust"}:
             modules.add("statics.residual_search")
+        elif len(solve.get("load_steps", [1.0])) > 1 and tension_only and not given.keys() & {"body"}:
+            modules.add("statics.predictor")
     if modules >= TANGENT:
         outside.append("qdldl")
         if given["web"].get("mesh") == "hexagon" and importlib.util.find_spec("rslab"):
