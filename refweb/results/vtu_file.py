@@ -54,7 +54,7 @@ def write(path, mesh):
             kind = next(known for known, code in TYPES.items() if np.dtype(code) == np.dtype(kind))
             size = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
             text.append(f'<DataArray type="{kind}" Name={quoteattr(name)}{size} format="appended" offset="{offset}"/>')
-            packed += _packed(np.ascontiguousarray(values, TYPES[kind]))
+            packed += _packed(np.ascontiguousarray(values, TYPES[kind]), offset)
             offset = sum(map(len, packed))
         text.append(f"</{section}>")
     size = f'NumberOfPoints="{len(mesh.points)}" NumberOfCells="{sum(counts)}"'
@@ -68,12 +68,27 @@ def write(path, mesh):
         file.write(b"\n</AppendedData>\n</VTKFile>\n")
 
 
-def _packed(values):
-    """An array as VTK has it compressed: number of blocks, their bytes, those of a last short one, sizes; blocks."""
+def _packed(values, offset):
+    """An array as VTK has it compressed: number of blocks, their bytes, those of a last short one, sizes; blocks.
+
+    meshio 5.3 replaces offsets one by one by those in base64, multiples of 4, and looks each up among both kinds. So
+    none but the first is a multiple of 4 here: the last block of an array is compressed otherwise until its end is not.
+    """
     data = memoryview(values.reshape(-1)).cast("B") if values.size else b""
     blocks = [zlib.compress(data[start : start + BLOCK], LEVEL) for start in range(0, len(data), BLOCK)]
+    for how in range(40):
+        if not blocks or (offset + sum(map(len, blocks))) % 4:
+            break
+        blocks[-1] = _otherwise(data[BLOCK * (len(blocks) - 1) :], how)
     head = [len(blocks), BLOCK, len(data) % BLOCK, *map(len, blocks)]
     return [np.array(head, "<u4").tobytes(), *blocks]
+
+
+def _otherwise(data, how):
+    """Compressed as two parts, of which the first has ``how`` bytes."""
+    packer = zlib.compressobj(LEVEL)
+    cut = min(how, len(data))
+    return packer.compress(data[:cut]) + packer.flush(zlib.Z_SYNC_FLUSH) + packer.compress(data[cut:]) + packer.flush()
 
 
 class Reader:

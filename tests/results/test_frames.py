@@ -2,6 +2,7 @@
 
 import gc
 import math
+import re
 import weakref
 
 import meshio
@@ -164,3 +165,21 @@ def test_the_estimate_of_states(kind):
     count = len(held)
     told = memory.of_states(count, system.rows, len(system.net.cells), read=kind == "static")
     assert 1.0 <= told / math.fsum(held) <= 2.0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_meshio_reads_arrays_of_any_size(tmp_path, seed):
+    """It mistakes an offset for another where both are multiples of 4: there is none but the first."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 12))
+    names = {name: np.round(rng.standard_normal(n), int(rng.integers(0, 3))) for name in "abcdefgh"}
+    lines = rng.integers(0, n, (int(rng.integers(1, 8)), 2))
+    written = meshio.Mesh(rng.standard_normal((n, 3)), [("line", lines)], point_data=names)
+    vtu_file.write(tmp_path / "one.vtu", written)
+    read = meshio.read(tmp_path / "one.vtu")
+    np.testing.assert_array_equal(read.points, written.points)
+    np.testing.assert_array_equal(read.cells[0].data, lines)
+    for name, values in names.items():
+        np.testing.assert_array_equal(read.point_data[name], values)
+    head = (tmp_path / "one.vtu").read_bytes().split(vtu_file.MARK)[0].decode()
+    assert [int(offset) % 4 == 0 for offset in re.findall(r'offset="(\d+)"', head)] == [True] + 11 * [False]

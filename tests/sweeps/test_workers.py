@@ -90,6 +90,8 @@ def test_whatever_ends_a_study_ends_its_workers(tmp_path, whole, sent, status):
     (tmp_path / "study.toml").write_text(tomli_w.dumps(given))
     command = [sys.executable, "-m", "refweb", "sweep", "study.toml", "--out", "s", "--workers", "1"]
     begun = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    # What a shell starts in the background ignores Ctrl-C, and so does what that starts.
+    begun["preexec_fn"] = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
     process = subprocess.Popen(command, cwd=tmp_path, **begun)
     table = tmp_path / "s" / "results.csv"
     while not (table.exists() and table.read_bytes().count(b"\n") > 3):
