@@ -7,8 +7,10 @@ that is ±, which no number of samples lets fall. They are told beside each othe
 The probability of a condition has an interval by Clopper and Pearson (1934), which covers it at least as often as its
 level says, of independent samples; of samples that are evenly spread it is that of as many independent ones, and
 mostly wider than it need be. A case that its ± leaves undecided, and one that has failed, may count either way: the
-interval holds for both. Results behind the horizon of their motion are draws: their ± says nothing, a case counts by
-its one run, and where it has an ensemble by mean and spread of that in mean and deviation.
+interval holds for both. Results behind the horizon of their motion are draws, and their ± says nothing. Where they have
+an ensemble, its mean and spread join those of the cases. Of samples a case counts by its one run, as the trials of
+Clopper and Pearson do: what differs between runs of one case is one chance more among those that are sampled. Of cases
+that are not drawn a condition says what holds of each, and of a draw with an ensemble that is `LIKELY` of its spread.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ from .study import SAMPLES
 
 RESAMPLES = 999
 """Number of samples with replacement that intervals of Sobol's indices are taken of."""
+LIKELY = 2.0
+"""Standard deviations about the mean of an ensemble within which most of its runs are."""
 UNDONE = ("skipped", "waiting")
 """Status of rows that say nothing of a condition, as their cases have not been run."""
 
@@ -130,14 +134,19 @@ def _ranks(n, q, level):
     return (low, high) if 0 <= low and high < n else None
 
 
-def bounds(row, results, values):
-    """Values by name for a condition: parameters, and results as intervals; exact of draws and of unknown ±."""
+def bounds(row, results, values, sampled):
+    """Values by name for a condition: parameters, and results as intervals; exact of draws and of unknown ±.
+
+    Where cases are not ``sampled``, those of draws with an ensemble are `LIKELY` standard deviations about its mean.
+    """
     told = dict(values)
     for result in results:
         value, error, statistical = column_of(row, result)
         if value is None:
             continue
         wide = 0.0 if statistical or error is None else error
+        if not sampled and (spread := row.get(f"{result.name} deviation")) is not None:
+            value, wide = row[f"{result.name} mean"], LIKELY * spread
         least, most = row.get(f"{result.name} least"), row.get(f"{result.name} most")
         told[result.name] = Interval(value - wide if least is None else least, value + wide if most is None else most)
     return told
@@ -146,7 +155,8 @@ def bounds(row, results, values):
 def _share(study, condition, results, cases, sampled):
     """Of how many cases a condition holds, and of samples its probability.
 
-    ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it leaves open, and
+    ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it, or the spread of an
+    ensemble, leaves open, and
     ``failed`` those without a result; ``unproven`` of the decided have a result without ±, and ``statistical`` have one
     that is a draw.
     """
@@ -157,7 +167,7 @@ def _share(study, condition, results, cases, sampled):
     for case, row in cases:
         if row["status"] in UNDONE:
             continue
-        told = bounds(row, results, case.values)
+        told = bounds(row, results, case.values, sampled)
         if row["status"] != "solved" or any(one.name not in told for one in used):
             count["failed"] += 1
             continue

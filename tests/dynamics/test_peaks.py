@@ -195,3 +195,10 @@ def test_top_of_a_parabola():
     top = top_of(times, [p(t) for t in times])
     np.testing.assert_allclose([top.time, top.height], [1.0 / 3.0, 4.0 / 3.0], rtol=1e-9)
     assert top_of(times, [-p(t) for t in times]) is None
+
+
+def test_a_step_of_one_rounding_has_no_top():
+    """A solver that stops short of a row takes one: the middle is one of its ends, and rounding the only difference."""
+    now = np.nextafter(9e-4, 1.0)
+    for middle in (9e-4, now):
+        assert top_of([9e-4, middle, now], [1.0, np.nextafter(1.0, 2.0), 1.0]) is None

@@ -206,6 +206,54 @@ def test_files_are_part_of_a_case(tmp_path):
     assert len(here.ran) == 2
 
 
+class Elsewhere(Here):
+    """A machine that has other files: while it runs a case, those of this one are away."""
+
+    def __init__(self, *paths, instead=None):
+        super().__init__()
+        self.paths, self.instead = paths, instead
+
+    def submit(self, fn, /, job):
+        aside = [path.with_name(f"{path.name} aside") for path in self.paths]
+        for path, beside in zip(self.paths, aside, strict=True):
+            path.rename(beside)
+            if self.instead is not None:
+                path.write_bytes(self.instead)
+        try:
+            return super().submit(fn, job)
+        finally:
+            for path, beside in zip(self.paths, aside, strict=True):
+                path.unlink(missing_ok=True)
+                beside.rename(path)
+
+
+@pytest.mark.parametrize("instead", [None, b"x,y,z\n0,0,0\n"])
+def test_files_travel_with_a_case(tmp_path, instead):
+    """To machines that do not have them, or others of that name; the rows are those of this machine."""
+    nodes, lines = tmp_path / "nodes.csv", tmp_path / "lines.csv"
+    nodes.write_text("x,y,z\n-1,0,0\n0,0,0\n1,0,0\n")
+    lines.write_text("i,j\n0,1\n1,2\n")
+    web = {"kind": "file", "path": "nodes.csv", "lines": "lines.csv"}
+    (tmp_path / "arms.toml").write_text(tomli_w.dumps({**ARMS, "web": web, "supports": {"nodes": [0, 2]}}))
+    (tmp_path / "study.toml").write_text(tomli_w.dumps({"scene": "arms.toml", "parameters": {FORCE: [1.0, 2.0]}}))
+    there = refweb.sweep(tmp_path / "study.toml", executor=Elsewhere(nodes, lines, instead=instead))
+    here = refweb.sweep(tmp_path / "study.toml", executor=Here())
+    assert here.count == there.count == {"solved": 2}
+    assert (there.values("deflection") == here.values("deflection")).all()
+
+
+def test_a_run_that_a_case_starts_from_travels_with_it(tmp_path):
+    dynamic = {"kind": "dynamic", "duration": 1e-3}
+    refweb.run(arms(), out=tmp_path / "first", progress=False)
+    scene = {**ARMS, "solve": {**dynamic, "start": "first"}}
+    (tmp_path / "arms.toml").write_text(tomli_w.dumps(scene))
+    (tmp_path / "study.toml").write_text(tomli_w.dumps({"scene": "arms.toml", "parameters": {FORCE: [1.0, 2.0]}}))
+    there = refweb.sweep(tmp_path / "study.toml", executor=Elsewhere(tmp_path / "first"))
+    here = refweb.sweep(tmp_path / "study.toml", executor=Here())
+    assert here.count == there.count == {"solved": 2}, there.rows
+    assert (there.values("deflection") == here.values("deflection")).all()
+
+
 @pytest.mark.parametrize("keep", ["json", "all"])
 def test_what_is_kept(tmp_path, keep):
     here, out = Here(), tmp_path / "s"

@@ -23,8 +23,10 @@ class Top(NamedTuple):
 
 
 def top_of(times, heights):
-    """The `Top` of the parabola through three points, None where it has none."""
+    """The `Top` of the parabola through three points, None where it has none; a step of one rounding has no middle."""
     (before, at, now), (low, high, value) = times, heights
+    if not before < at < now:
+        return None
     rise, fall = (high - low) / (at - before), (value - high) / (now - at)
     curve = (fall - rise) / (now - before)
     slope = rise + curve * (at - before)
