@@ -24,7 +24,7 @@ import time
 from typing import NamedTuple
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-COPIED = ("refweb", "tests", "validation", "README.md", "pyproject.toml")
+COPIED = ("refweb", "tests", "validation", "README.md", "pyproject.toml", "LICENSE", "CITATION.cff")
 LONGEST = 1800.0
 """Time that the tests of a bug may take [s]; one that makes them hang is noticed as well."""
 MIRRORS = {
@@ -406,7 +406,7 @@ def copied(root):
     for name in COPIED:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, root / name, ignore=shutil.ignore_patterns("__pycache__", "report", "*.png"))
+            shutil.copytree(source, root / name, ignore=shutil.ignore_patterns("__pycache__", "report"))
         else:
             shutil.copy2(source, root / name)
 

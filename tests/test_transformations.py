@@ -149,7 +149,7 @@ def random_motion(seed):
         "observe": OBSERVE + MOVING,
     }
     if rng.random() < 0.7:
-        away = rng.normal(size=3)
+        away = rng.normal(size=3) * (0.2, 0.2, 0.0) + (0.0, 0.0, rng.choice([-1.0, 1.0]))  # lines rise by half at most
         away /= np.linalg.norm(away)
         ball = {"name": "ball", "radius": 0.05, "mass": 0.1, "position": (middle + 0.052 * away).tolist()}
         scene["body"] = [ball | {"velocity": (-2.0 * away).tolist()}]

@@ -155,10 +155,9 @@ def bounds(row, results, values, sampled):
 def _share(study, condition, results, cases, sampled):
     """Of how many cases a condition holds, and of samples its probability.
 
-    ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it, or the spread of an
-    ensemble, leaves open, and
-    ``failed`` those without a result; ``unproven`` of the decided have a result without ±, and ``statistical`` have one
-    that is a draw.
+    ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it or the spread of
+    an ensemble leaves open, and ``failed`` those without a result; ``unproven`` of the decided have a result without ±,
+    and ``statistical`` have one that is a draw.
     """
     used = [one for one in results if one.name in condition.used]
     count: dict[str, int] = dict.fromkeys(

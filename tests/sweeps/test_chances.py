@@ -120,7 +120,7 @@ def test_results_beyond_the_horizon_join_by_their_ensemble():
 
 
 def test_an_ensemble_leaves_a_case_that_is_not_drawn_undecided():
-    """Of normal runs with mean x and deviation 0.1 the limit 0.5 cuts off less than one in forty at 0.2 and 0.8 only."""
+    """Of normal runs with mean x and deviation 0.1 the limit 0.5 leaves hardly any at 0.2 and 0.8 only."""
     study = Study(scene="s", parameters={"x": [0.2, 0.4, 0.6, 0.8]}, conditions={"high": "y > 0.5"})
     more = {"statistical": "y", "y mean": lambda v: v["x"], "y deviation": 0.1}
     (entry,) = told(study, lambda v: 0.9, 0.3, **more)
