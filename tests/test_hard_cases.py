@@ -41,6 +41,11 @@ def test_tiny_loads_on_slack_chains():
         assert outcome(random_net(seed)) == "solved"
 
 
+def test_a_central_path_that_leads_away_ends_at_its_best():
+    """At its end rounding throws it to 1e283 m; Newton's method goes on from where it was before."""
+    assert outcome(random_net(997)) == "solved"
+
+
 def test_relaxation_does_not_chatter():
     """An end that hangs from a cable, and triangles from a corner: a few thousand steps, not rest after rest."""
     for name in ("dangling end", "triangles hung from one corner", "hung from one corner"):

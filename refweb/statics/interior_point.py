@@ -131,17 +131,21 @@ class InteriorPoint:
     def follow(self, tolerance, most=80):
         """Go on until forces, lengths and what the cones leave open are below ``tolerance``; return the displacement.
 
-        ``most`` bounds the iterations of this call; where they run out the best displacement is returned.
+        ``most`` bounds the iterations of this call; where they run out, or lead away, it ends at the best so far.
         """
-        best, nearest = np.inf, self.x.copy()
+        best, nearest = np.inf, self._place()
         with np.errstate(all="ignore"):  # where rounding has come to the surface, steps may lead anywhere
             for _ in range(most):
                 worst = self._worst()
                 if worst < best:
-                    best, nearest = worst, self.x.copy()
+                    best, nearest = worst, self._place()
                 if worst < tolerance or not worst < FAR * best or not self._go_on():
                     break
-        return nearest
+        self.x, self._z, self._s, self._y = nearest
+        return self.x.copy()
+
+    def _place(self):
+        return tuple(value.copy() for value in (self.x, self._z, self._s, self._y))
 
     def _open(self):
         """What is left of the equations: of force at rows [N], of tension of bars [N], of the vectors in cones [m]."""
