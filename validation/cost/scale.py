@@ -128,25 +128,34 @@ def main(most=100, library="auto", meshes=MESHES):
     """Print the tables."""
     sizes = [n for n in (25, 50, 100, 200, 350, 500, 700, 1000) if n <= most]
     for mesh in meshes.split(","):
-        print(f"{mesh}, statics: lines, unknowns, set-up [s], CPU [s], of one SuperLU, factorizations, gap/|Pi|, peak")
-        rows = []
-        for n in sizes:
-            if (row := alone("statics", mesh, n, library)) is None:
-                break
-            rows.append(row)
-            unit = f"{row['cpu'] / row['unit']:6.1f}" if row["unit"] else "     -"
-            print(f"{row['lines']:9d}{row['unknowns']:9d}{row['build']:8.2f}{row['cpu']:9.2f}{unit}", end="")
-            print(f"{row['count']:5d}{row['gap']:9.0e}{row['peak']:7.2f} GB  {row['by']}", flush=True)
-        print(f"exponents: set-up {exponent(rows, 'build'):.2f}, CPU {exponent(rows, 'cpu'):.2f}")
-        print(f"{mesh}, explicit: lines, unknowns, set-up [s], CPU [s], steps, ns per element and step, peak")
-        rows = []
-        for n in sizes:
-            if (row := alone("explicit", mesh, n, library)) is None:
-                break
-            rows.append(row)
-            print(f"{row['lines']:9d}{row['unknowns']:9d}{row['build']:8.2f}{row['cpu']:9.2f}{row['steps']:6d}", end="")
-            print(f"{row['each']:8.1f}{row['peak']:7.2f} GB", flush=True)
-        print(f"exponents: set-up {exponent(rows, 'build'):.2f}, CPU {exponent(rows, 'cpu'):.2f}")
+        heads = "lines, unknowns, set-up [s], CPU [s]"
+        print(f"{mesh}, statics: {heads}, of one SuperLU, factorizations, gap/|Pi|, by, peak")
+        table("statics", mesh, sizes, library, told_statics)
+        print(f"{mesh}, explicit: {heads}, steps, ns per element and step, peak")
+        table("explicit", mesh, sizes, library, told_explicit)
+
+
+def table(kind, mesh, sizes, library, told):
+    """Print a row of each size, as far as this machine takes it, and exponents."""
+    rows = []
+    for n in sizes:
+        if (row := alone(kind, mesh, n, library)) is None:
+            break
+        rows.append(row)
+        start = f"{row['lines']:9d}{row['unknowns']:9d}{row['build']:8.2f}{row['cpu']:9.2f}"
+        print(f"{start}{told(row)}{row['peak']:7.2f} GB", flush=True)
+    print(f"exponents: set-up {exponent(rows, 'build'):.2f}, CPU {exponent(rows, 'cpu'):.2f}")
+
+
+def told_statics(row):
+    """What a row of statics tells beside size, time and memory."""
+    unit = f"{row['cpu'] / row['unit']:6.1f}" if row["unit"] else "     -"
+    return f"{unit}{row['count']:5d}{row['gap']:9.0e}  {row['by']}"
+
+
+def told_explicit(row):
+    """What a row of explicit steps tells beside size, time and memory."""
+    return f"{row['steps']:6d}{row['each']:8.1f}"
 
 
 if __name__ == "__main__":
