@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .effects.link import Link as Link
     from .effects.load import Load as Load
     from .effects.motion import Motion as Motion
+    from .effects.orbit import Orbit as Orbit
     from .effects.point_mass import PointMass as PointMass
     from .effects.pressure import Pressure as Pressure
     from .effects.reel import Reel as Reel

@@ -154,6 +154,8 @@ def _acting(effects):
     acting, count = [], {}
     for name, effect in sorted(zip(names, effects, strict=True), key=lambda one: tables.index(one[0])):
         count[name] = count.get(name, 0) + 1
+        for other in (other for other in effect.excludes if other in names):
+            raise InputError(f"[{name}] has what [{other}] would bring: leave out one of them")
         if not effect.several and count[name] > 1:
             raise InputError(f"[{name}] is listed {count[name]} times: a scene has one")
         acting.append(_Placed(f"[[{name}]] {count[name]}" if effect.several else f"[{name}]", effect))

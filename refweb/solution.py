@@ -152,8 +152,8 @@ class Solution(SolutionData):
         ----------
         what : {"history", "results"}
             The history by time or load step, a column for each quantity; or the results by name, with the columns
-            ``value``, ``error``, ``unit``, ``time``, ``at`` and ``where``. Of a run that looked for them ``smoothing``
-            and ``discretisation`` follow.
+            ``value``, ``error``, ``unit``, ``time``, ``at`` and ``where``. Of a run that has them ``smoothing``,
+            ``discretisation`` and ``neglected`` follow.
 
         Returns
         -------

@@ -346,10 +346,12 @@ class Table:
     """Base of all tables: checks its fields when made, and reads itself from a dict.
 
     Subclasses have `table` above them and fields made by the functions above. ``check`` may refuse combinations of
-    values; ``several`` says whether a scene may have more than one, ``[[load]]``.
+    values; ``several`` says whether a scene may have more than one, ``[[load]]``, and ``excludes`` names tables that it
+    does not stand beside.
     """
 
     several = False
+    excludes = ()
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __post_init__(self):

@@ -45,6 +45,7 @@ MIRRORS = {
     "effects/elasticity": "net/test_elements.py test_contract.py",
     "effects/temperature": "effects/test_temperature.py",
     "effects/outer_load": "test_contract.py",
+    "effects/turning_axes": "test_contract.py effects/test_frame.py effects/test_orbit.py",
     "effects": "test_contract.py effects/test_{}.py",
     "system/links": "dynamics/integrators/test_ida.py",
     "system": "system/test_system.py test_contract.py dynamics/integrators/test_cvode.py",
@@ -184,7 +185,9 @@ MUTANTS = [
     Mutant(
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
     ),
-    Mutant("effects/frame", "to, m = cells[c, a], 2.0 * data", "to, m = cells[c, a], -2.0 * data"),
+    Mutant("effects/turning_axes", "to, m = cells[c, a], 2.0 * data", "to, m = cells[c, a], -2.0 * data"),
+    Mutant("effects/turning_axes", "2.0 * data[c, at], 2.0 * data[c, at + 1]", "data[c, at], 2.0 * data[c, at + 1]"),
+    Mutant("effects/orbit", "np.diag([3.0, 0.0, -1.0])", "np.diag([2.0, 0.0, -1.0])"),
     Mutant("effects/pressure", "d0 += couple * x[other, 0]", "d0 -= couple * x[other, 0]"),
     Mutant(
         "effects/outer_load",
@@ -289,8 +292,8 @@ MUTANTS = [
     Mutant("dynamics/history", 'scales["stress"] = 0, 1.0 / net.area', 'scales["stress"] = 0, net.area'),
     Mutant(
         "dynamics/history",
-        "float(extremes.values[at]), float(extremes.times[at])",
-        "float(extremes.values[at]), course.time",
+        "float(extremes.values[slot]), float(extremes.times[slot])",
+        "float(extremes.values[slot]), course.time",
     ),
     Mutant("dynamics/schedule", "if duration - times[-1] > 1e-9 * interval:", "if duration - times[-1] > interval:"),
     Mutant("dynamics/initial_state", "positions - displacements + x, x", "positions + x, x"),

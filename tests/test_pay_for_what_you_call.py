@@ -87,6 +87,7 @@ BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", 
 VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
 BELOW["contact"] |= VECTORS
+BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
 BELOW |= {"bending": VECTORS}
 GENERAL = {"effects.contact.places", "net.grown_core"}
 """What effects are made of besides their own file."""
@@ -147,7 +148,7 @@ def called(given):
         modules.add("statics.remarks")
         if method != "relaxation":
             modules |= NEWTON
-        if "frame" in given:
+        if {"frame", "orbit"} & given.keys():
             modules |= TANGENT | {"statics.critical_speed"}
         elif tension_only:
             modules |= TANGENT | {"statics.duality_bound", "statics.floating"}
@@ -231,6 +232,7 @@ TABLES = {
     "contact": {"stiffness": 1e4},
     "link": {"nodes": [5, 6]},
     "frame": {"angular_velocity": [0.0, 0.0, 1.0]},
+    "orbit": {"mean_motion": 1.0},
     "pressure": {"lines": [0, 1], "normal": [0.0, 0.0, 1.0], "value": 1.0},
     "thrust": {"node": 4, "line": 0, "force": 1.0},
     "damping": {"time": 1e-4},
@@ -247,6 +249,7 @@ KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
 KERNELS["contact"] = {**FAMILY, "near": 1}
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
+KERNELS["orbit"] = KERNELS["frame"]
 KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
 KERNELS |= {name: {} for name in ("point_mass", "velocity", "body")}
 """Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
@@ -305,13 +308,20 @@ def expected(*effects):
         rows += 1
     if "contact" in effects:
         pairs = pairs + [(node, rows - 1) for node in range(rows - 1)]
-    if "frame" in effects:  # the axes of a row with each other
+    if {"frame", "orbit"} & set(effects):  # the axes of a row with each other
         pairs = pairs + [(row, row) for row in range(rows)]
     return coupled(pairs, held, rows)
 
 
 def test_every_effect_is_here():
     assert TABLES.keys() == EFFECTS.keys() == KERNELS.keys() | {"link"}
+
+
+def all_but(name):
+    """All effects but one: contact and its body are one, and an orbit stands only without what it excludes."""
+    excluded = load(EFFECTS["orbit"]).excludes
+    absent = {name, "contact" if name == "body" else name, *(excluded if name in excluded else ["orbit"])}
+    return [other for other in EFFECTS if other not in absent]
 
 
 @pytest.mark.parametrize("name", [None, *EFFECTS])
@@ -322,8 +332,7 @@ def test_entries_with_an_effect_alone(name):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_entries_without_an_effect(name):
-    """Of all effects but one: contact and its body are one."""
-    rest = [other for other in EFFECTS if other != name and not (name == "body" and other == "contact")]
+    rest = all_but(name)
     assert entries(*rest) == expected(*rest)
 
 
@@ -377,5 +386,5 @@ def test_kernels_of_friction(handed, monkeypatch):
 
 @pytest.mark.parametrize("name", KERNELS)
 def test_kernels_without_an_effect(handed, name):
-    rest = [other for other in KERNELS if other != name and not (name == "body" and other == "contact")]
+    rest = [other for other in all_but(name) if other in KERNELS]
     assert handed(*rest) == summed(*rest)

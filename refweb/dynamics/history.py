@@ -41,6 +41,9 @@ def _probes_of_warnings(system, followed):
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
     }
+    if system.orbit_radius is not None:
+        places = system.net.points[: system.rows - system.net.spins].copy()
+        found["distance"] = probes.Probe(probes.displacement, [probes.MAGNITUDE, 0, len(places)], places, 1.0)
     if system.contact:
         from ..results.observables.overlap import probe_of
 
@@ -169,18 +172,26 @@ class Watch:
     def results(self, course, last):
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
         results, extremes, unfilled = {}, course.extremes, self.unfilled(course)
+        neglected = self._neglected(course)
         state = State(self.system, course.time, course.x, course.v)
         for i, o in enumerate(self._observables):
             value, when, where = float(last[1 + i]), course.time, None
-            at = self._slot(o)
-            if at is not None and o.reduce != "final":
+            slot = self._slot(o)
+            if slot is not None and o.reduce != "final":
                 if o.name not in unfilled:
-                    value, when = float(extremes.values[at]), float(extremes.times[at])
+                    value, when = float(extremes.values[slot]), float(extremes.times[slot])
             if o in self._probed and o.average is None:
                 final = o.reduce == "final"
-                where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[at]))
-            results[o.name] = Result(value, None, o.unit, when, where, at=None if where is None else o.observable.at)
+                where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[slot]))
+            at = None if where is None else o.observable.at
+            left_out = None if neglected is None else abs(value) * neglected
+            results[o.name] = Result(value, None, o.unit, when, where, neglected=left_out, at=at)
         return results
+
+    def _neglected(self, course):
+        """Largest distance from the origin of an orbit over its radius [1], None without one."""
+        at = self._of_warning("distance")
+        return None if at is None else float(course.extremes.values[at]) / self.system.orbit_radius
 
     def unfilled(self, course):
         """Names of the observables whose largest or smallest mean is that of no full window: the run ended before."""

@@ -83,6 +83,8 @@ class Family:
         Whether it is contact with bodies.
     angular_velocity : sequence of 3 float, optional
         That of the frame [rad/s], where the forces are those of inertia in a frame that turns.
+    orbit_radius : float, optional
+        Radius of the orbit [m], where forces are linear in distances from its origin that are small against it.
     damping : kernel, optional
         −∂f/∂v by cell; None where the force does not depend on velocity.
     damping_bound : kernel, optional
@@ -121,6 +123,7 @@ class Family:
     lines: bool = False
     contact: bool = False
     angular_velocity: tuple | None = None
+    orbit_radius: float | None = None
     damping: Callable | None = None
     damping_bound: Callable | None = None
     near: Callable | None = None

@@ -12,7 +12,7 @@ from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, dot, label, leg
 from .shown import unit_of
 
 AXES = "xyz"
-FLOATING = ("potential_energy", "frame_energy")
+FLOATING = ("potential_energy", "frame_energy", "orbit_energy")
 """Energies that have no zero of their own."""
 HATCHES = ("", "//", "..", "\\\\", "xx", "--", "++", "oo")
 SMALL = 1e-3

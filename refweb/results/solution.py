@@ -19,7 +19,7 @@ SOLVER = dict.fromkeys(
 """What a solver reports; None for what it does not know."""
 
 
-OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "elements leave"}
+OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "elements leave", "neglected": "orbit neglects"}
 """Errors of a result besides ± of the scene as it stands, and the words before them."""
 
 
@@ -35,9 +35,9 @@ class Result(NamedTuple):
 
     ``error`` is that of the solution of the scene as it stands. In statics ``smoothing`` is how far a smooth law's η
     moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
-    elements; None where it was not looked for. ``interval`` are the least and the largest value in all equilibria,
-    where parts of the web float; an end that nothing holds is infinite. ``at`` says what ``where`` is the number of,
-    "node" or "line".
+    elements; in an orbit ``neglected`` is what its equations leave out, see `refweb.Orbit`; None where there is
+    none. ``interval`` are the least and the largest value in all equilibria, where parts of the web float; an end that
+    nothing holds is infinite. ``at`` says what ``where`` is the number of, "node" or "line".
     """
 
     value: float
@@ -47,6 +47,7 @@ class Result(NamedTuple):
     where: int | None
     smoothing: float | None = None
     discretisation: float | None = None
+    neglected: float | None = None
     interval: tuple[float, float] | None = None
     at: str | None = None
 

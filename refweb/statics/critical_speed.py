@@ -6,8 +6,9 @@ at which their sum is not positive definite,
 
     A y = Ω² C y,      A of unit tensions EA/L,   C of masses across the axis,
 
-is a sharp limit. Below it the whole potential has a least value, above it none. And as no law here has dσ/dε > E or
-T/l > EA/L, no tangent of the lines exceeds A: at and above the limit no equilibrium is stable, wherever it may be.
+is a sharp limit, also in an orbit, where Ω² C are masses times the G of `refweb.effects.orbit`. Below it the whole
+potential has a least value, above it none. And as no law here has dσ/dε > E or T/l > EA/L, no tangent of the lines
+exceeds A: at and above the limit no equilibrium is stable, wherever it may be.
 
 Counts of negative pivots (Sylvester's law of inertia) compare A with Ω²C. A part of the net that nothing holds across
 the axis is an exception in its translations alone, which A does not resist: such a part moves on in a straight line, as
@@ -61,8 +62,12 @@ def check_speed(system, t):
     while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
-    (speed,) = {np.linalg.norm(family.angular_velocity) for family in system.rotating}
+    family = system.rotating[0]
+    speed, key = (
+        np.linalg.norm(family.angular_velocity),
+        "angular_velocity" if family.name == "frame" else "mean_motion",
+    )
     raise SolverError(
-        f"no equilibrium: [frame] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
-        "centrifugal forces outgrow any tension: lower angular_velocity or the masses, or raise modulus × area"
+        f"no equilibrium: [{family.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
+        f"centrifugal forces outgrow any tension: lower {key} or the masses, or raise modulus × area"
     )

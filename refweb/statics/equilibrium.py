@@ -82,7 +82,9 @@ def check_supported(system, t):
             first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
             remedy = "support one of them"
             if system.rotating:
-                remedy += ", or move the web so that its centre of mass is on the axis of [frame]"
+                kind = system.rotating[0].name
+                balanced = {"frame": "the axis", "orbit": "the y axis"}[kind]
+                remedy += f", or move the web so that its centre of mass is on {balanced} of [{kind}]"
             raise SolverError(
                 f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
                 f"{resultant:.4g} N at step {t:g}, with no support in that direction: {remedy}"

@@ -117,12 +117,17 @@ class Simulation:
         values = [o.value(state) for o in observables]
         errors = [o.error(state, found) for o in observables]
         smoothed = [None] * len(values)
+        share = None
+        if (radius := self.system.orbit_radius) is not None:
+            places = state.position[: self.system.rows - self.system.net.spins]
+            share = float(np.linalg.norm(places, axis=1).max()) / radius
         if smoothing is not None:
             smoothed = smoothing.errors(found, [value.value for value in values])
         return {
             o.name: Result(
                 *(value.value, error, o.unit, found.step, value.where, moved),
                 interval=o.interval(state, found),
+                neglected=None if share is None else abs(value.value) * share,
                 at=None if value.where is None else o.observable.at,
             )
             for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)

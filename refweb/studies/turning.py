@@ -163,7 +163,7 @@ def turning_pairs(pencil, G, number, least):
         return _definite(gyroscopic, min(number, len(pencil.massive)), least)
     if len(pencil.massive) > MOST:
         raise SolverError(
-            f"no modes at step {pencil.t:g}: in [frame] nothing but Coriolis forces holds some directions of a net of "
+            f"no modes at step {pencil.t:g}: nothing but Coriolis forces holds some directions of a net of "
             f"{len(pencil.massive)} unknowns with mass, which is more than {MOST}, and none could be said to be "
             "missed: support nodes, or divide lines less"
         )

@@ -360,6 +360,11 @@ class System:
         """Families of the forces of inertia in a frame that turns, none where none does."""
         return [family for family in self.families if family.angular_velocity is not None]
 
+    @property
+    def orbit_radius(self):
+        """Radius of the orbit that the web is in [m], None where it is in none."""
+        return next((f.orbit_radius for f in self.families if f.orbit_radius is not None), None)
+
     def damping(self, t, x, v):
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity."""
         if not any(f.damping is not None for f in self.families):

@@ -87,13 +87,17 @@ def test_both_faces_agree(name):
             assert value[1] == where, observe
 
 
+UNKNOWN = ("kinetic_energy", "dissipated_energy", "frame_energy", "orbit_energy")
+"""Energies that a state of these scenes does not know."""
+
+
 @pytest.mark.parametrize("name", [name for name in BOOKED if name.endswith("_energy")])
 def test_weights_make_the_energy_of_a_state_at_rest(name):
     for state in STATES[:-1]:
         system = state.system
         energies = [0.0 if f.energy is None else system.energy_of(f, 0.0, state.x).sum() for f in system.families]
         (observe,) = tables(name)
-        unknown = name in ("kinetic_energy", "dissipated_energy", "frame_energy")  # to a state of this scene
+        unknown = name in UNKNOWN
         expected = 0.0 if unknown else observe.value(state).value
         found = observe.observable.weights(system) @ [*energies, 0.0, 5.0, 7.0]
         np.testing.assert_allclose(found, expected, rtol=1e-14)

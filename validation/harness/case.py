@@ -67,6 +67,7 @@ CASES = {
         "mass_on_arms",
         "falling_chain",
         "spinning_arm",
+        "orbit",
         "frequencies",
         "free_net",
     ),

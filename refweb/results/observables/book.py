@@ -84,6 +84,12 @@ class FrameEnergy(Booked):
     needs = "[frame]"
 
 
+class OrbitEnergy(Booked):
+    """Of place in an orbit."""
+
+    needs = "[orbit]"
+
+
 class DissipatedEnergy(Booked):
     """What damping and friction have taken."""
 

@@ -1,0 +1,85 @@
+"""An orbit: what masses feel about a point that goes round the Earth in a circle.
+
+In axes that go with this point, the origin, x away from the Earth, y along the track and z along the angular velocity
+n of the orbit, masses move by the equations of Clohessy and Wiltshire,
+
+    ẍ = 3n²x + 2nẏ,      ÿ = −2nẋ,      z̈ = −n²z,
+
+gravity less its value at the origin, to first order in r over the orbit's radius R, and the forces of inertia of the
+axes. With G = n² diag(3, 0, −1) `refweb.effects.turning_axes` has the kernels. Kinetic energy, −½ m n² (3x² − z²) and
+the energies of all other effects keep their sum, the Jacobi integral.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..tables import Table, real, table
+from .turning_axes import families
+
+GRAVITATION = 3.986004418e14
+"""Gravitational parameter of the Earth [m³/s²], IERS Conventions (2010), table 1.1."""
+EARTH = 6378136.6
+"""Equatorial radius of the Earth [m], of the same table."""
+
+
+@table
+class Orbit(Table):
+    """A circular orbit of the Earth; everything else in the scene is given in axes that go round with it.
+
+    The origin of the scene goes round; x points away from the Earth, y along the track, z along the angular velocity.
+    Velocities are relative to these axes: what keeps its place in them has the velocity 0, and a web that does not turn
+    as seen from the stars has the spin −n about z. Spheres whose rotation is followed turn by the same rule.
+
+    Each result says beside ± what the equations neglect: its size times the largest distance from the origin over the
+    radius of the orbit, by which gravity differs from what is linear in the distance. That is an order of magnitude. A
+    place along the track may come to differ by more, as differences of periods add up.
+
+    Parameters
+    ----------
+    mean_motion : float, optional
+        n [rad/s], 2π over the period.
+    altitude : float, optional
+        Height above the equator [m], in place of ``mean_motion``.
+
+    Raises
+    ------
+    InputError
+        For a number out of bounds, or where not exactly one is given; and beside ``[frame]`` or ``[gravity]``, which
+        it has itself.
+
+    References
+    ----------
+    W. H. Clohessy, R. S. Wiltshire, "Terminal guidance system for satellite rendezvous", J. Aerosp. Sci. 27 (1960)
+    653–658, doi:10.2514/8.8704.
+
+    Examples
+    --------
+        [orbit]
+        mean_motion = 1.1e-3
+    """
+
+    excludes = ("frame", "gravity")
+
+    mean_motion: float | None = real(default=None, above=0, unit="rad/s")
+    altitude: float | None = real(default=None, at_least=0, unit="m")
+
+    def check(self):
+        """Refuse an orbit that is not given, or twice."""
+        if (self.mean_motion is None) == (self.altitude is None):
+            given = "both are given" if self.altitude is not None else "none is"
+            raise InputError(f"give mean_motion [rad/s] or altitude [m]: {given}")
+
+    @property
+    def radius(self):
+        """R [m], of an orbit of the Earth."""
+        if self.mean_motion is None:
+            return EARTH + (self.altitude or 0.0)
+        return float(np.cbrt(GRAVITATION / self.mean_motion) / np.cbrt(self.mean_motion))
+
+    def on(self, net):
+        """The families of all rows with mass."""
+        n = np.sqrt(GRAVITATION / self.radius) / self.radius if self.mean_motion is None else self.mean_motion
+        pull = n**2 * np.diag([3.0, 0.0, -1.0])
+        return families(net, (0.0, 0.0, float(n)), pull, name="orbit", book="orbit_energy", orbit_radius=self.radius)

@@ -1,0 +1,194 @@
+"""Forces in axes that turn steadily about the origin: linear in the place of a mass, and Coriolis forces.
+
+With the angular velocity Ω of the axes, a symmetric matrix G [1/s²] and consistent or lumped masses M every row feels
+
+    M G r − 2 M Ω × v,      with the potential −½ r·M G r of the first part.
+
+Coriolis forces do no work: kinetic energy and potentials, this one among them, keep their sum, the Jacobi integral. The
+moment of inertia I of a sphere whose rotation is followed feels −I Ω × ω, ω its angular velocity in these axes; a ring
+keeps its plane in these axes and turns about its normal, which that does not change.
+
+Consistent mass couples the nodes of an element here as it does in M v': the force is that of the position between them.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from .base import Family, column
+
+STIFFEST, MASS = 9, 10
+"""Columns of data of the first part, behind G: the largest eigenvalue of −G, at least 0; the mass matrix of the cell,
+behind which stand the positions of its nodes in the web."""
+TURNED = 3
+"""First column of a cell's mass matrix behind Ω, of the Coriolis force."""
+
+
+@functools.cache
+def kernels_of_place(nodes):
+    """Force, energy, stiffness and bound of M G r.
+
+    Parameters
+    ----------
+    nodes : int
+        Nodes per cell, which its mass matrix couples.
+    """
+    rest = MASS + nodes * nodes
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            for b in range(nodes):
+                row, at = cells[c, b], rest + 3 * b
+                p0, p1, p2 = data[c, at] + x[row, 0], data[c, at + 1] + x[row, 1], data[c, at + 2] + x[row, 2]
+                for a in range(nodes):
+                    to, m = cells[c, a], data[c, MASS + nodes * a + b]
+                    for i in range(3):
+                        f[to, i] += m * (data[c, 3 * i] * p0 + data[c, 3 * i + 1] * p1 + data[c, 3 * i + 2] * p2)
+
+    @kernel(ENERGY)
+    def energy(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            out[c] = 0.0
+            for b in range(nodes):
+                row, at = cells[c, b], rest + 3 * b
+                p0, p1, p2 = 2.0 * data[c, at], 2.0 * data[c, at + 1], 2.0 * data[c, at + 2]
+                p0, p1, p2 = p0 + x[row, 0], p1 + x[row, 1], p2 + x[row, 2]
+                for a in range(nodes):
+                    to, m = cells[c, a], data[c, MASS + nodes * a + b]
+                    for i in range(3):
+                        pull = data[c, 3 * i] * p0 + data[c, 3 * i + 1] * p1 + data[c, 3 * i + 2] * p2
+                        out[c] -= 0.5 * m * x[to, i] * pull
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            for a in range(nodes if not definite else 0):
+                for b in range(nodes):
+                    m = data[c, MASS + nodes * a + b]
+                    for i in range(3):
+                        for j in range(3):
+                            blocks[c, 3 * a + i, 3 * b + j] -= m * data[c, 3 * i + j]
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        for c in range(cells.shape[0]):
+            for a in range(nodes):
+                for b in range(nodes):
+                    rates[cells[c, a]] += data[c, STIFFEST] * abs(data[c, MASS + nodes * a + b])
+
+    return force, energy, stiffness, bound
+
+
+@kernel()
+def turned(data, c, a0, a1, a2):
+    """Ω × a."""
+    w0, w1, w2 = data[c, 0], data[c, 1], data[c, 2]
+    return w1 * a2 - w2 * a1, w2 * a0 - w0 * a2, w0 * a1 - w1 * a0
+
+
+@functools.cache
+def kernels_of_velocity(nodes):
+    """Force, damping and its bound of the Coriolis force, of cells of so many nodes."""
+
+    @kernel(FORCE)
+    def coriolis(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            for b in range(nodes):
+                row = cells[c, b]
+                q0, q1, q2 = turned(data, c, v[row, 0], v[row, 1], v[row, 2])
+                for a in range(nodes):
+                    to, m = cells[c, a], 2.0 * data[c, TURNED + nodes * a + b]
+                    f[to, 0] -= m * q0
+                    f[to, 1] -= m * q1
+                    f[to, 2] -= m * q2
+
+    @kernel(STIFFNESS)
+    def damping(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            for a in range(nodes if not definite else 0):
+                for b in range(nodes):
+                    m = 2.0 * data[c, TURNED + nodes * a + b]
+                    for i in range(3):
+                        j, k = (i + 1) % 3, (i + 2) % 3
+                        blocks[c, 3 * a + j, 3 * b + k] -= m * data[c, i]
+                        blocks[c, 3 * a + k, 3 * b + j] += m * data[c, i]
+
+    @kernel(BOUND)
+    def damping_bound(reach, speed, x, mass, rates, cells, data):
+        for c in range(cells.shape[0]):
+            most = math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))  # of row sums of Ω ×
+            for a in range(nodes):
+                for b in range(nodes):
+                    rates[cells[c, a]] += 2.0 * most * abs(data[c, TURNED + nodes * a + b])
+
+    return coriolis, damping, damping_bound
+
+
+def families(net, speed, pull, **own):
+    """The families of all rows with mass; where mass is consistent those of the lines as well.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        What they act on.
+    speed : sequence of 3 float
+        Ω [rad/s].
+    pull : array_like, shape (3, 3)
+        G [1/s²].
+    **own
+        ``name`` and ``book`` of the families, and what else they have.
+    """
+    heavy = net.heavy
+    spins = np.array([b.spin for b in net.bodies if b.spin is not None and not b.shape.planar], int)
+    masses = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
+    found = [
+        _of_place(column(heavy), net.mass[heavy], net.points[heavy], pull, speed, own),
+        _of_velocity(column(np.concatenate([heavy, spins])), masses, speed, own),
+    ]
+    if (coupled := net.consistent_minus_lumped) is not None:
+        found.append(_of_place(net.cells, coupled, net.points[net.cells], pull, speed, own))
+        found.append(_of_velocity(net.cells, coupled, speed, own))
+    return found
+
+
+def _numbers(head, *parts):
+    """Rows that begin with the same numbers, each part flat behind them."""
+    flat = [np.reshape(part, (len(part), int(np.prod(np.shape(part)[1:])))) for part in parts]
+    return np.ascontiguousarray(np.hstack([np.tile(head, (len(parts[0]), 1)), *flat]))
+
+
+def _of_place(cells, mass, points, pull, speed, own):
+    stiffest = max(-float(np.linalg.eigvalsh(pull)[0]), 0.0)
+    force, energy, stiffness, bound = kernels_of_place(cells.shape[1])
+    return Family(
+        cells=cells,
+        data=_numbers([*np.ravel(pull), stiffest], mass, points),
+        force=force,
+        energy=energy,
+        stiffness=stiffness,
+        bound=bound if stiffest else None,  # what only lowers frequencies makes no step shorter
+        angular_velocity=tuple(speed),
+        **own,
+    )
+
+
+def _of_velocity(cells, mass, speed, own):
+    force, damping, damping_bound = kernels_of_velocity(cells.shape[1])
+    return Family(
+        cells=cells,
+        data=_numbers(speed, mass),
+        force=force,
+        damping=damping,
+        damping_bound=damping_bound,
+        symmetric=False,
+        at_rest=False,
+        angular_velocity=tuple(speed),
+        **own,
+    )
