@@ -34,10 +34,15 @@ Machine code is kept on disk, in a folder named by the content of all sources wi
 the file a function stands in, and would go on using a kernel whose law, in another file, has changed. It also finds the
 machine code of kernels in typed lists by name: kernels of one factory, which differ in the numbers and the kernels that
 they capture, are named after these, a captured kernel by its name and the content of its file.
+
+Of several processes that want the same kernel one compiles it, and the others wait and read what it has written; on
+Windows, where there are no such locks, each compiles it. Without them it is not only slower: numba numbers the machine
+code of a function by what stands there already, and two that write at once may put different code under one number.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
@@ -50,8 +55,14 @@ import numba.typed
 from numba import types
 from numba.core import config
 from numba.core.caching import FunctionCache
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 from numba.core.typing.templates import Signature
+
+try:
+    import fcntl
+except ImportError:  # not on Windows
+    fcntl = None
 
 # Kernels in typed lists are numba's first-class functions, which it calls experimental at every compilation.
 warnings.filterwarnings("ignore", message="First-class function type feature is experimental")
@@ -120,6 +131,30 @@ class _CacheOfBodies(_CacheByName):
         return *super()._index_key(signature, codegen), "body"
 
 
+@contextlib.contextmanager
+def _alone(function):
+    """Keep other threads and processes from compiling a function."""
+    with global_compiler_lock, contextlib.ExitStack() as stack:  # threads wait for each other inside of the first
+        if fcntl is not None and _folder:
+            with contextlib.suppress(OSError):
+                os.makedirs(_folder, exist_ok=True)
+                name = hashlib.sha256(f"{function.__module__}.{function.__qualname__}".encode()).hexdigest()[:16]
+                fcntl.flock(stack.enter_context(open(f"{_folder}/{name}.lock", "w")), fcntl.LOCK_EX)
+        yield
+
+
+def _compiled_once(dispatcher):
+    """A dispatcher that compiles `_alone`."""
+    compile_one = dispatcher.compile
+
+    def compile_alone(signature):
+        with _alone(dispatcher.py_func):
+            return compile_one(signature)
+
+    dispatcher.compile = compile_alone
+    return dispatcher
+
+
 def _with_signature(function, signature, options):
     dispatcher = _with_entry(function, options)
     dispatcher.compile(signature)
@@ -133,14 +168,14 @@ def _with_entry(function, options):
         dispatcher._cache = _CacheByName(function)
     else:
         dispatcher.enable_caching()
-    return dispatcher
+    return _compiled_once(dispatcher)
 
 
 def _body(function, options):
     bare = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     dispatcher: Any = numba.njit(**bare)(function)
     dispatcher._cache = _CacheOfBodies(function)
-    return dispatcher
+    return _compiled_once(dispatcher)
 
 
 def _with_body(function, options):

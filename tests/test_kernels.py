@@ -129,3 +129,35 @@ def test_a_warm_process_compiles_nothing():
     for _ in range(2):
         told = subprocess.run([sys.executable, "-c", WARM], capture_output=True, text=True, check=True).stdout
     assert json.loads(told) == [0.0, 0.0, 0.0, 0.0, 0]
+
+
+WANTED = """
+import sys, time
+import numpy as np
+from refweb.kernels import VECTOR, kernel
+from numba import types
+
+open(sys.argv[1] + ".ready", "w").close()
+while not open("go").read():
+    time.sleep(0.001)
+
+@kernel(types.void(VECTOR))
+def wanted(values):
+    for i in range(len(values)):
+        values[i] = 2.0 * values[i]
+
+print(sum(wanted.stats.cache_misses.values()))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks there")
+def test_of_processes_that_want_a_kernel_at_once_one_compiles_it(tmp_path):
+    (tmp_path / "wanted.py").write_text(WANTED)
+    (tmp_path / "go").touch()
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    begun = {"cwd": tmp_path, "env": environment, "stdout": subprocess.PIPE, "text": True}
+    both = [subprocess.Popen([sys.executable, "wanted.py", name], **begun) for name in "ab"]
+    while not all((tmp_path / f"{name}.ready").exists() for name in "ab"):
+        assert all(process.poll() is None for process in both)
+    (tmp_path / "go").write_text("go")
+    assert sorted(process.communicate()[0] for process in both) == ["0\n", "1\n"]

@@ -97,12 +97,10 @@ def _told(job, error):
 
 @functools.cache
 def _settle():
-    """Make a process one of many: kernels are compiled by one of them at a time, and twins have no thread."""
+    """Make a process one of many: twins have no thread."""
     from ..dynamics import twin_error
-    from .compiling import one_at_a_time
 
     warnings.simplefilter("ignore", RuntimeWarning)  # overflow: what it leads to is found and named
-    one_at_a_time()
     twin_error.THREADS = False
 
 
