@@ -247,15 +247,16 @@ def nodes(default=MISSING, *, empty=False, what="node") -> Any:
     return field(read, default=default)
 
 
-def component(default=MISSING) -> Any:
+def component(default=MISSING, *, axes="xyz") -> Any:
     """An axis: 0, 1, 2 or "x", "y", "z"; read as 0, 1 or 2."""
+    known = [*range(len(axes)), *axes]
 
-    @accepts({"type": ["integer", "string"], "enum": [0, 1, 2, "x", "y", "z"]})
+    @accepts({"type": ["integer", "string"], "enum": known})
     def read(name, value):
-        if isinstance(value, str) and value in ("x", "y", "z"):
-            return "xyz".index(value)
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or not 0 <= int(value) <= 2:
-            _refuse(name, value, 'one of 0, 1, 2, "x", "y", "z"')
+        if isinstance(value, str) and value in known:
+            return axes.index(value)
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or int(value) not in known:
+            _refuse(name, value, "one of " + ", ".join(map(shown, known)))
         return int(value)
 
     return field(read, default=default)

@@ -35,11 +35,15 @@ MIRRORS = {
     "net/elements": "net/test_elements.py system/test_orders.py",
     "net/cable": "net/test_elements.py test_scene.py",
     "net/tension_laws": "net/test_laws.py net/test_elements.py",
-    "net/rigid_body": "effects/test_contact.py test_contract.py",
+    "net/rigid_body": "effects/test_contact.py test_contract.py effects/test_tumbling.py",
+    "net/rotation": "net/test_rotation.py effects/test_tumbling.py",
+    "net/solid": "net/test_rotation.py",
+    "effects/contact/tumbling": "effects/test_tumbling.py",
     "net/shapes": "effects/test_contact.py",
     "net/grown_core": "effects/test_deep_contact.py",
     "effects/contact/overlap": "effects/test_overlap.py",
     "effects/contact/rubbing": "effects/test_rubbing.py effects/test_contact.py",
+    "effects/contact/pair": "effects/test_tumbling.py test_contract.py",
     "effects/contact": "test_contract.py effects/test_contact.py effects/test_overlap.py effects/test_deep_contact.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
     "effects/elasticity": "net/test_elements.py test_contract.py",
@@ -226,7 +230,14 @@ MUTANTS = [
     Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     Mutant("effects/contact/rubbing", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),
     Mutant("effects/contact/rubbing", "p, normal = 0.0, touches[n, PUSH]", "p, normal = 0.0, 2.0 * touches[n, PUSH]"),
-    Mutant("effects/contact/rubbing", "lever = cross(axis, y)", "lever = cross(y, axis)"),
+    Mutant("net/rotation", "share = h / (m + 1.0)", "share = h / (m + 2.0)"),
+    Mutant("net/rotation", "q1 += a * u0 + c * u2 - d * u1", "q1 += a * u0 - c * u2 + d * u1"),
+    Mutant("net/solid", "c * c * ball + 2.0 * c * first + second", "c * c * ball + c * first + second"),
+    Mutant(
+        "effects/contact/tumbling", "add_cross(block, at, at, moment, 1.0)", "add_cross(block, at, at, moment, -1.0)"
+    ),
+    Mutant("effects/contact/pair", "across = np.sqrt((reach**2).sum() - reach**2)", "across = 0.3 * reach"),
+    Mutant("effects/contact/rubbing", "arm = cross(axis, y)", "arm = cross(y, axis)"),
     # Systems and links
     Mutant(
         "system/links",

@@ -68,7 +68,7 @@ NEWTON |= {"system.conjugate_gradients"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book")}
-DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")}
+DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
 LOOP = ("central_difference", "explicit_loop", "between_steps", "nearby", "records", "step", "step_bound")
 EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP}
 AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
@@ -86,10 +86,10 @@ BELOW |= {"motion": TABLES_OF_TIME}
 BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
 VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
-BELOW["contact"] |= VECTORS
+BELOW["contact"] |= VECTORS | {"net.rotation"}
 BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
 BELOW |= {"bending": VECTORS}
-GENERAL = {"effects.contact.places", "net.grown_core"}
+GENERAL = {"effects.contact.places", "effects.contact.tumbling", "net.grown_core"}
 """What effects are made of besides their own file."""
 OBSERVED = {"reaction": {"results.observables.nodal"}}
 """What observables are made of besides their own file."""

@@ -6,11 +6,29 @@ from dataclasses import MISSING, dataclass, fields, replace
 
 import numpy as np
 
+from ..accepted import accepts, any_of, array, limits
 from ..errors import InputError
 from ..messages import shown
-from ..net.rigid_body import RigidBody, Shape
+from ..net.rigid_body import RigidBody, Shape, matrix_of
 from ..registry import SHAPES, load
-from ..tables import Several, Table, boolean, choice, field, real, refuse_keys, text, vector
+from ..tables import (
+    LARGEST,
+    Several,
+    Table,
+    boolean,
+    checked,
+    choice,
+    field,
+    numbers_list,
+    real,
+    refuse_keys,
+    rows,
+    text,
+    vector,
+)
+
+EVEN = 1e-9
+"""Share by which moments of inertia may miss what they have to satisfy: the last digits of a CAD program."""
 
 
 def _keys(shape):
@@ -22,13 +40,54 @@ def _given(name, value):
     return value
 
 
+_number = limits("number", at_least=-LARGEST, at_most=LARGEST)
+_moment = real(above=0, unit="kg m²")
+
+
+@accepts(any_of(_moment.metadata["read"].accepts, array(_number, 3, 3), array(array(_number, 3, 3), 3, 3)))
+def _inertia(name, value):
+    """Read a moment of inertia, three of them, or a symmetric tensor; as a number, or as three rows."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if not isinstance(value, (list, tuple)):
+        return checked(name, value, _moment)
+    if len(value) != 3:
+        raise InputError(f"{name} = {shown(value)} must be a number, three, or 3 rows of 3 [kg m²]")
+    if not isinstance(value[0], (list, tuple)):
+        tensor = np.diag(checked(name, value, numbers_list()))
+    else:
+        tensor = np.array(checked(name, value, rows(3)))
+    if not np.abs(tensor - tensor.T).max() <= EVEN * np.abs(tensor).max():
+        raise InputError(f"{name} = {shown(value)} must be symmetric")
+    least, middle, most = np.linalg.eigvalsh(tensor)
+    if not least > 0.0:
+        raise InputError(f"{name} = {shown(value)} must be positive definite: its principal moments begin at {least:g}")
+    if not most <= (1.0 + EVEN) * (least + middle):
+        raise InputError(
+            f"{name} = {shown(value)} is no body's: the largest principal moment {most:g} must be ≤ {least + middle:g} "
+            "[kg m²], the sum of the others"
+        )
+    return tuple(tuple(row) for row in (0.5 * (tensor + tensor.T)).tolist())
+
+
+@accepts(array(_number, 4, 4))
+def _quaternion(name, value):
+    """Read a quaternion that is not zero."""
+    quaternion = checked(name, value, numbers_list())
+    if len(quaternion) != 4:
+        raise InputError(f"{name} = {shown(value)} must be a quaternion [w, x, y, z], not {len(quaternion)} numbers")
+    if not any(quaternion):
+        raise InputError(f"{name} = {shown(value)} must not be zero")
+    return quaternion
+
+
 @dataclass(frozen=True, kw_only=True, init=False)
 class Body(Table):
     """A rigid body, free or fixed; its shape has keys of its own.
 
-    A body moves without turning, but for spheres and rings under friction, which turn, a ring about its normal only. A
-    ring is a rigid circle that touches the web as the disc inside it would, at any distance from its plane: how deep a
-    point is in it is measured at right angles to its normal. It is meant for webs that move in its plane.
+    A free body moves and turns in space, but for a ring, which keeps its plane and turns about its normal only. A ring
+    is a rigid circle that touches the web as the disc inside it would, at any distance from its plane: how deep a point
+    is in it is measured at right angles to its normal. It is meant for webs that move in its plane.
 
     Parameters
     ----------
@@ -43,33 +102,41 @@ class Body(Table):
     size : sequence of 3 float
         Edges of a box [m], > 0.
     axes : list of 2 vectors, optional
-        Directions of the first two edges of a box, at right angles; by default x and y.
+        Directions of the first two edges of a box, at right angles; by default x and y. Its third axis follows.
     length : float
         Length of a cylinder, or of a capsule between the centres of its ends [m], > 0.
     axis : sequence of 3 float
-        Axis of a cylinder or a capsule.
+        Axis of a cylinder or a capsule, the third of its axes.
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
+    orientation : sequence of 4 float, optional
+        In place of ``axes`` or ``axis``: the quaternion (w, x, y, z), of any length but 0, of the rotation that takes
+        x, y and z to the body's axes.
     mass : float, optional
-        Mass [kg], > 0; needed unless the body is fixed.
+        Mass [kg], > 0; it or the density is needed unless the body is fixed.
+    density : float, optional
+        Density [kg/m³] of a body that is solid, > 0, in place of the mass.
     position : sequence of 3 float
-        Position of its centre [m].
+        Position of its centre [m], which is its centre of mass.
     velocity : sequence of 3 float
         Initial velocity [m/s].
     angular_velocity : sequence of 3 float
-        Initial angular velocity [rad/s], which only friction feels; of a ring along its normal.
-    inertia : float, optional
-        Moment of inertia [kg m²], > 0, by default that of a solid sphere, 2/5 m r², or of a thin ring, m r².
+        Initial angular velocity along x, y and z [rad/s]; of a ring along its normal.
+    inertia : float or list, optional
+        Moments of inertia about its centre [kg m²]: one, three about its axes, or the symmetric 3 × 3 tensor along
+        them; of a ring that about its normal. By default that of a uniform solid, and of a thin ring m r².
     fixed : bool
         Whether it does not move.
 
     Raises
     ------
     InputError
-        For a key that the shape lacks or does not have, sizes or a mass that are not > 0, axes that are zero or not at
-        right angles, a rounding above half the smallest size, and a name that is no file name; for a free body that has
-        no mass or is a box, a cylinder or a capsule, a fixed one that moves, and a ring that turns about another axis
-        than its normal; from ``extend``, for a name that is listed twice, and a free body in statics.
+        For a key that the shape lacks or does not have, sizes, a mass or a density that are not > 0, both of these,
+        axes that are zero or not at right angles, or that are given twice, an orientation that is zero, a rounding
+        above half the smallest size, an inertia that no body has (not symmetric, not positive definite, or one
+        principal moment above the sum of the others), and a name that is no file name; for a free body without mass, a
+        fixed one that moves, and a ring that turns about another axis than its normal; from ``extend``, for a name that
+        is listed twice, and a free body in statics.
 
     Examples
     --------
@@ -86,11 +153,13 @@ class Body(Table):
     name: str = text(most=80)
     shape: str = choice(SHAPES, default="sphere")
     form: Shape = field(_given, default=None)  # the keys of the shape, as its own table
+    orientation: Several = field(_quaternion, default=None)
     mass: float | None = real(default=None, above=0, unit="kg")
+    density: float | None = real(default=None, above=0, unit="kg/m³")
     position: Several = vector(unit="m")
     velocity: Several = vector(default=(0.0, 0.0, 0.0), unit="m/s")
     angular_velocity: Several = vector(default=(0.0, 0.0, 0.0), unit="rad/s")
-    inertia: float | None = real(default=None, above=0, unit="kg m²")
+    inertia: Several = field(_inertia, default=None, unit="kg m²")
     fixed: bool = boolean(default=False)
 
     def __init__(self, **given):
@@ -134,16 +203,34 @@ class Body(Table):
         if not self.fixed and not self.form.free:
             free = [shape for shape, reference in SHAPES.items() if load(reference).free]
             raise InputError(
-                f'fixed = false: shape = "{self.shape}" must have fixed = true; {" and ".join(free)} may be free'
+                f'fixed = false: shape = "{self.shape}" must have fixed = true; '
+                f"{', '.join(free[:-1])} and {free[-1]} may be free"
             )
-        if not self.fixed and self.mass is None:
-            raise InputError("mass is missing: a free body needs mass = ... [kg]; fixed = true holds it")
+        if self.mass is not None and self.density is not None:
+            raise InputError(f"mass = {self.mass:g} and density = {self.density:g} exclude each other")
+        if self.density is not None:
+            self.form.volume()  # which a ring has not
+        if not self.fixed and self.mass is None and self.density is None:
+            raise InputError(
+                "mass is missing: a free body needs mass = ... [kg] or density = ... [kg/m³]; fixed = true holds it"
+            )
+        self._refuse_tensor()
         for key in ("velocity", "angular_velocity"):
             if self.fixed and any(getattr(self, key)):
                 raise InputError(f"{key} = {list(getattr(self, key))} must be zero where fixed = true")
         if not self.name.replace("-", "").replace("_", "").isalnum() or self.name.lower() == "web":
             raise InputError(f'name = "{self.name}" must be letters, digits, - and _, and not "web": it names files')
         self.form.refuse_turning(self.angular_velocity)
+
+    def _refuse_tensor(self):
+        """Refuse axes that are given twice or not at all, and more than one moment of inertia of a ring."""
+        given = [key for key in self.form.directions if getattr(self.form, key, None) is not None]
+        if self.orientation is None:
+            self.form.frame()
+        elif given:
+            raise InputError(f"orientation = {shown(self.orientation)} and {given[0]} exclude each other: give one")
+        if self.form.planar and isinstance(self.inertia, tuple):
+            raise InputError(f'inertia = {shown(self.inertia)} must be a number for shape = "{self.shape}"')
 
     def _form(self):
         """The table of the shape, from what is given of its keys."""
@@ -162,18 +249,28 @@ class Body(Table):
             raise InputError(f'name = "{self.name}" is listed twice: names of bodies are unique')
         if not self.fixed and net.quasi_static:
             raise InputError("fixed = false: a free body cannot be used in statics; fixed = true holds it")
+        mass = self.mass or (self.density * self.form.volume() if self.density else 0.0)
         body = RigidBody(
             name=self.name,
             row=len(net.points),
             shape=self.form,
             velocity=self.velocity,
             fixed=self.fixed,
-            inertia=self.inertia or self.form.inertia(self.mass or 0.0),
+            axes=self.form.frame() if self.orientation is None else matrix_of(self.orientation).T,
+            inertia=self._tensor(mass),
             angular_velocity=self.angular_velocity,
         )
         return replace(
             net,
             points=np.vstack([net.points, self.position]),
-            mass=np.append(net.mass, self.mass or 0.0),
-            bodies=(*net.bodies, body),
+            mass=np.append(net.mass, mass),
+            bodies=(*net.bodies, replace(body, turns=body.tumbles or any(self.angular_velocity))),
         )
+
+    def _tensor(self, mass):
+        """Tensor of inertia of a free body; zero of a fixed one."""
+        if self.fixed:
+            return np.zeros((3, 3))
+        if self.inertia is None:
+            return self.form.inertia(mass)
+        return np.array(self.inertia) if isinstance(self.inertia, tuple) else self.inertia * np.eye(3)

@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from .base import Family, column
 
@@ -144,7 +145,18 @@ def families(net, speed, pull, **own):
         G [1/s²].
     **own
         ``name`` and ``book`` of the families, and what else they have.
+
+    Raises
+    ------
+    InputError
+        For a body that turns in space.
     """
+    for body in net.bodies:
+        if body.turn is not None:
+            raise InputError(
+                f'[{own["name"]}] takes no body that turns in space, such as "{body.name}": fixed = true holds it, and '
+                "spheres and rings may turn"
+            )
     heavy = net.heavy
     spins = np.array([b.spin for b in net.bodies if b.spin is not None and not b.shape.planar], int)
     masses = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins

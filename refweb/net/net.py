@@ -72,8 +72,9 @@ class Net:
     bodies : tuple of refweb.net.rigid_body.RigidBody
         Bodies, whose rows follow those of the nodes.
     spins : int
-        Number of rows at the end that are rotations of bodies: rotation vector [rad], angular velocity [rad/s], and
-        moment of inertia [kg m²] in place of mass.
+        Number of rows at the end that are rotations of bodies, with a moment of inertia [kg m²] in place of mass: of
+        one without orientation its rotation vector [rad] and its angular velocity [rad/s], of one with an orientation
+        two rows, see `refweb.net.rotation`.
     """
 
     web: Web

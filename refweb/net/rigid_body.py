@@ -34,16 +34,17 @@ A body is convex. Its depth is the distance from its surface there, and concave,
 force is the slope of an energy. That is why edges are rounded, and a body is a core and the radius by which it has
 grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
 round about its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a
-capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move sets
-``free = True`` and brings ``inertia``. The line in ``SHAPES`` of ``refweb/registry.py``::
+capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn sets
+``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its centre. The
+line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -75,17 +76,20 @@ class Shape(Table):
     Attributes
     ----------
     free : bool
-        Whether a body of this shape may move: it looks the same however friction turns it.
+        Whether a body of this shape may move.
     once : bool
         Whether its core is a point: a sphere touches a line once, at the deepest place, other shapes each element at
         both ends and once in between.
     planar : bool
-        Whether it turns about its third axis only.
+        Whether it turns about its third axis only, and looks the same then.
+    directions : tuple of str
+        Keys that say where its axes are.
     """
 
     free = False
     once = False
     planar = False
+    directions: ClassVar[tuple] = ("axes", "axis", "normal")
 
     def grown(self):
         """Its core and the radius of growth, a `Grown`."""
@@ -95,9 +99,17 @@ class Shape(Table):
         """Unit vectors of its axes, right-handed, shape (3, 3)."""
         return np.eye(3)
 
+    def volume(self):
+        """Its volume [m³]."""
+        from .solid import moments
+
+        return moments(self.grown())[0]
+
     def inertia(self, mass):
-        """Moment of inertia of a mass [kg m²], where none is given."""
-        return 0.0
+        """Tensor of inertia of a uniform mass about its centre [kg m²], along its axes, shape (3, 3)."""
+        from .solid import inertia
+
+        return inertia(self.grown(), mass)
 
     def refuse_turning(self, angular_velocity):
         """Refuse an angular velocity [rad/s] that it cannot have."""
@@ -136,12 +148,18 @@ class RigidBody:
         Initial velocity [m/s].
     fixed : bool
         Whether it does not move.
-    inertia : float
-        Moment of inertia [kg m²].
+    axes : ndarray, shape (3, 3)
+        Unit vectors of its axes at the start.
+    inertia : ndarray, shape (3, 3)
+        Tensor of inertia along its axes [kg m²].
     angular_velocity : tuple of 3 float
         Initial angular velocity [rad/s].
+    turns : bool
+        Whether its rotation is followed.
     spin : int, optional
         Its row of rotation, where it has one.
+    turn : int, optional
+        The second one, where its orientation counts, see `refweb.net.rotation`.
     """
 
     name: str
@@ -149,9 +167,12 @@ class RigidBody:
     shape: Shape
     velocity: tuple
     fixed: bool
-    inertia: float = 0.0
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3), compare=False)
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)), compare=False)
     angular_velocity: tuple = (0.0, 0.0, 0.0)
+    turns: bool = False
     spin: int | None = None
+    turn: int | None = None
 
     @property
     def radius(self):
@@ -173,15 +194,87 @@ class RigidBody:
         """Largest distance from its centre to its surface as a web sees it [m]; infinite for a ring."""
         return self.radius + float(np.linalg.norm(self.core))
 
-    def surface(self, centre):
-        """Its surface about a centre as points (n, 3) [m] and triangles (t, 3), outward."""
+    @property
+    def tumbles(self):
+        """Whether its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia."""
+        one = (self.inertia == self.inertia[0, 0] * np.eye(3)).all()
+        return not (self.fixed or self.shape.planar or self.shape.once and one)
+
+    @property
+    def moment(self):
+        """Moment of inertia that stands in place of mass [kg m²]: the largest, or that of a ring about its normal."""
+        if self.tumbles:
+            return float(np.linalg.eigvalsh(self.inertia)[-1])
+        return float(self.inertia[2, 2])
+
+    @property
+    def mobility(self):
+        """That over the tensor of inertia, along its axes, shape (3, 3)."""
+        found = self.moment * np.linalg.inv(self.inertia)
+        return 0.5 * (found + found.T)
+
+    @property
+    def start_spin(self):
+        """Velocity of its row of rotation at the start [rad/s], see `refweb.net.rotation`; a tuple or an ndarray."""
+        if not self.tumbles:
+            return self.angular_velocity
+        return self.axes.T @ (self.inertia @ (self.axes @ self.angular_velocity)) / self.moment
+
+    def rotation(self, x):
+        """Matrix of its rotation since the start, at displacements x (rows, 3)."""
+        if self.turn is not None:
+            return matrix_of((1.0 + x[self.turn, 0], *x[self.spin]))
+        if self.shape.planar and self.spin is not None:  # about its normal, by an angle
+            angle = float(self.axes[2] @ x[self.spin])
+            return matrix_of((np.cos(0.5 * angle), *np.sin(0.5 * angle) * self.axes[2]))
+        return np.eye(3)
+
+    def turning(self, x, v):
+        """Its angular velocity [rad/s] at displacements and velocities of all rows, (rows, 3); along x, y and z."""
+        if self.turn is None:
+            return np.zeros(3) if self.spin is None else v[self.spin]
+        axes = self.axes @ self.rotation(x).T
+        return axes.T @ (self.mobility @ (axes @ v[self.spin]))
+
+    def surface(self, centre, rotation=None):
+        """Its surface about a centre as points (n, 3) [m] and triangles (t, 3), outward; turned by a matrix."""
         local, triangles = self.shape.surface()
-        return np.asarray(centre) + local @ self.shape.frame(), triangles
+        axes = self.axes if rotation is None else self.axes @ rotation.T
+        return np.asarray(centre) + local @ axes, triangles
 
 
 def row_names(bodies):
     """Names of the rows behind those of the nodes: of bodies, and of their rotations, with a dot."""
-    return [body.name for body in bodies] + [f"{body.name}.spin" for body in bodies if body.spin is not None]
+    rows = ([f"{b.name}.spin", f"{b.name}.turn"][: 1 + (b.turn is not None)] for b in bodies if b.spin is not None)
+    return [body.name for body in bodies] + [name for names in rows for name in names]
+
+
+def with_rotations(net):
+    """The net with the rows of rotation of its bodies behind all others."""
+    if net.spins or not any(body.turns for body in net.bodies):
+        return net
+    bodies, mass = [], []
+    for body in net.bodies:
+        if body.turns:
+            at, count = len(net.points) + len(mass), 1 + body.tumbles
+            mass += count * [body.moment]
+            body = replace(body, spin=at, turn=at + 1 if body.tumbles else None)
+        bodies.append(body)
+    return replace(
+        net,
+        points=np.vstack([net.points, np.zeros((len(mass), 3))]),
+        mass=np.append(net.mass, mass),
+        bodies=tuple(bodies),
+        spins=len(mass),
+    )
+
+
+def matrix_of(quaternion):
+    """Rotation matrix of a quaternion (w, x, y, z) of any length but 0."""
+    w, *v = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
+    a, b, c = v
+    across = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    return np.eye(3) + 2.0 * (w * across + across @ across)
 
 
 def unit(name, axis):
@@ -194,6 +287,8 @@ def unit(name, axis):
 
 def axes_about(name, axis):
     """Unit vectors, shape (3, 3), the third along a key's value."""
+    if axis is None:
+        raise InputError(f"{name} is missing: give {name} = ... or orientation = ...")
     own = unit(name, axis)
     first = np.cross(own, np.eye(3)[np.abs(own).argmin()])
     first /= np.linalg.norm(first)

@@ -84,7 +84,7 @@ class Frame(NamedTuple):
 
 
 class Body(NamedTuple):
-    """Surface of a body: points, displacement [m], shapes (points, 3) and (3,), and triangles, shape (triangles, 3)."""
+    """Surface of a body: points and displacement [m], shape (points, 3), and triangles, shape (triangles, 3)."""
 
     points: np.ndarray
     triangles: np.ndarray
@@ -267,5 +267,5 @@ def _surface(mesh):
             corners.append(block.data)
         elif block.type == "quad":
             corners += [block.data[:, [0, 1, 2]], block.data[:, [0, 2, 3]]]
-    moved = np.reshape(mesh.point_data.get("displacement", np.zeros((1, 3))), (-1, 3))[0]
+    moved = np.reshape(mesh.point_data.get("displacement", np.zeros((1, 3))), (-1, 3))
     return Body(mesh.points, np.concatenate(corners), moved)

@@ -49,12 +49,17 @@ def web_mesh(state, shape=None):
 
 
 def body_mesh(body, state):
-    """The surface of a body at its current position."""
+    """The surface of a body at its current position, as it has turned; its points have their own velocity."""
     import meshio
 
-    points, triangles = body.surface(state.position[body.row])
+    rotation, centre = body.rotation(state.x) if body.turn is not None else None, state.position[body.row]
+    points, triangles = body.surface(centre, rotation)
     data = {"displacement": state.x, "velocity": state.v, "reaction": state.reaction}
     point_data: dict = {name: np.tile(values[body.row], (len(points), 1)) for name, values in data.items()}
+    if rotation is not None:
+        away = points - centre
+        point_data["displacement"] += away - away @ rotation
+        point_data["velocity"] += np.cross(body.turning(state.x, state.v), away)
     return meshio.Mesh(points, [("triangle", triangles)], point_data=point_data)
 
 

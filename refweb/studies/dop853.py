@@ -52,7 +52,7 @@ class Dop853:
     """
 
     def __init__(self, system, begin):
-        from ..dynamics.integrators.step_observer import refuse_massless
+        from ..system.mass import refuse_massless
 
         refuse_massless(system, NAME)
         if system.constraints:
@@ -65,7 +65,11 @@ class Dop853:
         self._start = np.concatenate([x.ravel()[system.free], v.ravel()[system.free]])
         self._held, self._mass = np.where(system.supported, x, 0.0), np.repeat(system.net.mass, 3)[system.free]
         self._consistent = system.net.consistent_minus_lumped is not None
-        self._breaks = system.corners
+        self._breaks, self._rotations = system.corners, None
+        if system.turning:
+            from ..dynamics.integrators.rotations import Rotations
+
+            self._rotations = Rotations(system)
         self._thickness = min((body.thickness for body in system.net.bodies), default=np.inf)
 
     def _rows(self, t, y):
@@ -78,9 +82,13 @@ class Dop853:
 
     def _rate(self, t, y):
         system, n = self.system, self._unknowns
-        force = system.force(t, *self._rows(t, y)).ravel()[system.free]
+        rows = self._rows(t, y)
+        force = system.force(t, *rows).ravel()[system.free]
         over_mass = system.mass.factor.solve(force) if self._consistent else force / self._mass
-        return np.concatenate([y[n:], over_mass])
+        rate = y[n:].copy()
+        if self._rotations:
+            self._rotations.set_rates(*rows, rate)
+        return np.concatenate([rate, over_mass])
 
     def follow(self, times, rtol, observable, clock, check):
         """Take the system through some times.

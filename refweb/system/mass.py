@@ -10,6 +10,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ..errors import InputError
+
 
 class Mass:
     """M of M v' = f.
@@ -89,3 +91,13 @@ class Mass:
         """M v of every row [N s], shape (rows, 3)."""
         lumped = self._net.mass[:, None] * v
         return lumped if self._consistent_minus_lumped is None else lumped + self.passed_on(v)
+
+
+def refuse_massless(system, method):
+    """Refuse free nodes without mass, for a method that divides by it."""
+    bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
+    if len(bare):
+        raise InputError(
+            f"node {bare[0]} has no mass, which {method} needs: give density > 0 or a [[point_mass]], or use "
+            'method = "ida"'
+        )

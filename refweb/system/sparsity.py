@@ -44,6 +44,8 @@ class Pattern:
         One entry per family with stiffness.
     library : refweb.system.factorization.Library
         What factorizes symmetric matrices.
+    also : list of ndarray of int32, shape (cells, arity)
+        Other cells that are coupled, by what is no family.
 
     Attributes
     ----------
@@ -55,7 +57,7 @@ class Pattern:
         Places of the diagonal.
     """
 
-    def __init__(self, rows, free, cells, library):
+    def __init__(self, rows, free, cells, library, also=()):
         self.size = n = len(free)
         self.library = library
         library.choose(n)
@@ -63,7 +65,9 @@ class Pattern:
         number.ravel()[free] = np.arange(n, dtype=np.int32)
         # By blocks of two rows, of which there are a ninth: column × rows + row, in the order of the columns.
         keys = [np.arange(rows) * (rows + 1)]
-        keys += [(family[:, None, :].astype(np.int64) * rows + family[:, :, None]).reshape(-1) for family in cells]
+        keys += [
+            (family[:, None, :].astype(np.int64) * rows + family[:, :, None]).reshape(-1) for family in (*cells, *also)
+        ]
         blocks = _different(np.concatenate(keys))
         of_cells = [np.searchsorted(blocks, key) for key in keys]
         coupled = np.zeros(len(blocks), dtype=bool)
@@ -71,7 +75,7 @@ class Pattern:
             coupled[block] = True
         places = self._places(number, blocks // max(rows, 1), blocks % max(rows, 1), coupled)
         self.slots = []
-        for family, block in zip(cells, of_cells[1:], strict=True):
+        for family, block in zip(cells, of_cells[1 : 1 + len(cells)], strict=True):
             arity = family.shape[1]
             slots = places[block].reshape(len(family), arity, arity, 3, 3).transpose(0, 1, 4, 2, 3)
             self.slots.append(np.ascontiguousarray(slots).reshape(len(family), 9 * arity**2))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..effects.base import Constraint, Drive, Family, LineDrive
 from ..net.net import LENGTH
-from ..net.rigid_body import row_names
+from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
 from .forces import Forces, PerCell
 
@@ -55,6 +55,7 @@ class System:
         for effect in sorted(effects, key=lambda effect: hasattr(effect, "on")):  # bodies before what makes them turn
             if hasattr(effect, "extend"):
                 net = effect.extend(net)
+        net = with_rotations(net)
         self.net, self.effects = net, effects
         self.rows = len(net.points)
         acting = []
@@ -135,7 +136,7 @@ class System:
         for body in self.net.bodies:
             v[body.row] = body.velocity
             if body.spin is not None:
-                v[body.spin] = body.angular_velocity
+                v[body.spin] = body.start_spin
         return v
 
     @property
@@ -153,7 +154,9 @@ class System:
         """The fixed `refweb.system.sparsity.Pattern` of the tangent."""
         from .sparsity import Pattern
 
-        return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent], self.library)
+        turns = [[(body.spin, body.turn)] for body in self.net.bodies if body.turn is not None]  # by their equations
+        also = [np.array(pair, dtype=np.int32) for pair in turns]
+        return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent], self.library, also)
 
     @cached_property
     def mass(self):
@@ -324,6 +327,11 @@ class System:
         """Whether K and C are symmetric."""
         return all(f.symmetric for f in self.families)
 
+    @cached_property
+    def turning(self):
+        """Whether there are bodies whose orientation counts."""
+        return any(body.turn is not None for body in self.net.bodies)
+
     @property
     def conservative(self):
         """Whether every force has a potential."""
@@ -350,7 +358,7 @@ class System:
         """(number of the family, slice of its cells) whose penalty is of a body; the cells are in order of elements."""
         for i, family in enumerate(self.families):
             if family.contact and family.energy is not None:
-                own = np.flatnonzero(family.cells[:, -1] == body.row)
+                own = np.flatnonzero(family.cells[:, self.net.order + 1] == body.row)
                 if len(own):
                     return i, slice(int(own[0]), int(own[-1]) + 1)
         raise ValueError(f'nothing touches body "{body.name}"')

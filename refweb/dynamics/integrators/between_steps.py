@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import copy_rows, kernel
+from ...net.rotation import note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
 from .extremes import EDGE, Extremes, correction, look, look_at_sums, take_over, time_of_top
@@ -55,8 +56,8 @@ def look_at_books(t, x, v, total, extremes, ending, model, observed, running):
     """Look for extremes of energies at the end of a step."""
     families = model.families
     book_energies(
-        t, x, v, model.inertia.mass, families.cells, families.data, families.energies, families.stored, running.work,
-        families.working, total,
+        t, x, v, model.inertia.mass, model.inertia.turns, families.cells, families.data, families.energies,
+        families.stored, running.work, families.working, total,
     )  # fmt: skip
     return look_at_sums(t, total, observed, extremes, ending)
 
@@ -68,14 +69,16 @@ def book_within(t, now, x, v, smooth, total, model, running):
     Work there is that until ``now`` less what they still gain, where the motion is ``smooth``; else it stays: in a
     kick, a drift and a kick, energies between have an error of their own where something touches.
     """
-    families, mass, last = model.families, model.inertia.mass, 0.0
+    families, mass, turns, last = model.families, model.inertia.mass, model.inertia.turns, 0.0
     cells, data, energies, stored, working = (
         families.cells, families.data, families.energies, families.stored, families.working
     )  # fmt: skip
     if smooth and families.powers.shape[0]:
-        book_energies(now, running.x, running.v, mass, cells, data, energies, stored, running.work, working, total)
+        book_energies(
+            now, running.x, running.v, mass, turns, cells, data, energies, stored, running.work, working, total
+        )  # fmt: skip
         last = own_energy(total, working)
-    book_energies(t, x, v, mass, cells, data, energies, stored, running.work, working, total)
+    book_energies(t, x, v, mass, turns, cells, data, energies, stored, running.work, working, total)
     if smooth and families.powers.shape[0]:
         total[-2] -= last - own_energy(total, working)
 
@@ -109,6 +112,9 @@ def step_back(t, h, end, start, lines, model):
         for k in range(3):
             start[1, r, k] = end[1, r, k] - 0.5 * h * inverse[r, k] * end[2, r, k]
             start[0, r, k] = end[0, r, k] - h * start[1, r, k]
+    if model.inertia.turns.moment.size:
+        note_turns(end[0], model.inertia.turns)
+        turn_on(-h, start[1], start[0], model.inertia.turns)
     forces_at(t, start[0], start[1], start[2], lines, model)
     for r in range(inverse.shape[0]):
         for k in range(3):
@@ -126,6 +132,8 @@ def state_within(t, now, h, x, v, f, smooth, inside, model):
         interpolate(share, h, inside.before, x, v, inverse, f, here[0], here[1])
     else:
         interpolate_kicks(share, h, inside.before, x, v, inverse, f, here[0], here[1])
+    if model.inertia.turns.moment.size:
+        turns_within(share, h, inside.before, x, v, model.inertia.turns, here[0])
     forces_at(t, here[0], here[1], here[2], inside.lines, model)
 
 

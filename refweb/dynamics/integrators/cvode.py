@@ -69,7 +69,9 @@ class Cvode(Sundials):
                 "the mass matrix has no pattern"
             )
         self._mass = np.repeat(system.net.mass, 3)[system.free]
-        self._sparing = linear_solver == "auto" and self.linear_solver == "block" and not self._consistent
+        self._sparing = (
+            linear_solver == "auto" and self.linear_solver == "block" and not (self._consistent or self.rotations)
+        )
         if self._sparing:
             self.choice += f"; none where a step is short, γω ≤ {SHORT:g}"
         self._gamma, self._plain, self._set_up_at, self._due = None, False, None, 0
@@ -87,8 +89,11 @@ class Cvode(Sundials):
 
     def _right_side(self, t, y, yp):
         n = self.unknowns
-        force = self.force(t, y[:n], y[n:])
+        x, v = self.state(t, y[:n], y[n:])
+        force = self.force_at(t, x, v)
         yp[:n] = y[n:]
+        if self.rotations:
+            self.rotations.set_rates(x, v, yp[:n])
         yp[n:] = self._over_mass(force)
 
     def _tangent(self, t, y):
@@ -96,6 +101,8 @@ class Cvode(Sundials):
         self.stats["njev"] += 1
         x, v = self.state(t, y[: self.unknowns], y[self.unknowns :])
         self._at_state = t, x, v
+        if self.rotations:
+            self.rotations.linearize(x, v)
         return self.system.stiffness(t, x, v), self.system.damping(t, x, v)
 
     # Block elimination
@@ -135,6 +142,9 @@ class Cvode(Sundials):
     def _factorize_step(self, gamma):
         system = self.system
         values = gamma * gamma * self._stiffness
+        if self.rotations:
+            self.rotations.begin(gamma)
+            values = self.rotations.eliminated(system.pattern, values)
         if self._damping is not None:
             values += gamma * self._damping
         if self._consistent:
@@ -153,9 +163,10 @@ class Cvode(Sundials):
             return
         if self._inverts(z, gamma == self._gamma and self._true):
             return
-        n = self.unknowns
-        z[n:] = self._factor.apply(self._times_mass(r[n:]) - self._gamma * (self._K @ r[:n]))
-        z[:n] = r[:n] + self._gamma * z[n:]
+        n, rotations = self.unknowns, self.rotations
+        first = rotations.before(r[:n]) if rotations else r[:n]
+        z[n:] = self._factor.apply(self._times_mass(r[n:]) - self._gamma * (self._K @ first))
+        z[:n] = first + self._gamma * (rotations.carried(z[n:]) if rotations else z[n:])
 
     def _jacobian_times(self, t, y, yp, u, Ju):
         if self._plain:
@@ -166,7 +177,7 @@ class Cvode(Sundials):
         n, pull = self.unknowns, self._K @ u[: self.unknowns]
         if self._C is not None:
             pull += self._C @ u[n:]
-        Ju[:n] = u[n:]
+        Ju[:n] = self.rotations.product(u[:n], u[n:]) if self.rotations else u[n:]
         Ju[n:] = -self._over_mass(pull)
 
     # The whole Jacobian
@@ -175,14 +186,22 @@ class Cvode(Sundials):
         """Rows and columns of −M⁻¹K, of the diagonal, of the unit matrix and of −M⁻¹C, for a lumped mass."""
         pattern, n = self.system.pattern, self.unknowns
         row, column, at = pattern.indices, np.repeat(np.arange(n), np.diff(pattern.indptr)), np.arange(n)
-        self._heavy = self._mass[row]
-        return np.concatenate([n + row, at, at, n + row]), np.concatenate([column, at, n + at, n + column])
+        self._heavy, self._unit = self._mass[row], np.ones(n)
+        rows, columns = [n + row, at, at, n + row], [column, at, n + at, n + column]
+        if self.rotations:
+            self._unit[self.rotations.places] = 0.0
+            (first, second), (slow, fast) = self.rotations.pattern()
+            rows, columns = [*rows, first, slow], [*columns, second, n + fast]
+        return np.concatenate(rows), np.concatenate(columns)
 
     def _jacobian(self, t, y, yp, J):
         n, (K, C) = self.unknowns, self._tangent(t, y)
         if not self._consistent:
             damped = np.zeros(K.shape) if C is None else -C / self._heavy
-            self._write(J, np.concatenate([-K / self._heavy, np.zeros(n), np.ones(n), damped]))
+            parts = [-K / self._heavy, np.zeros(n), self._unit, damped]
+            if self.rotations:
+                parts += [self.rotations.X.ravel(), self.rotations.V.ravel()]
+            self._write(J, np.concatenate(parts))
             return
         self.stats["nlu"] += 1
         mass, matrix = self._mass_matrix.toarray(), self.system.pattern.matrix
@@ -191,6 +210,10 @@ class Cvode(Sundials):
         J[n:, :n] = -np.linalg.solve(mass, matrix(K).toarray())
         if C is not None:
             J[n:, n:] = -np.linalg.solve(mass, matrix(C).toarray())
+        if self.rotations:
+            (first, second), (slow, fast) = self.rotations.pattern()
+            J[self.rotations.places.ravel(), n + self.rotations.places.ravel()] = 0.0
+            J[first, second], J[slow, n + fast] = self.rotations.X.ravel(), self.rotations.V.ravel()
 
     def _linear_options(self):
         from sksundae.cvode import CVODEJacTimes, CVODEPrecond
@@ -216,7 +239,7 @@ class Cvode(Sundials):
         def right_side(t, y, yp):
             self._right_side(t, y, yp)
 
-        tolerance = np.repeat([self.atol_position, self.atol_velocity], self.unknowns)
+        tolerance = np.concatenate(self.tolerance())
         return CVODE(right_side, method={"bdf": "BDF", "adams": "Adams"}[self.family], atol=tolerance, **options)
 
     def _initial(self, t, x, v):

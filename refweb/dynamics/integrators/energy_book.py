@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import OpenBook
 from ...kernels import ENERGY, kernel
 from ...net.net import AXIAL_STIFFNESS, LENGTH
+from ...net.rotation import more_kinetic
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -38,7 +39,7 @@ def refuse_open(course, limit, remedy):
 
 
 @kernel()
-def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, working, total):
+def book_energies(t, x, v, mass, turns, cells, data, energies, energy_outs, book, working, total):
     """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
 
     ``book`` holds the work of each family and, last, that of all motion; ``working`` says of each family whether that
@@ -55,6 +56,8 @@ def book_energies(t, x, v, mass, cells, data, energies, energy_outs, book, worki
             total[i] = -book[i]
     for r in range(x.shape[0]):
         total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+    if turns.moment.size:
+        total[count] += more_kinetic(x, v, turns)
 
 
 @kernel(ENERGY)

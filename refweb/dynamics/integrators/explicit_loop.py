@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from ...kernels import copy_rows, kernel
+from ...net.rotation import sizes
 from ...results.probes import PLACE
 from .averages import average, look_for_means, write_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
@@ -36,8 +37,8 @@ from .step import (
     add_forces,
     give_impulse,
     give_reaction,
-    kick_and_drift,
     last_kick,
+    move,
     move_supports,
     note_lengths,
     note_state,
@@ -60,6 +61,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
     Time goes with the drifts, and in the potential that is booked with the kicks.
     """
     families, inverse, held = model.families, model.inertia.inverse, model.inertia.held
+    turns = model.inertia.turns
     x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     drifted = kicked = now - h
@@ -69,7 +71,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         give_impulse(kick, reaction, running.impulse)
         give_impulse(kick, push, running.ledger.pushed)
         book_potential(1.0, kicked, x, families, running.work)
-        kick_and_drift(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1))
+        move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
         set_reaction(held, f.reshape(-1), reaction)
@@ -164,7 +166,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         if stages:
             inner_stages(now, h, scheme, model, running, reaction, push, extra)
         note_motion(driven, mass, x, v, f, before)
-        kick_and_drift(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f)
+        move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, model.inertia.turns)
         if stages:
             book_potential(-1.0, now - kicks[stages + 1], x, families, work)
         if moved:
@@ -222,6 +224,11 @@ def steps_until(end, changing, scheme, model, running):
         speed = max(speed, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
         a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
         push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
+    turns = model.inertia.turns
+    for n in range(turns.moment.size):  # of any point of a body
+        (own, turning), (force, moment) = sizes(n, v, turns), sizes(n, f, turns)
+        speed = max(speed, (own + turning) ** 2)
+        push = max(push, (inverse[turns.rows[n, 0], 0] * force + inverse[turns.rows[n, 1], 0] * moment) ** 2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
     reach_all(2.0 * interval * fastest, running.x, model.nearby, model.families)
     return interval / (
@@ -234,8 +241,8 @@ def energies_now(model, running, total):
     """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
     clock, families = running.clock[0], model.families
     book_energies(
-        clock.time, running.x, running.v, model.inertia.mass, families.cells, families.data, families.energies,
-        families.stored, running.work, families.working, total,
+        clock.time, running.x, running.v, model.inertia.mass, model.inertia.turns, families.cells, families.data,
+        families.energies, families.stored, running.work, families.working, total,
     )  # fmt: skip
     stored = 0.0
     for i in range(total.size - 2):
@@ -372,6 +379,6 @@ def begin(x, v, f, model, observed, extremes, work, total):
         )  # fmt: skip
         extremes.places[i] = where[0]
     book_energies(
-        0.0, x, v, model.inertia.mass, families.cells, families.data, families.energies, families.stored, work,
-        families.working, total,
+        0.0, x, v, model.inertia.mass, model.inertia.turns, families.cells, families.data, families.energies,
+        families.stored, work, families.working, total,
     )  # fmt: skip

@@ -114,6 +114,12 @@ class Ida(Sundials):
         v[self._heavy] = self._parts(y)[1]
         return v
 
+    def _of_all(self, own):
+        """What has mass has, among all unknown displacements, where all else has 0."""
+        found = np.zeros(self.unknowns)
+        found[self._heavy] = own
+        return found
+
     def _rows(self, t, y, yp):
         """Displacement and velocity of all rows at a state of the unknowns."""
         return self.state(t, self._parts(y)[0], self._velocity(y, yp))
@@ -131,13 +137,20 @@ class Ida(Sundials):
         slope = np.zeros(n)
         slope[heavy] = self._parts(yp)[1]
         balance = self._M @ slope - force
-        r[heavy], r[bare], r[n : n + len(heavy)] = rate[heavy] - own, balance[bare], balance[heavy]
+        moved = own
+        if self.rotations:
+            moved = self._of_all(own)
+            self.rotations.set_rates(x, v, moved)
+            moved = moved[heavy]
+        r[heavy], r[bare], r[n : n + len(heavy)] = rate[heavy] - moved, balance[bare], balance[heavy]
 
     def _tangent(self, t, y, yp):
         """Values of K, and of C or None, at a state."""
         self.stats["njev"] += 1
         x, v = self._rows(t, y, yp)
         self._at_state = t, x, v
+        if self.rotations:
+            self.rotations.linearize(x, v)
         K = self.system.stiffness(t, x, v)
         if self._massless:
             self._adrift = t, self._massless.adrift(K)
@@ -152,6 +165,9 @@ class Ida(Sundials):
         self._K, self._C = system.pattern.matrix(K), None if C is None else system.pattern.matrix(C)
         self._factored = c
         rest = self._M.data if C is None else self._M.data + C / c
+        if self.rotations:
+            self.rotations.begin(1.0 / c)
+            K = self.rotations.eliminated(system.pattern, K)
 
         def definite():
             values = rest + system.stiffness(*self._at_state, definite=True) / c**2
@@ -166,8 +182,11 @@ class Ida(Sundials):
         n, heavy, bare, c = self.unknowns, self._heavy, self._bare, self._factored
         first, second = r[:n].copy(), np.empty(n)
         first[bare], second[bare], second[heavy] = 0.0, r[bare], r[n:]
+        if self.rotations:
+            first = self.rotations.before(first)
         velocity = self._factor.apply((second - self._K @ first / c) / c)
-        z[:n], z[n:] = (first + velocity) / c, velocity[heavy]
+        carried = self.rotations.carried(velocity) if self.rotations else velocity
+        z[:n], z[n:] = (first + carried) / c, velocity[heavy]
 
     def _jacobian_times(self, t, y, yp, res, u, Ju, c):
         if self._multiplied(u):
@@ -178,7 +197,8 @@ class Ida(Sundials):
         balance = self._M @ slope + self._K @ u[:n]
         if self._C is not None:
             balance += self._C @ velocity
-        Ju[heavy], Ju[bare], Ju[n:] = c * u[heavy] - u[n:], balance[bare], balance[heavy]
+        moved = self.rotations.product(u[:n], self._of_all(u[n:]))[heavy] if self.rotations else u[n:]
+        Ju[heavy], Ju[bare], Ju[n:] = c * u[heavy] - moved, balance[bare], balance[heavy]
 
     # The whole Jacobian
 
@@ -190,6 +210,11 @@ class Ida(Sundials):
         at[heavy] = n + np.arange(len(heavy))
         self._slid = ~np.isin(column, heavy)
         parts = [(heavy, heavy), (heavy, at[heavy]), (at[pattern.indices], column), (at[pattern.indices], at[column])]
+        self._unit = np.full(len(heavy), -1.0)
+        if self.rotations:
+            self._unit[np.searchsorted(heavy, self.rotations.places)] = 0.0
+            (first, second), (slow, fast) = self.rotations.pattern()
+            parts += [(first, second), (slow, at[fast])]
         if self._links:
             parts += self._links.places(heavy, at[heavy], n + len(heavy))
         return (np.concatenate(side) for side in zip(*parts, strict=True))
@@ -199,7 +224,9 @@ class Ida(Sundials):
         slope = c * self._M.data
         if C is not None:
             slope += np.where(self._slid, c, 1.0) * C
-        parts = [np.full(len(self._heavy), c), np.full(len(self._heavy), -1.0), K, slope]
+        parts = [np.full(len(self._heavy), c), self._unit, K, slope]
+        if self.rotations:
+            parts += [-self.rotations.X.ravel(), -self.rotations.V.ravel()]
         if self._links:
             parts += self._links.values(*self._at_state[1:], self._parts(y)[2])
         self._write(J, np.concatenate(parts))
@@ -242,9 +269,10 @@ class Ida(Sundials):
         from sksundae.ida import IDA
 
         n, heavy, links = self.unknowns, len(self._heavy), 2 * self._count
+        position, velocity = self.tolerance()
         return IDA(
             self._residual,
-            atol=np.repeat([self.atol_position, self.atol_velocity, UNTESTED], [n, heavy, links]),
+            atol=np.concatenate([position, velocity[self._heavy], np.full(links, UNTESTED)]),
             algebraic_idx=np.concatenate([self._bare, n + heavy + np.arange(links)]).astype(int).tolist(),
             **options,
         )
@@ -258,7 +286,10 @@ class Ida(Sundials):
             slope, multipliers = self._links.start(*rows, force)
         elif len(heavy):
             slope = self.system.mass.moved_by(force).ravel()[self.system.free[heavy]]
-        return np.concatenate([x, v[heavy], multipliers, rest]), np.concatenate([v, slope, rest, rest])
+        rate = v.copy()
+        if self.rotations:
+            self.rotations.set_rates(*rows, rate)
+        return np.concatenate([x, v[heavy], multipliers, rest]), np.concatenate([rate, slope, rest, rest])
 
     # A solver's steps
 
@@ -300,6 +331,7 @@ class Ida(Sundials):
 
     def hold(self, x, v):
         """Move a state to the nearest one with the lengths of the links."""
+        super().hold(x, v)
         if self._links:
             self._links.hold(x, v)
 

@@ -13,6 +13,7 @@ from numba.typed import List
 
 from ... import kernels as k
 from ...kernels import INDICES, INTEGERS, MATRIX, VECTOR, record, typed_list
+from ...net.rotation import Turns
 from ...results.probes import PROBE, plain_of
 from .averages import Averages, Windows
 from .energy_book import no_energy
@@ -80,6 +81,8 @@ class Inertia(NamedTuple):
         Rows that are free somewhere, supported components 3 · row + axis, and rows whose motion is prescribed.
     linear : int
         Number of rows that are places; the others are angles.
+    turns : refweb.net.rotation.Turns
+        Bodies whose orientation counts.
     """
 
     mass: np.ndarray
@@ -88,6 +91,7 @@ class Inertia(NamedTuple):
     held: np.ndarray
     driven: np.ndarray
     linear: int
+    turns: Turns
 
     @classmethod
     def of(cls, system):
@@ -96,7 +100,7 @@ class Inertia(NamedTuple):
         inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
         moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.supported)
-        return cls(net.mass, inverse, moving, held, driven, system.rows - net.spins)
+        return cls(net.mass, inverse, moving, held, driven, system.rows - net.spins, Turns.of(net))
 
 
 class Families(NamedTuple):

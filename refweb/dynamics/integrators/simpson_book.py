@@ -15,6 +15,7 @@ import numpy as np
 
 from ...errors import NoEnd, OpenBook
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
+from ...net.rotation import Turns, more_kinetic
 from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
 from .momentum_book import Outside, note_momentum, open_ledger
 
@@ -153,7 +154,7 @@ class SimpsonBook:
 
     def __init__(self, system, hold, fast, shown=()):
         self.system, self._hold, self._least = system, hold, least_energy(system.net)
-        self._linear = system.rows - system.net.spins
+        self._linear, self._turns = system.rows - system.net.spins, Turns.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
         families, self._shown = system.families, shown
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
@@ -216,7 +217,8 @@ class SimpsonBook:
             after[driven] = end.v[driven]
             self._hold(end.x, after)
             last, end = self.sample(end.time, end.x, before), self.sample(end.time, end.x, after)
-            jump = Jump(self.kinetic(after) - self.kinetic(before), self.momentum(after) - self.momentum(before))
+            gained = self.kinetic(end.x, after) - self.kinetic(end.x, before)
+            jump = Jump(gained, self.momentum(after) - self.momentum(before))
         rates = course.rates, self.rates(middle), self.rates(last)
         behind = self.rates(end)
         before = Booked(course.work, course.impulse, course.ledger.pushed.copy())
@@ -225,11 +227,12 @@ class SimpsonBook:
     def uneven(self, course, piece):
         """Whether powers change too much within a piece."""
         apart = piece.unevenness
-        return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(piece.end.v)
+        return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(piece.end.x, piece.end.v)
 
-    def kinetic(self, v):
+    def kinetic(self, x, v):
         """Kinetic energy [J]."""
-        return 0.5 * (v * self.system.mass.momentum(v)).sum()
+        energy = 0.5 * (v * self.system.mass.momentum(v)).sum()
+        return energy + more_kinetic(x, v, self._turns) if len(self._turns.moment) else energy
 
     def momentum(self, v):
         """Momentum of what is free [N s], shape (3,)."""
@@ -244,8 +247,8 @@ class SimpsonBook:
         t, x, v, system, total = sample.time, sample.x, sample.v, self.system, np.zeros(len(self.system.families) + 3)
         if system.line_drives:
             self._lines[:] = system.line_data(t)
-        book_energies(t, x, v, system.net.mass, *self._families, work, self._working, total)
-        total[-3] = self.kinetic(v)
+        book_energies(t, x, v, system.net.mass, self._turns, *self._families, work, self._working, total)
+        total[-3] = self.kinetic(x, v)
         total[-1] = step
         return total
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
+from ...net.rotation import note_turns, turn_on
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -29,6 +30,16 @@ def kick_and_drift(kick, drift, inverse, x, v, f):
         v[q] = speed
         x[q] += drift * speed
         f[q] = 0.0
+
+
+@kernel(forceinline=True)
+def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
+    """As `kick_and_drift`, where bodies may turn."""
+    if turns.moment.size:
+        note_turns(x, turns)
+    kick_and_drift(kick, drift, inverse, flat_x, flat_v, flat_f)
+    if turns.moment.size:
+        turn_on(drift, v, x, turns)
 
 
 @kernel(forceinline=True)

@@ -18,9 +18,12 @@ class StepLimits:
     ----------
     system : refweb.system.system.System
         Its tables of time, and its bodies.
+    rotations : refweb.dynamics.integrators.rotations.Rotations, optional
+        Bodies that turn.
     """
 
-    def __init__(self, system):
+    def __init__(self, system, rotations=None):
+        self._rotations = rotations
         self._net, self._moving = system.net, system.rows - system.net.spins
         self._corners = system.corners
         bodies = system.net.bodies
@@ -38,6 +41,8 @@ class StepLimits:
         stop = self._corners[ahead] if ahead < len(self._corners) else np.inf
         if np.isfinite(self._thickness):
             speed = 2.0 * np.sqrt((v[: self._moving] ** 2).sum(axis=1).max())
+            if self._rotations:
+                speed = max(speed, 2.0 * self._rotations.speed(v))
             way = max(TRAVEL * self._thickness, 0.5 * self._gap(x))
             stop = min(stop, t + way / speed) if speed > 0.0 else stop
         return t + SAME * end if stop - t < SAME * end else stop

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, NoEnd
+from ...system.mass import refuse_massless
 from .energy_book import DRIFT, refuse_open
 from .event_search import search
 from .events import event_rows, starts_above
@@ -93,8 +94,9 @@ class StepObserver(Integrator):
     breathe = staticmethod(lambda t: None)
     course_type = ObservedCourse
     _made_of: tuple
-    takes_massless = takes_links = False
-    """Whether nodes without mass have a place in the method's equations, and rigid links."""
+    takes_massless = takes_links = takes_rotations = False
+    """Whether nodes without mass have a place in the method's equations, rigid links, and bodies that turn."""
+    rotations = None  # the `refweb.dynamics.integrators.rotations.Rotations` of such bodies
     restarts = False
     """Whether it begins anew at corners of tables: IDA's polynomial through the steps before a pulse of 1e-8 s gives
     3 % too much of its impulse, a new beginning 4e-5."""
@@ -111,6 +113,10 @@ class StepObserver(Integrator):
             refuse_massless(system, self.method)
         if system.constraints and not self.takes_links:
             raise InputError(f'[[link]] needs method = "ida": {self.method} does not hold lengths')
+        if system.turning:
+            from .rotations import followed
+
+            self.rotations = followed(system, self.method, self.takes_rotations)
         self.unknowns = len(system.free)
         if not self.unknowns:
             raise InputError(
@@ -125,7 +131,7 @@ class StepObserver(Integrator):
         self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
         still = max(fast, self.atol_velocity / rtol)
         self._book = SimpsonBook(system, self.hold, still, self._measurements.shown)
-        self._limits = StepLimits(system)
+        self._limits = StepLimits(system, self.rotations)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a method brings
@@ -171,6 +177,8 @@ class StepObserver(Integrator):
 
     def hold(self, x, v):
         """Move a state of all rows, shape (rows, 3), to the nearest one that the equations allow."""
+        if self.rotations:
+            self.rotations.set_lengths(x)
 
     # What it may call
 
@@ -388,13 +396,3 @@ class StepObserver(Integrator):
                 f"the largest force that moves anything is at {system.row_name(row)}: raise rtol = {self.rtol:g}, "
                 "or lower the stiffness that asks for such steps"
             ) from None
-
-
-def refuse_massless(system, method):
-    """Refuse free nodes without mass, for a method that divides by it."""
-    bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
-    if len(bare):
-        raise InputError(
-            f"node {bare[0]} has no mass, which {method} needs: give density > 0 or a [[point_mass]], or use "
-            'method = "ida"'
-        )

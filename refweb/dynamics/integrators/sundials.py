@@ -46,6 +46,7 @@ class Sundials(StepObserver):
         Which linear solver is used, and why.
     """
 
+    takes_rotations = True
     linear_solver = choice = ""
     max_order: int
     _symmetric: Symmetric
@@ -54,6 +55,14 @@ class Sundials(StepObserver):
     def __init__(self, system, *observed, **tolerances):
         super().__init__(system, *observed, **tolerances)
         self._product, self._exact, self._true = None, False, False
+
+    def tolerance(self):
+        """Absolute tolerances of unknown displacements and of velocities, each of shape (unknowns,)."""
+        both = [np.full(self.unknowns, size) for size in (self.atol_position, self.atol_velocity)]
+        if self.rotations:
+            self.rotations.scale(both[0], False)
+            self.rotations.scale(both[1], True)
+        return both
 
     # What a subclass brings, besides `_jacobian` as its solver calls it
 

@@ -8,9 +8,9 @@ slip u_t = u − (n·u) n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossle
 
 F being what is added here to the penalty. F acts on the line at the contact and on the body with −F and the moment
 −y × F about its centre, y from the centre to the line's point, so that their momenta and angular momenta are kept; a
-ring turns about its normal only. The power F·u is not positive. With the matrices A = ∂F/∂y and B = ∂F/∂u the tangents
-follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of the contact's place as it moves. How explicit
-kicks solve for F is in `refweb.effects.contact.rubbing`.
+ring turns about its normal only, other bodies as `refweb.net.rotation` says. The power F·u is not positive. With the
+matrices A = ∂F/∂y and B = ∂F/∂u the tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of
+the contact's place as it moves. How explicit kicks solve for F is in `refweb.effects.contact.rubbing`.
 
 References
 ----------
@@ -29,9 +29,10 @@ import numpy as np
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..vectors import cross, dot
 from .nearest_point import lightness, share
-from .pair import pair_of
+from .pair import lever_of, pair_of, pairing
 from .penalty import SHALLOW, foresight, push_of, slope_of_power, thickness, turn_block
 from .places import PLACES, along_axes, from_axes, hessian_times, place_moves, places, window
+from .tumbling import add_push, add_rotation, add_velocities, set_arms, to_quaternion
 
 
 class Slip(NamedTuple):
@@ -67,6 +68,12 @@ def turned_by(planar, w):
     return (0.0, 0.0, w[2]) if planar else w
 
 
+@kernel(forceinline=True)
+def angular(pair, spins, u):
+    """Angular velocity along the axes of the body, by the velocity of its row of rotation."""
+    return hessian_times(pair.mobility, u) if spins == 2 else turned_by(pair.planar, u)
+
+
 @kernel()
 def slip_of(v, cells, c, nodes, spins, functions, pair, place, y):
     """The `Slip` at a place of cell c."""
@@ -81,7 +88,7 @@ def slip_of(v, cells, c, nodes, spins, functions, pair, place, y):
     u, s = along_axes(pair.axes, (u0, u1, u2)), along_axes(pair.axes, (s0, s1, s2))
     if spins:
         r = cells[c, nodes + 1]
-        w = turned_by(pair.planar, along_axes(pair.axes, (v[r, 0], v[r, 1], v[r, 2])))
+        w = angular(pair, spins, along_axes(pair.axes, (v[r, 0], v[r, 1], v[r, 2])))
         wy = cross(w, y)
         u = u[0] - wy[0], u[1] - wy[1], u[2] - wy[2]
     return Slip(u, s, w)
@@ -199,13 +206,13 @@ def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
     c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
     u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
     by_velocity(pair, push_of(touch), touch.spot.gradient, u, by_u)
-    for b in range(nodes + 1 + spins):
+    for b in range(nodes + 2 if spins else nodes + 1):
         part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
         for j in range(3):
             unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
             du = part * unit[0], part * unit[1], part * unit[2]
             if b > nodes:
-                du = cross(y, turned_by(pair.planar, unit))
+                du = cross(y, angular(pair, spins, unit))
             change = dot(by_u[0], du), dot(by_u[1], du), dot(by_u[2], du)
             for i in range(3):
                 for a in range(nodes):
@@ -226,6 +233,8 @@ def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
     """
     pair = pair_of(data, c, nodes)
     delta, thick, b = lightness(mass, cells, c, nodes), thickness(pair.shape), cells[c, nodes]
+    if spins == 2:
+        thick = lever_of(data, c, nodes)
     most *= 1.0 if nodes == 2 else float(nodes * nodes)
     near, all_of = 1.6, 3.0  # 1 + max W N of a node; both ends and one between
     if pair.once:
@@ -250,11 +259,11 @@ def kernels(depth, pieces, nodes, functions, spins):
     depth, pieces, nodes, functions
         See `refweb.effects.contact.penalty.kernels`.
     spins : int
-        1 where the last row of a cell is the rotation of the body, else 0.
+        Number of rows behind the body in a cell that are its rotation: 1 or 2, see `refweb.net.rotation`, or 0.
     """
-    arity = nodes + 1 + spins
-    _, _, contacts, touch_of = places(depth)
-    foreseen = foresight(depth)
+    rows, paired = nodes + (2 if spins else 1), pairing(spins)
+    _, _, contacts, touch_of = places(depth, spins)
+    foreseen = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -280,15 +289,36 @@ def kernels(depth, pieces, nodes, functions, spins):
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         found, z, q = np.empty((PLACES * pieces, 3)), np.empty((nodes + 1, 3)), np.empty((3, 3))
-        by_y, by_u = np.empty((3, 3)), np.empty((3, 3))
+        by_y, by_u, pushes, arms = (
+            np.empty((3, 3)),
+            np.empty((3, 3)),
+            np.empty((pieces, nodes, 3)),
+            np.empty((nodes, 3)),
+        )
+        damped = np.empty_like(blocks if spins == 2 else blocks[:0])
+        damped[:] = 0.0
         blocks[:] = 0.0
         for first in range(0, cells.shape[0] if not definite else 0, pieces):
+            pushes[:] = 0.0
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 place_moves(touch, touch.inner, nodes, functions, z)
                 add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_u)
+                if spins == 2:
+                    pair, place, y = touch.pair, touch.place, touch.spot.y
+                    u, _, _ = slip_of(v, cells, touch.c, nodes, spins, functions, pair, place, y)
+                    own = friction_force(pair, push_of(touch), touch.spot.gradient, u)
+                    add_push(pushes[touch.c - first], 1.0, own, place, nodes, functions)
+                    add_damping(damped, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
-                turn_block(blocks, c, arity, data, nodes, q)
+                axes = paired(x, cells, data, c, nodes).axes
+                if spins == 2:
+                    set_arms(x, cells, data, c, nodes, axes, arms)
+                    add_rotation(blocks[c], pushes[c - first], arms, nodes)
+                    add_velocities(blocks[c], damped[c], v, cells, c, nodes, axes)
+                turn_block(blocks, c, rows, axes, q)
+                if spins == 2:
+                    to_quaternion(blocks[c], x, cells[c, nodes + 1], cells[c, nodes + 2], nodes)
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
@@ -299,7 +329,7 @@ def kernels(depth, pieces, nodes, functions, spins):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
-                turn_block(blocks, c, arity, data, nodes, q)
+                turn_block(blocks, c, rows, paired(x, cells, data, c, nodes).axes, q)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):

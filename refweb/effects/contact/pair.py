@@ -1,21 +1,24 @@
 """Numbers of a pair, one element and one body, as the kernels of contact read them.
 
 Data of a cell begin with the columns `RADIUS` to `AWAY`, and vectors from the centre to the cell's nodes in the web's
-position; behind these stands the rest of a `Pair`, which spheres alone do not need.
+position; behind these stands the rest of a `Pair`, which spheres alone do not need, and at the end what turning takes.
 """
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 
 from ...kernels import kernel
 from ...net.rigid_body import Grown
+from ...net.rotation import matrix_at, times
 
 RADIUS, PENALTY, AWAY = 0, 1, 2
 """Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
 _EXPONENT, _DAMPING, _FRICTION, _SLIP, _GROWTH, _CORE, _ROUND, _ONCE, _PLANAR, _AXES = 0, 1, 2, 3, 4, 5, 8, 9, 10, 11
+_MOBILITY, _LEVER = 20, 26
 """Columns behind the vectors."""
 
 
@@ -34,6 +37,8 @@ class Pair(NamedTuple):
         Unit vectors of the body's axes.
     once, planar : bool
         As in `refweb.net.rigid_body.Shape`.
+    mobility : tuple of 6 float
+        W of `refweb.net.rotation` along these axes, 00, 01, 02, 11, 12, 22.
     """
 
     stiffness: float
@@ -45,9 +50,10 @@ class Pair(NamedTuple):
     axes: tuple
     once: bool
     planar: bool
+    mobility: tuple
 
 
-def pair_data(body, cells, points, law):
+def pair_data(body, cells, points, law, tumbles=False):
     """Data of the contact of elements with a body, shape (cells, columns).
 
     Parameters
@@ -60,18 +66,70 @@ def pair_data(body, cells, points, law):
         Reference positions [m].
     law : tuple of 5 float
         Stiffness, exponent, damping, friction and slip velocity, as in `Pair`.
+    tumbles : bool
+        Whether its axes are those of its rows of rotation.
     """
     away = (points[cells] - points[body.row]).reshape(len(cells), -1)
     shape, (stiffness, *law) = body.shape, law
     radius, core, round_ = shape.grown()
-    tail = [*law, radius, *core, round_, shape.once, shape.planar, *shape.frame().ravel()]
+    tail = [*law, radius, *core, round_, shape.once, shape.planar, *body.axes.ravel()]
+    tail += [*body.mobility[np.triu_indices(3)], lever(body)] if tumbles else []
     head, tail = (np.tile(part, (len(cells), 1)) for part in ([body.extent, stiffness], tail))
     return np.column_stack([head, away, tail])
 
 
+def lever(body):
+    """√(I (y × g)·J⁻¹(y × g)) for any point y of a body and unit vector g, at most [m]: a lever for its moment I."""
+    reach = np.array(body.core) + body.radius
+    across = np.sqrt((reach**2).sum() - reach**2)
+    return float(np.sqrt(across @ np.abs(body.mobility) @ across))
+
+
+@kernel(forceinline=True)
+def lever_of(data, c, nodes):
+    """What `lever` says of the body of cell c."""
+    return data[c, AWAY + 3 * nodes + _LEVER]
+
+
+@functools.cache
+def pairing(spins):
+    """Kernel ``(x, cells, data, c, nodes)`` of the `Pair` of cell c at displacements x.
+
+    Parameters
+    ----------
+    spins : int
+        2 where the last rows of a cell are those of the rotation of the body, of which its axes follow.
+    """
+
+    @kernel(forceinline=True)
+    def paired(x, cells, data, c, nodes):
+        pair = pair_of(data, c, nodes)
+        if spins < 2:
+            return pair
+        turned, at, axes = (
+            matrix_at(x, cells[c, nodes + 1], cells[c, nodes + 2]),
+            AWAY + 3 * nodes + _MOBILITY,
+            pair.axes,
+        )
+        return Pair(
+            pair.stiffness,
+            pair.exponent,
+            pair.damping,
+            pair.friction,
+            pair.slip_velocity,
+            pair.shape,
+            (times(turned, axes[0]), times(turned, axes[1]), times(turned, axes[2])),
+            pair.once,
+            pair.planar,
+            (data[c, at], data[c, at + 1], data[c, at + 2], data[c, at + 3], data[c, at + 4], data[c, at + 5]),
+        )
+
+    return paired
+
+
 @kernel(forceinline=True)
 def pair_of(data, c, nodes):
-    """The `Pair` of cell c; what is not read of it costs nothing."""
+    """The `Pair` of cell c as its body starts; what is not read of it costs nothing."""
     at = AWAY + 3 * nodes
     a, k = at + _AXES, at + _CORE
     return Pair(
@@ -88,4 +146,5 @@ def pair_of(data, c, nodes):
         ),
         data[c, at + _ONCE] != 0.0,
         data[c, at + _PLANAR] != 0.0,
+        (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
     )

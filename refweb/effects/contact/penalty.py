@@ -6,6 +6,9 @@ body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the place, and y' = dy
 
     stiffness of (a, b)    k W N_a N_b (p δ^(p−1) g⊗g + δ^p H) + c_a⊗∂ξ/∂x_b,
     c_a                    k δ^(p−1) [(W' δ + p W δ') N_a g + W δ (N_a H y' + N_a' g)].
+
+A body that turns feels the moment y × F of its push F about its centre, y from there to the line's point; what that
+adds to the stiffness is in `refweb.effects.contact.tumbling`.
 """
 
 from __future__ import annotations
@@ -17,10 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..vectors import dot
+from ..vectors import cross, dot
 from .nearest_point import lightness, point, share
-from .pair import pair_of
+from .pair import lever_of, pair_of, pairing
 from .places import PLACES, from_axes, hessian_times, place_moves, places, window
+from .tumbling import add_moments, add_push, add_rotation, set_arms, to_quaternion
 
 SHALLOW = 0.05
 """Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
@@ -50,9 +54,8 @@ def push_of(touch):
 
 
 @kernel()
-def turn_block(blocks, c, rows, data, nodes, q):
+def turn_block(blocks, c, rows, axes, q):
     """Turn the block of cell c from the axes of its body; ``q (3, 3)`` is space to work in."""
-    axes = pair_of(data, c, nodes).axes
     for r in range(0, 3 * rows, 3):
         for s in range(0, 3 * rows, 3):
             for i in range(3):
@@ -85,13 +88,14 @@ class Foreseen(NamedTuple):
 
 
 @functools.cache
-def foresight(depth):
+def foresight(depth, spins=0):
     """Kernel ``(careful, reach, speed, x, mass, cells, data, c, nodes, functions)`` of what is `Foreseen` of a cell.
 
     It goes no deeper than ``reach`` and the energy of what meets at this speed allow; unless ``careful``, only by
-    `SHALLOW` of that, and not beyond twice the depth that it already has. ``depth`` is the kernel of the bodies.
+    `SHALLOW` of that, and not beyond twice the depth that it already has. ``depth`` is the kernel of the bodies,
+    ``spins`` as in `refweb.effects.contact.pair.pairing`.
     """
-    within, deepest, _, _ = places(depth)
+    within, deepest, _, _ = places(depth, spins)
 
     @kernel()
     def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
@@ -142,10 +146,11 @@ def add_stiffness(blocks, touch, definite, nodes, functions, z):
 
 
 @kernel(forceinline=True)
-def add_row_sums(rates, foreseen, speed, mass, cells, data, c, nodes):
+def add_row_sums(rates, foreseen, speed, mass, cells, data, c, nodes, spins):
     """Add the row sums of the stiffness of an element's contacts; nothing passes through between two steps.
 
-    Half the bound are steps of a tenth of the body's thickness.
+    Half the bound are steps of a tenth of the body's thickness. A body that turns has a rotation among its unknowns, of
+    the lever that its light ends make of its moment of inertia; it is scaled as the body is.
     """
     scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
     deep, length, pair = foreseen.depth, foreseen.length, pair_of(data, c, nodes)
@@ -155,15 +160,20 @@ def add_row_sums(rates, foreseen, speed, mass, cells, data, c, nodes):
     if pair.once:  # a line turns under a push that slides along it
         tilt = scale * deep / length if length > 0.0 else 0.0
         own = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
-    body = own * (1.0 + 1.0 / delta) if delta > 0.0 else own
+    spun = 0.0
+    if spins:
+        r, arm = cells[c, nodes + 1], lever_of(data, c, nodes)
+        spun = min(delta * arm * math.sqrt(mass[b] / mass[r]), 1.0)
+        rates[r] += own * arm * arm * (1.0 + (1.0 + delta) / spun)
+    body = own * (1.0 + (1.0 + spun) / delta) if delta > 0.0 else own
     rates[b] = max(rates[b] + body, (10.0 * speed / thick) ** 2 * mass[b])
     for a in range(nodes):
         r = cells[c, a]
-        rates[r] = max(rates[r] + own * (1.0 + delta), (10.0 * speed / thick) ** 2 * mass[r])
+        rates[r] = max(rates[r] + own * (1.0 + delta + spun), (10.0 * speed / thick) ** 2 * mass[r])
 
 
 @functools.cache
-def kernels(depth, pieces, nodes, functions):
+def kernels(depth, pieces, nodes, functions, spins=0):
     """Force, energy, stiffness and bound kernels.
 
     Parameters
@@ -176,9 +186,12 @@ def kernels(depth, pieces, nodes, functions):
         Nodes per element.
     functions : tuple of float
         Coefficients of the element's functions, by power of ξ, then by node in the order along the line.
+    spins : int
+        2 where the last rows of a cell are those of the rotation of the body, else 0.
     """
-    _, _, contacts, touch_of = places(depth)
-    foreseen = foresight(depth)
+    arity, paired = nodes + 1 + spins, pairing(spins)
+    _, _, contacts, touch_of = places(depth, spins)
+    foreseen = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -194,6 +207,10 @@ def kernels(depth, pieces, nodes, functions):
                     for a in range(nodes):
                         f[cells[c, a], k] -= share(a, nodes, functions, touch.place)[0] * push * g[k]
                     f[cells[c, nodes], k] += push * g[k]
+                if spins:
+                    moment = from_axes(touch.pair.axes, cross(touch.spot.y, touch.spot.gradient))
+                    for k in range(3):
+                        f[cells[c, nodes + 1], k] += push * moment[k]
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -209,20 +226,33 @@ def kernels(depth, pieces, nodes, functions):
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         found, z, q = np.empty((PLACES * pieces, 3)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        pushes, arms, turning = np.empty((pieces, nodes, 3)), np.empty((nodes, 3)), spins > 0 and not definite
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
+            pushes[:] = 0.0
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 place_moves(touch, touch.inner and not definite, nodes, functions, z)
                 add_stiffness(blocks, touch, definite, nodes, functions, z)
+                if turning:
+                    add_push(
+                        pushes[touch.c - first], -push_of(touch), touch.spot.gradient, touch.place, nodes, functions
+                    )
             for c in range(first, first + pieces):
-                turn_block(blocks, c, nodes + 1, data, nodes, q)
+                axes = paired(x, cells, data, c, nodes).axes
+                if turning:
+                    set_arms(x, cells, data, c, nodes, axes, arms)
+                    add_moments(blocks[c], pushes[c - first], arms, nodes)
+                    add_rotation(blocks[c], pushes[c - first], arms, nodes)
+                turn_block(blocks, c, arity - (1 if spins else 0), axes, q)
+                if turning:
+                    to_quaternion(blocks[c], x, cells[c, nodes + 1], cells[c, nodes + 2], nodes)
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
             most = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
             if most.depth > 0.0:
-                add_row_sums(rates, most, speed, mass, cells, data, c, nodes)
+                add_row_sums(rates, most, speed, mass, cells, data, c, nodes, spins)
 
     return force, energy, stiffness, bound

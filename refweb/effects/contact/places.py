@@ -18,7 +18,7 @@ from typing import NamedTuple
 from ...kernels import kernel
 from ..vectors import dot
 from .nearest_point import SAMPLES, far, point, share
-from .pair import Pair, pair_of
+from .pair import Pair, pair_of, pairing
 
 PLACES = 3
 """Largest number of contacts of an element."""
@@ -153,7 +153,7 @@ class Places(NamedTuple):
 
 
 @functools.cache
-def places(depth):
+def places(depth, spins=0):
     """Kernels that find where lines touch.
 
     ``within(x, cells, data, c, nodes, functions, place)`` is the `Spot` at a place of cell c, ``deepest`` of all but
@@ -164,11 +164,14 @@ def places(depth):
     ----------
     depth : kernel
         Depth in the bodies, as `refweb.net.grown_core.depth`.
+    spins : int
+        See `refweb.effects.contact.pair.pairing`.
     """
+    paired = pairing(spins)
 
     @kernel()
     def within(x, cells, data, c, nodes, functions, place):
-        pair = pair_of(data, c, nodes)
+        pair = paired(x, cells, data, c, nodes)
         p, d, e = point(x, cells, data, c, nodes, functions, place)
         p, d, e = along_axes(pair.axes, p), along_axes(pair.axes, d), along_axes(pair.axes, e)
         deep, gradient, hessian = depth(p, pair.shape)
@@ -252,6 +255,6 @@ def places(depth):
     def touch_of(x, cells, data, nodes, functions, found, n):
         c, place = int(found[n, 0]), found[n, 1]
         spot = within(x, cells, data, c, nodes, functions, place)
-        return Touch(c, place, found[n, 2] > 0.0, pair_of(data, c, nodes), spot)
+        return Touch(c, place, found[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot)
 
     return Places(within, deepest, contacts, touch_of)

@@ -42,15 +42,16 @@ from ..vectors import cross, dot
 from .friction import facing
 from .nearest_point import share
 from .penalty import push_of
-from .places import PLACES, from_axes, places
+from .places import PLACES, along_axes, from_axes, hessian_times, places
 
 CELL, ROWS, SHARES, AXES, LEVERS, START = 0, 1, 5, 7, 16, 25
 """Columns of what touches: cell; rows of the nodes, the body and its rotation, −1 without; shares of the nodes; the
-normal and two tangents; what an angular velocity adds to u along each; u⁻ along each [m/s]."""
+normal and two tangents; what the velocity of the rotation adds to u along each; u⁻ along each [m/s]."""
 OWN, MIXED, PUSH, DAMPING, FRICTION, SLIP = 28, 31, 33, 34, 35, 36
 """J M⁻¹ Jᵀ of each direction [1/kg], and of the normal with each tangent; N₀ [N], d [s/m], μ and v_s [m/s]."""
-FORCE, THETA, SLOT, WIDTH = 37, 40, 42, 43
-"""F along each direction [N], θ of the normal and of the tangents, slot in the memory of a cell; number of columns."""
+FORCE, THETA, SLOT, ARMS, WIDTH = 37, 40, 42, 43, 52
+"""F along each direction [N], θ of the normal and of the tangents, slot in the memory of a cell; what a force along
+each direction adds to the moment on the body; number of columns."""
 SLOTS, NOTED = 3, 4
 """Contacts that a cell has at most, and what is remembered of each: the number of the step, and F [N]."""
 SETTLING = 2
@@ -124,7 +125,7 @@ def push_apart(touches, n, p, q, s, f):
         f[b, k] += touches[n, SHARES + 1] * force
         f[body, k] -= force
         if spin >= 0:
-            f[spin, k] += p * touches[n, LEVERS + k] + q * touches[n, LEVERS + 3 + k] + s * touches[n, LEVERS + 6 + k]
+            f[spin, k] += p * touches[n, ARMS + k] + q * touches[n, ARMS + 3 + k] + s * touches[n, ARMS + 6 + k]
 
 
 @kernel()
@@ -136,7 +137,7 @@ def weigh(touches, n, i, j, inverse):
         point = touches[n, SHARES] ** 2 * inverse[a, k] + touches[n, SHARES + 1] ** 2 * inverse[b, k] + inverse[body, k]
         total += touches[n, AXES + 3 * i + k] * touches[n, AXES + 3 * j + k] * point
         if spin >= 0:
-            total += touches[n, LEVERS + 3 * i + k] * touches[n, LEVERS + 3 * j + k] * inverse[spin, k]
+            total += touches[n, ARMS + 3 * i + k] * touches[n, LEVERS + 3 * j + k] * inverse[spin, k]
     return total
 
 
@@ -148,21 +149,26 @@ def turn_tangents(touches, n, inverse):
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
         c, s = math.cos(angle), math.sin(angle)
-        for at in (AXES, LEVERS):
+        for at in (AXES, LEVERS, ARMS):
             for k in range(3):
                 one, other = touches[n, at + 3 + k], touches[n, at + 6 + k]
                 touches[n, at + 3 + k], touches[n, at + 6 + k] = c * one + s * other, c * other - s * one
 
 
 @kernel()
-def set_axis(touches, n, i, axis, y, normal, planar):
-    """Write direction i of a contact at y from the centre, and its lever: of a ring, about its normal alone."""
-    lever = cross(axis, y)
-    if planar:
-        turn = dot(lever, normal)
-        lever = turn * normal[0], turn * normal[1], turn * normal[2]
+def set_axis(touches, n, i, axis, y, pair, spins):
+    """Write direction i of a contact at y from the centre, its arm and its lever: of a ring, about its normal alone."""
+    arm = cross(axis, y)
+    if pair.planar:
+        normal = pair.axes[2]
+        turn = dot(arm, normal)
+        arm = turn * normal[0], turn * normal[1], turn * normal[2]
+    lever = arm
+    if spins == 2:
+        lever = from_axes(pair.axes, hessian_times(pair.mobility, along_axes(pair.axes, arm)))
     for k in range(3):
         touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = axis[k], lever[k]
+        touches[n, ARMS + 3 * i + k] = arm[k]
 
 
 @kernel()
@@ -170,7 +176,7 @@ def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
     """Write all that sweeps ask of a contact of an element with two nodes."""
     c, pair = touch.c, touch.pair
     touches[n, CELL] = c
-    for k in range(3 + spins):
+    for k in range(4 if spins else 3):
         touches[n, ROWS + k] = cells[c, k]
     if not spins:
         touches[n, ROWS + 3] = -1.0
@@ -183,9 +189,9 @@ def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
     e = cross(g, least)
     size = math.sqrt(dot(e, e))
     e = e[0] / size, e[1] / size, e[2] / size
-    set_axis(touches, n, 0, g, y, pair.axes[2], pair.planar)
-    set_axis(touches, n, 1, e, y, pair.axes[2], pair.planar)
-    set_axis(touches, n, 2, cross(g, e), y, pair.axes[2], pair.planar)
+    set_axis(touches, n, 0, g, y, pair, spins)
+    set_axis(touches, n, 1, e, y, pair, spins)
+    set_axis(touches, n, 2, cross(g, e), y, pair, spins)
     turn_tangents(touches, n, inverse)
     for i in range(3):
         touches[n, START + i] = along(touches, n, i, v)
@@ -314,7 +320,7 @@ def kernels(depth, pieces, functions, spins):
     depth, pieces, functions, spins
         See `refweb.effects.contact.friction.kernels`.
     """
-    _, _, contacts, touch_of = places(depth)
+    _, _, contacts, touch_of = places(depth, spins)
 
     @kernel(MEET)
     def meet(h, x, v, inverse, cells, data, touches, begin):

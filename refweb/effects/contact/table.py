@@ -53,6 +53,11 @@ def _bodies(name, value):
     return {k: b if isinstance(b, BodyContact) else BodyContact.read(f"{name}.{k}", b) for k, b in value.items()}
 
 
+def rotations(body):
+    """Number of its rows of rotation."""
+    return (body.spin is not None) + (body.turn is not None)
+
+
 @table
 class Contact(Table):
     """Contact of the web with all bodies.
@@ -70,7 +75,7 @@ class Contact(Table):
         d of Hunt and Crossley [s/m]: a push of k δ^p (1 + d δ̇), never a pull. A body that comes with a small velocity
         v is thrown back with 1 − 2/3 d v of it.
     friction : float
-        Coefficient of friction μ. Free bodies that are spheres or rings are turned by it.
+        Coefficient of friction μ. It turns free bodies; a push turns those alone that are no spheres or rings.
     slip_velocity : float
         Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Explicit steps
         do not depend on it.
@@ -80,9 +85,8 @@ class Contact(Table):
     Raises
     ------
     InputError
-        For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from
-        ``extend``, for a body that turns and has no friction; from ``on``, without a body, and for a name in
-        ``bodies`` that no body has.
+        For a stiffness or a slip velocity that is not > 0, damping or friction < 0, and another exponent; from ``on``,
+        without a body, and for a name in ``bodies`` that no body has.
 
     Examples
     --------
@@ -117,19 +121,12 @@ class Contact(Table):
         return replace(self, bodies={**self.bodies, **own})
 
     def extend(self, net):
-        """The net with a row of rotation for each free body that friction turns."""
-        turned = [body.name for body in net.bodies if not body.fixed and self._of(body, "friction") > 0.0]
-        for body in net.bodies:
-            if any(body.angular_velocity) and body.name not in turned:
-                raise InputError(f'friction = 0 with body "{body.name}", which turns: only friction > 0 feels that')
-        rows = {name: len(net.points) + i for i, name in enumerate(turned)}
-        return replace(
-            net,
-            points=np.vstack([net.points, np.zeros((len(turned), 3))]),
-            mass=np.concatenate([net.mass, [body.inertia for body in net.bodies if body.name in turned]]),
-            bodies=tuple(replace(body, spin=rows.get(body.name)) for body in net.bodies),
-            spins=net.spins + len(turned),
-        )
+        """The net whose free bodies turn where friction turns them."""
+
+        def turns(body):
+            return body.turns or not body.fixed and self._of(body, "friction") > 0.0
+
+        return replace(net, bodies=tuple(replace(body, turns=turns(body)) for body in net.bodies))
 
     def on(self, net):
         """The families of all pairs of a line and a body, of one kind each; ``out`` is the depth of the deepest
@@ -146,26 +143,28 @@ class Contact(Table):
         element = net.subdivide, net.order + 1, tuple(functions.ravel().tolist())
         pressed, losing = {}, {}
         for body in net.bodies:
-            linear = body.shape.once and self._of(body, "exponent") == 1.0
-            pressed.setdefault(None if linear else body.shape.depth(), []).append(body)
+            linear, spins = body.shape.once and self._of(body, "exponent") == 1.0, rotations(body)
+            depth = None if linear else body.shape.depth()
+            pressed.setdefault((depth, 2 if spins == 2 and not body.shape.once else 0), []).append(body)
             if self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0:
-                losing.setdefault((body.shape.depth(), int(body.spin is not None)), []).append(body)
-        families = [self._penalty(net, element, depth, bodies) for depth, bodies in pressed.items()]
+                losing.setdefault((body.shape.depth(), spins), []).append(body)
+        families = [self._penalty(net, element, depth, spins, bodies) for (depth, spins), bodies in pressed.items()]
         lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
         return families + lost
 
     def _numbers(self, net, bodies, spins=0):
-        """Cells and data of every element with each of some bodies, ``spins`` of 1 with their rotations."""
+        """Cells and data of every element with each of some bodies, with ``spins`` rows of their rotations."""
         along = net.cells[:, net.along]
         keys = ("stiffness", "exponent", "damping", "friction", "slip_velocity")
-        rows = [[body.row, body.spin][: 1 + spins] for body in bodies]
+        rows = [[body.row, body.spin, body.turn][: 1 + spins] for body in bodies]
         cells = [np.hstack([along, np.tile(row, (len(along), 1))]) for row in rows]
-        data = [pair_data(body, along, net.points, tuple(self._of(body, key) for key in keys)) for body in bodies]
+        laws = [tuple(self._of(body, key) for key in keys) for body in bodies]
+        data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         return np.ascontiguousarray(np.vstack(cells), dtype=np.int32), np.ascontiguousarray(np.vstack(data))
 
-    def _penalty(self, net, element, depth, bodies):
-        """The family of bodies of one depth, or without one of spheres alone."""
-        cells, data = self._numbers(net, bodies)
+    def _penalty(self, net, element, depth, spins, bodies):
+        """The family of bodies of one depth, or without one of spheres alone; with ``spins`` of 2 they turn."""
+        cells, data = self._numbers(net, bodies, spins)
         if depth is None:
             from .sphere import kernels
 
@@ -174,7 +173,7 @@ class Contact(Table):
         else:
             from .penalty import kernels
 
-            force, energy, stiffness, bound = kernels(depth, *element)
+            force, energy, stiffness, bound = kernels(depth, *element, spins)
         return Family(
             name="contact",
             contact=True,
@@ -188,6 +187,7 @@ class Contact(Table):
             book="contact_energy",
             observed=1,
             internal=True,
+            symmetric=spins == 0,  # moments, and quaternions
         )
 
     def _friction(self, net, element, depth, spins, bodies):

@@ -20,7 +20,7 @@ class Box(Shape):
     size : sequence of 3 float
         Its edges [m], > 0.
     axes : list of 2 vectors, optional
-        Directions of the first two edges, at right angles; by default x and y.
+        Directions of the first two edges, at right angles; by default x and y. Not with ``orientation``.
     rounding : float, optional
         Radius of the edges [m], > 0, by default 2 % of the smallest size; see `refweb.net.grown_core`.
 
@@ -33,6 +33,8 @@ class Box(Shape):
         position = [0.0, 0.0, -0.2]
         fixed = true
     """
+
+    free = True
 
     size: Several = vector(unit="m")
     axes: Several = rows(3, default=None)

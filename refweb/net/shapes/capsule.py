@@ -17,7 +17,7 @@ class Capsule(Shape):
     length : float
         Distance of the centres of its half spheres [m], > 0; from end to end it is longer by two radii.
     axis : sequence of 3 float
-        Its axis.
+        Its axis; not with ``orientation``.
 
     Examples
     --------
@@ -31,13 +31,16 @@ class Capsule(Shape):
         fixed = true
     """
 
+    free = True
+
     radius: float = real(above=0, unit="m")
     length: float = real(above=0, unit="m")
-    axis: Several = vector()
+    axis: Several = vector(default=None)
 
     def check(self):
         """Refuse an axis that is zero."""
-        self.frame()
+        if self.axis is not None:
+            self.frame()
 
     def grown(self):
         """Its axis, grown by the radius."""

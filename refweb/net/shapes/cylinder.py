@@ -20,7 +20,7 @@ class Cylinder(Shape):
     length : float
         Its length [m], > 0.
     axis : sequence of 3 float
-        Its axis.
+        Its axis; not with ``orientation``.
     rounding : float, optional
         Radius of the edges [m], > 0, by default 2 % of the smallest size; see `refweb.net.grown_core`.
 
@@ -36,14 +36,17 @@ class Cylinder(Shape):
         fixed = true
     """
 
+    free = True
+
     radius: float = real(above=0, unit="m")
     length: float = real(above=0, unit="m")
-    axis: Several = vector()
+    axis: Several = vector(default=None)
     rounding: float | None = real(default=None, above=0, unit="m")
 
     def check(self):
         """Refuse an axis that is zero and a rounding that is too large."""
-        self.frame()
+        if self.axis is not None:
+            self.frame()
         check_rounding(self.rounding, self._sizes())
 
     def _sizes(self):

@@ -18,6 +18,8 @@ TUBE = 0.04
 class Ring(Shape):
     """A ring; along its normal, its third direction, it has no ends.
 
+    It keeps its plane: it turns about its normal only.
+
     Parameters
     ----------
     radius : float
@@ -54,9 +56,14 @@ class Ring(Shape):
         """Unit vectors of its axes, the normal third."""
         return axes_about("normal", self.normal)
 
+    def volume(self):
+        """None: it has no thickness."""
+        raise InputError('density has no meaning for shape = "ring", which has no thickness: give mass = ... [kg]')
+
     def inertia(self, mass):
-        """Of a thin ring about its normal, m r²."""
-        return mass * self.radius**2
+        """Of a thin ring, m r² about its normal and half of it across."""
+        about = mass * self.radius**2
+        return np.diag([0.5 * about, 0.5 * about, about])
 
     def refuse_turning(self, angular_velocity):
         """Refuse to turn about another axis than the normal."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...tables import real, table
 from ..rigid_body import Grown, Shape
 
@@ -36,4 +38,4 @@ class Sphere(Shape):
 
     def inertia(self, mass):
         """Of a solid sphere, 2/5 m r²."""
-        return 0.4 * mass * self.radius**2
+        return 0.4 * mass * self.radius**2 * np.eye(3)

@@ -37,8 +37,10 @@ class Observe(Table):
     line : int, str or list, optional
         Lines of a line quantity, by number or group, see `refweb.net.groups`. Of several the one with the largest
         value counts; without ``line`` that is over all.
-    component : {0, 1, 2, "x", "y", "z"}, optional
-        Axis of a nodal quantity; without it the magnitude.
+    component : {0, 1, 2, "x", "y", "z", "w"}, optional
+        Axis of a nodal quantity, or of one of a body that turns; without it the magnitude. Of an orientation it is the
+        component of the quaternion that takes the axes x, y and z to those of the body, "w" or 3 being its scalar part;
+        without it the angle from the start.
     reduce : {"max", "min", "final"}
         Reduction over time; in statics none, where each load step has results of its own.
     average : float, optional
@@ -73,7 +75,7 @@ class Observe(Table):
     node: Several = nodes(default=None)
     body: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
-    component: int | None = component(default=None)
+    component: int | None = component(default=None, axes="xyzw")
     reduce: str = choice("max", "min", "final", default="final")
     average: float | None = real(default=None, above=0.0, unit="s")
 
@@ -87,6 +89,8 @@ class Observe(Table):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
+        if self.component == 3 and self.quantity != "orientation":
+            raise InputError(f'component = "w" has no meaning for quantity = "{self.quantity}"')
         if self.node is not None and self.body is not None:
             raise InputError(f"node = {shown(self.node)} and body = {shown(self.body)} exclude each other")
         if self.average is not None and self.observable.booked:

@@ -1,0 +1,186 @@
+"""How a body turns: its orientation, its angular velocity and its angular momentum about its centre.
+
+All are along the axes x, y and z of the scene.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...errors import InputError
+from ...kernels import kernel
+from ...messages import nearest
+from ...net.rotation import matrix_at, quaternion_of, times, times_transposed
+from ..probes import MAGNITUDE, PROBE, Probe
+from .observable import Observable, Value
+
+W = 3
+"""Number of the component "w"."""
+
+
+class Turning(Observable):
+    """What one body has."""
+
+    keys = ("body", "component")
+    dynamic = True
+
+    def on(self, system):
+        """Refuse a body that is none, and none where there are several or no body."""
+        names, body = [body.name for body in system.net.bodies], self.observe.body
+        if not names:
+            raise InputError(f'quantity = "{self.observe.quantity}" needs a [[body]] in the scene')
+        if body is None and len(names) > 1:
+            raise InputError(
+                f'body is missing: quantity = "{self.observe.quantity}" needs one body, {nearest("", names)}'
+            )
+        if body is not None and body not in names:
+            raise InputError(f'body = "{body}" is not a body, {nearest(body, names)}')
+
+    def body(self, system):
+        """The body it is of."""
+        return next(body for body in system.net.bodies if self.observe.body in (None, body.name))
+
+    def rows(self, system):
+        """Component and rows of rotation of the body, −1 where there is none."""
+        component, body = self.observe.component, self.body(system)
+        rows = (MAGNITUDE if component is None else component, body.spin, body.turn)
+        return [-1 if row is None else row for row in rows]
+
+    def _sized(self, vector):
+        component = self.observe.component
+        return Value(float(np.linalg.norm(vector) if component is None else vector[component]), None)
+
+
+class Orientation(Turning):
+    """Components of the quaternion that takes x, y and z to the axes of the body; without one the angle from the start.
+
+    It is that of the scene's ``orientation`` at the start, or of its axes with w ≥ 0, and does not jump. The angle is 0
+    to π.
+    """
+
+    def __init__(self, observe):
+        super().__init__(observe)
+        self.unit = "rad" if observe.component is None else "1"
+
+    def on(self, system):
+        """Refuse a ball, which looks the same however it turns."""
+        super().on(system)
+        body = self.body(system)
+        if body.spin is not None and body.turn is None and not body.shape.planar:
+            raise InputError(
+                f'body = "{body.name}" has no orientation that is followed: a sphere with one moment of inertia looks '
+                "the same however it turns"
+            )
+
+    def of(self, state):
+        """By the rotation of the body."""
+        value = self.probe(state.system)
+        rows = np.array(value.rows, dtype=np.int64)
+        return Value(float(orientation_of(state.x, rows, np.ascontiguousarray(value.data, dtype=float))), None)
+
+    def probe(self, system):
+        """Of x alone."""
+        body, component = self.body(system), self.observe.component
+        component = -1 if component is None else component
+        return Probe(
+            orientation,
+            [component, *self.rows(system)[1:]],
+            np.concatenate([quaternion_of(body.axes.T), body.axes[2]])[None],
+        )
+
+
+class AngularVelocity(Turning):
+    """Angular velocity; in a frame that turns, against it."""
+
+    unit = "rad/s"
+
+    def of(self, state):
+        """By momentum and inertia."""
+        return self._sized(self.body(state.system).turning(state.x, state.v))
+
+    def probe(self, system):
+        """Of x and v."""
+        body = self.body(system)
+        whirl = np.eye(3) if body.turn is None else body.axes.T @ body.mobility @ body.axes
+        return Probe(angular_velocity, self.rows(system), whirl)
+
+
+class AngularMomentum(Turning):
+    """Angular momentum about the centre of the body."""
+
+    unit = "N m s"
+
+    def of(self, state):
+        """By the velocity of its row of rotation."""
+        body = self.body(state.system)
+        return self._sized(np.zeros(3) if body.spin is None else body.moment * state.v[body.spin])
+
+    def probe(self, system):
+        """Of v alone."""
+        body = self.body(system)
+        return Probe(angular_momentum, self.rows(system), np.array([[body.moment if body.spin is not None else 0.0]]))
+
+
+@kernel()
+def orientation_of(x, rows, data):
+    """Component of a quaternion, or angle; ``rows`` is (component or −1, rows of rotation), data the start, normal."""
+    w, a, b, c = 1.0, 0.0, 0.0, 0.0
+    s = rows[1]
+    if rows[2] >= 0:
+        w, a, b, c = 1.0 + x[rows[2], 0], x[s, 0], x[s, 1], x[s, 2]
+    elif s >= 0:
+        half = 0.5 * (data[0, 4] * x[s, 0] + data[0, 5] * x[s, 1] + data[0, 6] * x[s, 2])
+        size = math.sin(half)
+        w, a, b, c = math.cos(half), size * data[0, 4], size * data[0, 5], size * data[0, 6]
+    size = math.sqrt(w * w + a * a + b * b + c * c)
+    if rows[0] < 0:
+        return 2.0 * math.atan2(math.sqrt(a * a + b * b + c * c), abs(w))
+    d, p, q, r = data[0, 0], data[0, 1], data[0, 2], data[0, 3]
+    if rows[0] == W:
+        return (w * d - a * p - b * q - c * r) / size
+    if rows[0] == 0:
+        return (w * p + a * d + b * r - c * q) / size
+    if rows[0] == 1:
+        return (w * q - a * r + b * d + c * p) / size
+    return (w * r + a * q - b * p + c * d) / size
+
+
+@kernel(PROBE)
+def orientation(t, x, v, f, lines, rows, data, where):
+    """What `orientation_of` says."""
+    return orientation_of(x, rows, data)
+
+
+@kernel()
+def _sized(component, w):
+    if component == MAGNITUDE:
+        return math.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    return w[0] if component == 0 else w[1] if component == 1 else w[2]
+
+
+@kernel(PROBE)
+def angular_velocity(t, x, v, f, lines, rows, data, where):
+    """Of R W Rᵀ v; ``rows`` is (component, rows of rotation), data W along the axes of space at the start."""
+    s = rows[1]
+    if s < 0:
+        return 0.0
+    w = v[s, 0], v[s, 1], v[s, 2]
+    if rows[2] >= 0:
+        turned = matrix_at(x, s, rows[2])
+        p = times_transposed(turned, w)
+        mobility = (
+            (data[0, 0], data[0, 1], data[0, 2]),
+            (data[1, 0], data[1, 1], data[1, 2]),
+            (data[2, 0], data[2, 1], data[2, 2]),
+        )
+        w = times(turned, times(mobility, p))
+    return _sized(rows[0], w)
+
+
+@kernel(PROBE)
+def angular_momentum(t, x, v, f, lines, rows, data, where):
+    """Of data times v."""
+    s = rows[1]
+    return 0.0 if s < 0 else data[0, 0] * _sized(rows[0], (v[s, 0], v[s, 1], v[s, 2]))
