@@ -79,7 +79,12 @@ def expected_cost(scene, system):
         return None
     integrator = method.integrator_of(solve, system)
     linear = system.rows - system.net.spins
-    speed = 2.0 * float(np.linalg.norm(system.initial_velocity()[:linear], axis=1).max())
+    v = system.initial_velocity()
+    speeds = np.linalg.norm(v[:linear], axis=1)
+    for body in system.net.bodies:
+        if body.turn is not None:
+            speeds[body.row] += body.extent * np.linalg.norm(body.turning(np.zeros_like(v), v))
+    speed = 2.0 * float(speeds.max())
     rules = [ruling(integrator, system, 0.0, speed)]
     if system.contact:
         touched = ruling(integrator, system, np.inf, speed)

@@ -38,6 +38,8 @@ PLAIN = {
     "accuracy": {"error": "none"},
 }
 BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, 0.11], "velocity": [0.0, 0.0, -1.0]}
+BOX = BALL | {"shape": "box", "size": [0.2, 0.15, 0.1], "angular_velocity": [5.0, 3.0, 1.0]}
+BOX.pop("radius")
 RUBBING = {"stiffness": 1e5, "friction": 0.3}
 EFFECTS = {
     "gravity": {"gravity": {"acceleration": [0.0, 0.0, -9.81]}},
@@ -45,6 +47,7 @@ EFFECTS = {
     "motion": {"motion": [{"node": "rim", "displacement": [[0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 1.0]]}]},
     "point mass": {"point_mass": [{"node": "centre", "mass": 1.0}]},
     "contact": {"body": [BALL], "contact": {"stiffness": 1e5}},
+    "contact, a box that tumbles": {"body": [BOX], "contact": {"stiffness": 1e5}},
     "friction": {"body": [BALL], "contact": RUBBING},
     "friction at 1e-6 m/s": {"body": [BALL], "contact": RUBBING | {"slip_velocity": 1e-6}},
     "friction, damping": {"body": [BALL], "contact": RUBBING | {"damping": 0.1}},

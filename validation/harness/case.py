@@ -70,6 +70,7 @@ CASES = {
         "orbit",
         "frequencies",
         "free_net",
+        "tumbling",
     ),
     "methods": ("cross_validation", "coverage", "work_precision", "price_of_modelling"),
     "hard_cases": ("hard_cases",),

@@ -229,8 +229,8 @@ class Overlaps:
 def first_stiffness(system, body, exponent, load_steps=()):
     """Stiffness of contact that a scene asks for before it is solved [N/m^p].
 
-    It is that of `AIM` of the allowed overlap under the energy ½ μ v² that is there between the web and the body, and
-    under what pushes them. v is the speed of the body and the free node nearest to it towards each other, with what
+    It is that of `AIM` of the allowed overlap under the energy ½ μ v² that is there between the web and the body, with
+    that by which a body tumbles, and under what pushes them. v is the speed of the body and the free node nearest to it towards each other, with what
     they gain under outer forces until they meet, and that of prescribed motion. μ is the mass of the body if the web
     has supports, else the reduced mass of both; for a fixed body it is that of all free nodes. The push is the
     resultant of outer forces on the body, or, for a fixed one, on the web. Statics knows no energy: there contact is at
@@ -279,7 +279,7 @@ def _push(system, body, t):
 
 
 def _energy(system, body):
-    """½ μ v² of a web and a body that meet [J], see `first_stiffness`."""
+    """½ μ v² of a web and a body that meet, and the energy by which that turns [J], see `first_stiffness`."""
     net, nodes = system.net, system.net.nodes
     held = system.supported[:nodes]
     free = np.flatnonzero(~held.all(axis=1))
@@ -301,4 +301,7 @@ def _energy(system, body):
     along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
     gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - body.thickness, 0.0)
     mass = web if body.fixed else own if held.any() else own * web / (own + web)
-    return 0.5 * mass * ((v0 + fastest) ** 2 + gained)
+    turning = 0.0
+    if body.turn is not None:
+        turning = 0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v))
+    return 0.5 * mass * ((v0 + fastest) ** 2 + gained) + turning
