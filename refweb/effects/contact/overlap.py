@@ -230,12 +230,12 @@ def first_stiffness(system, body, exponent, load_steps=()):
     """Stiffness of contact that a scene asks for before it is solved [N/m^p].
 
     It is that of `AIM` of the allowed overlap under the energy ½ μ v² that is there between the web and the body, with
-    that by which a body tumbles, and under what pushes them. v is the speed of the body and the free node nearest to it towards each other, with what
-    they gain under outer forces until they meet, and that of prescribed motion. μ is the mass of the body if the web
-    has supports, else the reduced mass of both; for a fixed body it is that of all free nodes. The push is the
-    resultant of outer forces on the body, or, for a fixed one, on the web. Statics knows no energy: there contact is at
-    least as stiff as the stiffest line, which costs no steps; so it is, as the softest line, where nothing moves and
-    nothing pushes.
+    that by which a body tumbles, and under what pushes them. v is the speed of the body and the free node nearest to it
+    towards each other, with what they gain under outer forces until they meet, and that of prescribed motion. μ is the
+    mass of the body if the web has supports, else the reduced mass of both; for a fixed body it is that of all free
+    nodes. The push is the resultant of outer forces on the body, or, for a fixed one, on the web. Statics knows no
+    energy: there contact is at least as stiff as the stiffest line, which costs no steps; so it is, as the softest
+    line, where nothing moves and nothing pushes.
 
     Parameters
     ----------
