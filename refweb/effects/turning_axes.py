@@ -6,7 +6,8 @@ With the angular velocity Ω of the axes, a symmetric matrix G [1/s²] and consi
 
 Coriolis forces do no work: kinetic energy and potentials, this one among them, keep their sum, the Jacobi integral. The
 moment of inertia I of a sphere whose rotation is followed feels −I Ω × ω, ω its angular velocity in these axes; a ring
-keeps its plane in these axes and turns about its normal, which that does not change.
+keeps its plane in these axes and turns about its normal, which that does not change. Moments on bodies that turn in
+space are in `refweb.effects.turning_bodies`.
 
 Consistent mass couples the nodes of an element here as it does in M v': the force is that of the position between them.
 """
@@ -18,7 +19,6 @@ import math
 
 import numpy as np
 
-from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from .base import Family, column
 
@@ -145,20 +145,10 @@ def families(net, speed, pull, **own):
         G [1/s²].
     **own
         ``name`` and ``book`` of the families, and what else they have.
-
-    Raises
-    ------
-    InputError
-        For a body that turns in space.
     """
-    for body in net.bodies:
-        if body.turn is not None:
-            raise InputError(
-                f'[{own["name"]}] takes no body that turns in space, such as "{body.name}": fixed = true holds it, and '
-                "spheres and rings may turn"
-            )
     heavy = net.heavy
-    spins = np.array([b.spin for b in net.bodies if b.spin is not None and not b.shape.planar], int)
+    turning = [body for body in net.bodies if body.spin is not None and not body.shape.planar]
+    spins = np.array([body.spin for body in turning if body.turn is None], int)
     masses = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
     found = [
         _of_place(column(heavy), net.mass[heavy], net.points[heavy], pull, speed, own),
@@ -167,6 +157,10 @@ def families(net, speed, pull, **own):
     if (coupled := net.consistent_minus_lumped) is not None:
         found.append(_of_place(net.cells, coupled, net.points[net.cells], pull, speed, own))
         found.append(_of_velocity(net.cells, coupled, speed, own))
+    if any(body.turn is not None for body in turning):
+        from . import turning_bodies
+
+        found += turning_bodies.families(net, speed, pull, own)
     return found
 
 

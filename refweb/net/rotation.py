@@ -80,6 +80,19 @@ def quaternion_rate(w, a, b, c, omega):
     return -p * a - q * b - r * c, p * w + q * c - r * b, q * w + r * a - p * c, r * w + p * b - q * a
 
 
+@kernel()
+def to_quaternion(block, x, spin, turn, at):
+    """Make columns of a quaternion, in two rows of three from ``at``, of those of a rotation, of all rows before."""
+    w, a, b, c = 1.0 + x[turn, 0], x[spin, 0], x[spin, 1], x[spin, 2]
+    size = 2.0 / (w * w + a * a + b * b + c * c)
+    for i in range(at + 3):
+        k0, k1, k2 = block[i, at], block[i, at + 1], block[i, at + 2]
+        block[i, at] = size * (w * k0 + k1 * c - k2 * b)
+        block[i, at + 1] = size * (w * k1 + k2 * a - k0 * c)
+        block[i, at + 2] = size * (w * k2 + k0 * b - k1 * a)
+        block[i, at + 3] = -size * (k0 * a + k1 * b + k2 * c)
+
+
 class Turns(NamedTuple):
     """Bodies whose orientation counts.
 

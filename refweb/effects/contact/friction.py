@@ -27,12 +27,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
+from ...net.rotation import to_quaternion
 from ..vectors import cross, dot
 from .nearest_point import lightness, share
 from .pair import lever_of, pair_of, pairing
 from .penalty import SHALLOW, foresight, push_of, slope_of_power, thickness, turn_block
 from .places import PLACES, along_axes, from_axes, hessian_times, place_moves, places, window
-from .tumbling import add_push, add_rotation, add_velocities, set_arms, to_quaternion
+from .tumbling import add_push, add_rotation, add_velocities, set_arms
 
 
 class Slip(NamedTuple):
@@ -318,7 +319,7 @@ def kernels(depth, pieces, nodes, functions, spins):
                     add_velocities(blocks[c], damped[c], v, cells, c, nodes, axes)
                 turn_block(blocks, c, rows, axes, q)
                 if spins == 2:
-                    to_quaternion(blocks[c], x, cells[c, nodes + 1], cells[c, nodes + 2], nodes)
+                    to_quaternion(blocks[c], x, cells[c, nodes + 1], cells[c, nodes + 2], 3 * (nodes + 1))
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):

@@ -20,11 +20,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ...net.rotation import to_quaternion
 from ..vectors import cross, dot
 from .nearest_point import lightness, point, share
 from .pair import lever_of, pair_of, pairing
 from .places import PLACES, from_axes, hessian_times, place_moves, places, window
-from .tumbling import add_moments, add_push, add_rotation, set_arms, to_quaternion
+from .tumbling import add_moments, add_push, add_rotation, set_arms
 
 SHALLOW = 0.05
 """Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
@@ -246,7 +247,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                     add_rotation(blocks[c], pushes[c - first], arms, nodes)
                 turn_block(blocks, c, arity - (1 if spins else 0), axes, q)
                 if turning:
-                    to_quaternion(blocks[c], x, cells[c, nodes + 1], cells[c, nodes + 2], nodes)
+                    to_quaternion(blocks[c], x, cells[c, nodes + 1], cells[c, nodes + 2], 3 * (nodes + 1))
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):

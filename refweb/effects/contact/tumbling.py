@@ -105,17 +105,3 @@ def add_velocities(block, damping, v, cells, c, nodes, axes):
             block[i, at] -= k2 * own[1] - k1 * own[2]
             block[i, at + 1] -= k0 * own[2] - k2 * own[0]
             block[i, at + 2] -= k1 * own[0] - k0 * own[1]
-
-
-@kernel()
-def to_quaternion(block, x, spin, turn, nodes):
-    """Make columns of a quaternion, in two rows of three, of those of a rotation."""
-    at = 3 * (nodes + 1)
-    w, a, b, c = 1.0 + x[turn, 0], x[spin, 0], x[spin, 1], x[spin, 2]
-    size = 2.0 / (w * w + a * a + b * b + c * c)
-    for i in range(at + 3):
-        k0, k1, k2 = block[i, at], block[i, at + 1], block[i, at + 2]
-        block[i, at] = size * (w * k0 + k1 * c - k2 * b)
-        block[i, at + 1] = size * (w * k1 + k2 * a - k0 * c)
-        block[i, at + 2] = size * (w * k2 + k0 * b - k1 * a)
-        block[i, at + 3] = -size * (k0 * a + k1 * b + k2 * c)

@@ -1,0 +1,184 @@
+"""Moments on bodies that turn in space, in axes that turn steadily: of forces linear in the place, and Coriolis forces.
+
+With S = ∫ r⊗r dm of a body, which is ½ tr(J) 1 − J of its tensor of inertia J, the forces of
+`refweb.effects.turning_axes` have the moments about its centre
+
+    ∫ r × G r dm = ε : (S G),        −2 ∫ r × (Ω × (ω × r)) dm = 2 ω × S Ω,
+
+the first of the potential −½ tr(S G), of which gravity gradients are a part; the second does no work. ω is the angular
+velocity in these axes, see `refweb.net.rotation`; a rotation δθ changes S by δθ × S − S × δθ.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..net.rotation import Turns, matrix_at, times, to_quaternion
+from .base import Family
+from .vectors import cross
+
+PULL, SPEED, SPREAD, MOBILITY, LARGEST = 0, 9, 12, 21, 30
+"""Columns of data: G, Ω, S and W at the start, and the largest eigenvalue of S times that of W [kg m²]."""
+
+
+@kernel()
+def rows_of(data, c, at):
+    """A matrix of the numbers of a cell, by rows."""
+    return (
+        (data[c, at], data[c, at + 1], data[c, at + 2]),
+        (data[c, at + 3], data[c, at + 4], data[c, at + 5]),
+        (data[c, at + 6], data[c, at + 7], data[c, at + 8]),
+    )
+
+
+@kernel()
+def turned(m, s):
+    """M S Mᵀ of a symmetric matrix S, all by rows."""
+    p, q, r = times(m, s[0]), times(m, s[1]), times(m, s[2])
+    return times(m, (p[0], q[0], r[0])), times(m, (p[1], q[1], r[1])), times(m, (p[2], q[2], r[2]))
+
+
+@kernel()
+def turning_of(s, g):
+    """ε : (S G) of a matrix S and a symmetric one, by rows."""
+    return (
+        s[1][0] * g[0][2] + s[1][1] * g[1][2] + s[1][2] * g[2][2]
+        - s[2][0] * g[0][1] - s[2][1] * g[1][1] - s[2][2] * g[2][1],
+        s[2][0] * g[0][0] + s[2][1] * g[1][0] + s[2][2] * g[2][0]
+        - s[0][0] * g[0][2] - s[0][1] * g[1][2] - s[0][2] * g[2][2],
+        s[0][0] * g[0][1] + s[0][1] * g[1][1] + s[0][2] * g[2][1]
+        - s[1][0] * g[0][0] - s[1][1] * g[1][0] - s[1][2] * g[2][0],
+    )  # fmt: skip
+
+
+@kernel()
+def changed(e, s):
+    """e × S − S × e, what a small rotation e adds to a symmetric matrix S, by rows; symmetric."""
+    a, b, c = cross(e, s[0]), cross(e, s[1]), cross(e, s[2])  # columns of e × S
+    return (
+        (a[0] + a[0], b[0] + a[1], c[0] + a[2]),
+        (a[1] + b[0], b[1] + b[1], c[1] + b[2]),
+        (a[2] + c[0], b[2] + c[1], c[2] + c[2]),
+    )
+
+
+@kernel()
+def unit(j):
+    return (1.0 if j == 0 else 0.0), (1.0 if j == 1 else 0.0), (1.0 if j == 2 else 0.0)
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        s = turned(matrix_at(x, cells[c, 0], cells[c, 1]), rows_of(data, c, SPREAD))
+        moment = turning_of(s, rows_of(data, c, PULL))
+        for k in range(3):
+            f[cells[c, 0], k] += moment[k]
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    for c in range(cells.shape[0]):
+        start = rows_of(data, c, SPREAD)
+        s, g = turned(matrix_at(x, cells[c, 0], cells[c, 1]), start), rows_of(data, c, PULL)
+        out[c] = 0.0
+        for i in range(3):
+            for j in range(3):
+                out[c] -= 0.5 * (s[i][j] - start[i][j]) * g[i][j]
+
+
+@kernel(STIFFNESS)
+def stiffness(t, x, v, blocks, cells, data, definite):
+    blocks[:] = 0.0
+    for c in range(cells.shape[0] if not definite else 0):
+        s, g = turned(matrix_at(x, cells[c, 0], cells[c, 1]), rows_of(data, c, SPREAD)), rows_of(data, c, PULL)
+        for j in range(3):
+            change = turning_of(changed(unit(j), s), g)
+            for i in range(3):
+                blocks[c, i, j] = -change[i]
+        to_quaternion(blocks[c], x, cells[c, 0], cells[c, 1], 0)
+
+
+@kernel(BOUND)
+def bound(reach, speed, x, mass, rates, cells, data):
+    for c in range(cells.shape[0]):
+        size = 0.0
+        for k in range(9):
+            size += data[c, PULL + k] ** 2
+        rates[cells[c, 0]] += 4.0 * data[c, LARGEST] * math.sqrt(size)
+
+
+@kernel()
+def whirl(x, v, data, c, cells):
+    """(ω, S Ω, W) along the axes of the scene."""
+    m, a = matrix_at(x, cells[c, 0], cells[c, 1]), cells[c, 0]
+    w, o = turned(m, rows_of(data, c, MOBILITY)), (data[c, SPEED], data[c, SPEED + 1], data[c, SPEED + 2])
+    s = times(turned(m, rows_of(data, c, SPREAD)), o)
+    return times(w, (v[a, 0], v[a, 1], v[a, 2])), s, w
+
+
+@kernel(FORCE)
+def coriolis(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        omega, s, _ = whirl(x, v, data, c, cells)
+        moment = cross(omega, s)
+        for k in range(3):
+            f[cells[c, 0], k] += 2.0 * moment[k]
+
+
+@kernel(STIFFNESS)
+def coriolis_stiffness(t, x, v, blocks, cells, data, definite):
+    blocks[:] = 0.0
+    for c in range(cells.shape[0] if not definite else 0):
+        (omega, own, w), a = whirl(x, v, data, c, cells), cells[c, 0]
+        s = turned(matrix_at(x, a, cells[c, 1]), rows_of(data, c, SPREAD))
+        u, o = (v[a, 0], v[a, 1], v[a, 2]), (data[c, SPEED], data[c, SPEED + 1], data[c, SPEED + 2])
+        for j in range(3):
+            e = unit(j)
+            first, less = cross(e, omega), times(w, cross(e, u))
+            first = cross((first[0] - less[0], first[1] - less[1], first[2] - less[2]), own)
+            last = cross(omega, times(changed(e, s), o))
+            for i in range(3):
+                blocks[c, i, j] = -2.0 * (first[i] + last[i])
+        to_quaternion(blocks[c], x, a, cells[c, 1], 0)
+
+
+@kernel(STIFFNESS)
+def damping(t, x, v, blocks, cells, data, definite):
+    blocks[:] = 0.0
+    for c in range(cells.shape[0] if not definite else 0):
+        _, s, w = whirl(x, v, data, c, cells)
+        for j in range(3):
+            moment = cross((w[0][j], w[1][j], w[2][j]), s)
+            for i in range(3):
+                blocks[c, i, j] = -2.0 * moment[i]
+
+
+@kernel(BOUND)
+def damping_bound(reach, speed, x, mass, rates, cells, data):
+    for c in range(cells.shape[0]):
+        size = data[c, SPEED] ** 2 + data[c, SPEED + 1] ** 2 + data[c, SPEED + 2] ** 2
+        rates[cells[c, 0]] += 2.0 * math.sqrt(3.0 * size) * data[c, LARGEST]
+
+
+def families(net, speed, pull, own):
+    """The families of all bodies that turn in space, see `refweb.effects.turning_axes.families`."""
+    turns = Turns.of(net)
+    tensors = [turns.moment[n] * np.linalg.inv(mobility) for n, mobility in enumerate(turns.mobility)]
+    spreads = [0.5 * np.trace(tensor) * np.eye(3) - tensor for tensor in tensors]
+    largest = [
+        np.linalg.eigvalsh(spread)[-1] * np.linalg.eigvalsh(mobility)[-1]
+        for spread, mobility in zip(spreads, turns.mobility, strict=True)
+    ]
+    cells = np.ascontiguousarray(turns.rows[:, 1:], dtype=np.int32)
+    head = np.tile([*np.ravel(pull), *speed], (len(cells), 1))
+    parts = head, *(np.reshape(part, (len(cells), 9)) for part in (spreads, turns.mobility)), np.array(largest)
+    shared = dict(cells=cells, data=np.ascontiguousarray(np.column_stack(parts)), symmetric=False, at_rest=False, **own)
+    still = Family(force=force, energy=energy, stiffness=stiffness, bound=bound, **shared)
+    moving = Family(
+        force=coriolis, stiffness=coriolis_stiffness, damping=damping, damping_bound=damping_bound, **shared
+    )
+    return [still, moving]
