@@ -176,7 +176,9 @@ def families(net, speed, pull, own):
     cells = np.ascontiguousarray(turns.rows[:, 1:], dtype=np.int32)
     head = np.tile([*np.ravel(pull), *speed], (len(cells), 1))
     parts = head, *(np.reshape(part, (len(cells), 9)) for part in (spreads, turns.mobility)), np.array(largest)
-    shared = dict(cells=cells, data=np.ascontiguousarray(np.column_stack(parts)), symmetric=False, at_rest=False, **own)
+    shared: dict = dict(
+        cells=cells, data=np.ascontiguousarray(np.column_stack(parts)), symmetric=False, at_rest=False, **own
+    )
     still = Family(force=force, energy=energy, stiffness=stiffness, bound=bound, **shared)
     moving = Family(
         force=coriolis, stiffness=coriolis_stiffness, damping=damping, damping_bound=damping_bound, **shared
