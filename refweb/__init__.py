@@ -11,6 +11,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .effects.body import Body as Body
     from .effects.contact.table import Contact as Contact
     from .effects.damping import Damping as Damping
+    from .effects.drag.table import Drag as Drag
     from .effects.frame import Frame as Frame
     from .effects.gravity import Gravity as Gravity
     from .effects.link import Link as Link

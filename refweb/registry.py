@@ -33,6 +33,7 @@ EFFECTS = {
     "pressure": "refweb.effects.pressure:Pressure",
     "thrust": "refweb.effects.thrust:Thrust",
     "damping": "refweb.effects.damping:Damping",
+    "drag": "refweb.effects.drag.table:Drag",
     "bending": "refweb.effects.bending:Bending",
     "reel": "refweb.effects.reel:Reel",
     "temperature": "refweb.effects.temperature:Temperature",

@@ -49,6 +49,7 @@ MIRRORS = {
     "effects/elasticity": "net/test_elements.py test_contract.py",
     "effects/temperature": "effects/test_temperature.py",
     "effects/outer_load": "test_contract.py",
+    "effects/drag": "test_contract.py effects/test_drag.py",
     "effects/turning_axes": "test_contract.py effects/test_frame.py effects/test_orbit.py",
     "effects": "test_contract.py effects/test_{}.py",
     "system/links": "dynamics/integrators/test_ida.py",
@@ -191,6 +192,13 @@ MUTANTS = [
     ),
     Mutant("effects/turning_axes", "to, m = cells[c, a], 2.0 * data", "to, m = cells[c, a], -2.0 * data"),
     Mutant("effects/turning_axes", "2.0 * data[c, at], 2.0 * data[c, at + 1]", "data[c, at], 2.0 * data[c, at + 1]"),
+    Mutant(
+        "effects/drag/force",
+        "(1.0 if i == j else 0.0) - e[i] * e[j]",
+        "(1.0 if i == j else 0.0)",
+    ),
+    Mutant("effects/drag/kick", "touches[n, START + k] + 0.5 * h", "touches[n, START + k] + h"),
+    Mutant("effects/drag/table", "[self.normal, math.pi * self.tangential]", "[self.normal, self.tangential]"),
     Mutant("effects/orbit", "np.diag([3.0, 0.0, -1.0])", "np.diag([2.0, 0.0, -1.0])"),
     Mutant("effects/pressure", "d0 += couple * x[other, 0]", "d0 -= couple * x[other, 0]"),
     Mutant(

@@ -31,6 +31,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "Contact of lines with bodies: where they touch, how deep, and the forces of penalty, damping and friction.",
     ),
     (
+        "effects.drag",
+        "*",
+        "Drag of a fluid on lines and bodies: its table, its force, and how explicit kicks solve for it.",
+    ),
+    (
         "system",
         "*",
         "M v' = f assembled: force, tangent, mass, links and factorizations; it knows no scene, method or file.",

@@ -55,6 +55,10 @@ EXAMPLES = {
         dict(stiffness=1e3, exponent=1.5, damping=0.1, friction=0.4, slip_velocity=2.0),
     ],
     "Frame": [dict(angular_velocity=(1.0, -2.0, 3.0))],
+    "Drag": [
+        dict(density=20.0, normal=1.1, tangential=0.3),
+        dict(density=20.0, diameter=0.05, wind=(1.0, 2.0, -3.0)),
+    ],
     "Orbit": [dict(mean_motion=2.0)],
     "Pressure": [
         dict(lines="all", normal=(1.0, 2.0, -2.0), value=30.0),

@@ -136,6 +136,7 @@ EFFECTS = {
     "damping": table(optional={"time": ANY, "rate": ANY}),
     "bending": table(stiffness=ANY),
     "frame": table(angular_velocity=VECTOR),
+    "drag": table(density=ANY, optional={"wind": VECTOR, "normal": ANY}),
     "orbit": table(mean_motion=ANY),
     "pressure": st.lists(table(lines=LINES, normal=VECTOR, value=SIGNED), min_size=1, max_size=1),
     "thrust": st.lists(

@@ -69,7 +69,7 @@ DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.obser
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
-LOOP = ("central_difference", "explicit_loop", "between_steps", "nearby", "records", "step", "step_bound")
+LOOP = ("central_difference", "explicit_loop", "between_steps", "nearby", "records", "rubbed", "step", "step_bound")
 EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP}
 AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
 SUNDIALS = TANGENT | {"system.mass"} | {f"dynamics.integrators.{name}" for name in ("sundials", *AROUND_STEPS)}
@@ -88,7 +88,7 @@ VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
 BELOW["contact"] |= VECTORS | {"net.rotation"}
 BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
-BELOW |= {"bending": VECTORS}
+BELOW |= {"bending": VECTORS, "drag": VECTORS | {f"effects.drag{name}" for name in ("", ".force", ".kick")}}
 GENERAL = {"effects.contact.places", "effects.contact.tumbling", "net.grown_core"}
 """What effects are made of besides their own file."""
 OBSERVED = {"reaction": {"results.observables.nodal"}}
@@ -233,6 +233,7 @@ TABLES = {
     "link": {"nodes": [5, 6]},
     "frame": {"angular_velocity": [0.0, 0.0, 1.0]},
     "orbit": {"mean_motion": 1.0},
+    "drag": {"density": 1.2},
     "pressure": {"lines": [0, 1], "normal": [0.0, 0.0, 1.0], "value": 1.0},
     "thrust": {"node": 4, "line": 0, "force": 1.0},
     "damping": {"time": 1e-4},
@@ -250,6 +251,7 @@ KERNELS["contact"] = {**FAMILY, "near": 1}
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
 KERNELS["orbit"] = KERNELS["frame"]
+KERNELS["drag"] = {**FAMILY, **dict.fromkeys(SOLVED, 1)}
 KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
 KERNELS |= {name: {} for name in ("point_mass", "velocity", "body")}
 """Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
@@ -310,6 +312,8 @@ def expected(*effects):
         pairs = pairs + [(node, rows - 1) for node in range(rows - 1)]
     if {"frame", "orbit"} & set(effects):  # the axes of a row with each other
         pairs = pairs + [(row, row) for row in range(rows)]
+    if "drag" in effects and {"body", "contact"} & set(effects):
+        pairs = pairs + [(rows - 1, rows - 1)]
     return coupled(pairs, held, rows)
 
 
@@ -366,7 +370,7 @@ def summed(*effects):
     total = dict.fromkeys(LISTED, 0) | FAMILY
     for name in effects:
         for which, number in KERNELS[name].items():
-            total[which] += number
+            total[which] += number * (2 if name == "drag" and {"body", "contact"} & set(effects) else 1)
     total["work of lengths"] = min(total["lengths"], 1)
     return total
 

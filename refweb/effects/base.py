@@ -32,7 +32,7 @@ class Rubbing(NamedTuple):
     ----------
     meet, recall, sweep, give : kernel
         What touches, its forces in the step before, one sweep over it, and its power; signatures are in
-        `refweb.kernels`. All families have the same ``sweep``.
+        `refweb.kernels`. Families that stand together and have the same ``sweep`` are swept together.
     width : int
         Number of columns of what touches.
     memory : int

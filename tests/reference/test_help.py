@@ -34,6 +34,7 @@ BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0, 0, -0.2]}
 AROUND = {
     "contact": {"body": [BALL]},
     "contact.bodies": {"body": [BALL]},
+    "drag.bodies": {"body": [BALL | {"name": "hub"}], "drag": {"density": 1.2}},
     "event": {"body": [BALL], "contact": {}},
     "temperature.groups": {"temperature": {"expansion": 1e-6, "change": 0.0}},
     "link": {"solve": {**SCENE["solve"], "method": "ida"}},

@@ -52,6 +52,7 @@ EFFECTS = {
     "friction at 1e-6 m/s": {"body": [BALL], "contact": RUBBING | {"slip_velocity": 1e-6}},
     "friction, damping": {"body": [BALL], "contact": RUBBING | {"damping": 0.1}},
     "frame": {"frame": {"angular_velocity": [0.0, 0.0, 1.0]}},
+    "drag": {"drag": {"density": 1.2}},
     "orbit": {"orbit": {"mean_motion": 1.1e-3}},
     "pressure": {"pressure": [{"lines": "all", "normal": [0.0, 0.0, 1.0], "value": 0.1}]},
     "thrust": {"thrust": [{"node": 0, "line": 0, "force": 1.0}]},

@@ -51,7 +51,7 @@ SMALL = {
         {"name": "height", "quantity": "displacement", "node": "centre", "component": "z"},
     ],
 }
-EFFECTS = {"orbit": {"mean_motion": 2.0}}
+EFFECTS = {"orbit": {"mean_motion": 2.0}, "drag": {"density": 100.0, "wind": [0.5, 0.0, 0.0]}}
 """The small net, and what it has one at a time."""
 END = 0.03
 """Duration of the quick impact [s]: the ball has hit, and the centre follows it."""

@@ -20,6 +20,7 @@ from .energy_book import no_energy
 from .extremes import Extremes
 from .momentum_book import Ledger, Outside
 from .nearby import Nearby, near_of
+from .rubbed import Rubbed
 from .step_bound import no_bound
 
 CLOCK = np.dtype(
@@ -164,46 +165,6 @@ class Families(NamedTuple):
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
             bounds=typed_list(k.BOUND, [family.bound or no_bound for family in families]),
             dampings=typed_list(k.BOUND, [families[i].damping_bound or no_bound for i in viscous]),
-        )
-
-
-class Rubbed(NamedTuple):
-    """Families whose kicks are solved for.
-
-    Attributes
-    ----------
-    families : ndarray of int
-        Their numbers.
-    meets, recalls, sweeps, gives : List
-        Their kernels, see `refweb.effects.base.Rubbing`.
-    memories : List
-        What is remembered of the step before, by cell, within a row.
-    width : int
-        Number of columns of what touches.
-    """
-
-    families: np.ndarray
-    meets: List
-    recalls: List
-    sweeps: List
-    gives: List
-    memories: List
-    width: int
-
-    @classmethod
-    def of(cls, system):
-        """Those of a system."""
-        families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
-        rubbing = [system.families[i] for i in families]
-        own = [family.rubbing for family in rubbing]
-        return cls(
-            families=np.array(families, dtype=np.int64),
-            meets=typed_list(k.MEET, [one.meet for one in own]),
-            recalls=typed_list(k.KEPT, [one.recall for one in own]),
-            sweeps=typed_list(k.SWEEP, [one.sweep for one in own]),
-            gives=typed_list(k.GIVE, [one.give for one in own]),
-            memories=typed_list(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
-            width=max((one.width for one in own), default=0),
         )
 
 

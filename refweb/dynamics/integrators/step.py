@@ -159,8 +159,10 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
                 forces[i](t, x, v, extra, cells[i], data[i], outs[i])
             for q in range(flat_f.size):
                 flat_f[q] += flat_extra[q]
-        if count:
-            change = rubbed.sweeps[0](h, n, f, inverse, touches, count)
+        begin = 0
+        for m in rubbed.last:
+            change = max(change, rubbed.sweeps[m](h, n, f, inverse, touches[begin : ends[m]], ends[m] - begin))
+            begin = ends[m]
         if viscous.size:
             for q in range(flat_v.size):
                 speed = flat_half[q] + 0.5 * h * flat_inverse[q] * flat_f[q]

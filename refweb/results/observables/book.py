@@ -94,7 +94,7 @@ class DissipatedEnergy(Booked):
     """What damping and friction have taken."""
 
     dynamic = True
-    needs = "[damping], or damping or friction in [contact],"
+    needs = "[damping], [drag] in a fluid at rest, or damping or friction in [contact],"
 
 
 class TotalEnergy(Booked):

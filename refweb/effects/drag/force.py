@@ -1,0 +1,125 @@
+"""The force of drag at a node, quadratic in its velocity relative to the fluid, as compiled kernels.
+
+Each end of an element, and each inner node, bears the drag of its share of the natural length: with the unit tangent t
+of the element there, u = v − w the velocity of the node less that of the wind, u_t = (t·u) t and u_n = u − u_t,
+
+    F = −c_n |u_n| u_n − c_t |u_t| u_t.
+
+−∂F/∂u = c_n (|u_n| (I − t⊗t) + u_n⊗u_n/|u_n|) + 2 c_t |u_t| t⊗t is positive semidefinite, and F·u ≤ 0. What has no
+direction, such as a body or an element whose ends are at one place, has t = 0, and all of u counts as u_n.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+from ...kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..vectors import dot
+
+NORMAL, TANGENTIAL, WIND, ALONG, GROUP, LENGTH, SLOPES = 0, 1, 2, 5, 8, 9, 10
+"""Columns of data: c_n and c_t [kg/m]; w; d = dx/dξ of the web; the number of cells of one row, where they begin, else
+0; natural length [m]; ∂d/∂x of each node, the first of which bears the force."""
+
+
+@kernel()
+def tangent(x, cells, data, c, nodes):
+    """(t, 1/|d| or 0)."""
+    d0, d1, d2 = data[c, ALONG], data[c, ALONG + 1], data[c, ALONG + 2]
+    for b in range(nodes):
+        row, slope = cells[c, b], data[c, SLOPES + b]
+        d0 += slope * x[row, 0]
+        d1 += slope * x[row, 1]
+        d2 += slope * x[row, 2]
+    length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    inverse = 1.0 / length if length > 0.0 else 0.0
+    return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
+
+
+@kernel()
+def split(t, u):
+    """(t·u, u_n, |u_n|)."""
+    along = dot(t, u)
+    n = u[0] - along * t[0], u[1] - along * t[1], u[2] - along * t[2]
+    return along, n, math.sqrt(dot(n, n))
+
+
+@kernel()
+def drag_on(t, u, normal, tangential):
+    """F of coefficients c_n and c_t."""
+    along, n, size = split(t, u)
+    a, b = normal * size, tangential * abs(along) * along
+    return -a * n[0] - b * t[0], -a * n[1] - b * t[1], -a * n[2] - b * t[2]
+
+
+@kernel()
+def add_slope(t, u, normal, tangential, matrix):
+    """Add −∂F/∂u to a matrix (3, 3)."""
+    along, n, size = split(t, u)
+    inverse = normal / size if size > 0.0 else 0.0
+    beside = 2.0 * tangential * abs(along) - normal * size
+    for i in range(3):
+        for j in range(3):
+            matrix[i, j] += inverse * n[i] * n[j] + beside * t[i] * t[j]
+        matrix[i, i] += normal * size
+
+
+@kernel()
+def relative(v, cells, data, c):
+    """u of cell c."""
+    row = cells[c, 0]
+    return v[row, 0] - data[c, WIND], v[row, 1] - data[c, WIND + 1], v[row, 2] - data[c, WIND + 2]
+
+
+@functools.cache
+def kernels(nodes):
+    """Force, stiffness, damping and bound of cells of so many nodes."""
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            row, (e, _) = cells[c, 0], tangent(x, cells, data, c, nodes)
+            own = drag_on(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
+            power = 0.0
+            for k in range(3):
+                f[row, k] += own[k]
+                power += own[k] * v[row, k]
+            out[c, 0] = power
+
+    @kernel(STIFFNESS)
+    def stiffness(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            e, inverse = tangent(x, cells, data, c, nodes)
+            along, n, size = split(e, relative(v, cells, data, c))
+            normal, tangential = data[c, NORMAL], data[c, TANGENTIAL]
+            for j in range(3 if not definite else 0):
+                faster = n[j] * inverse  # ∂(t·u)/∂d
+                for i in range(3):
+                    turned = ((1.0 if i == j else 0.0) - e[i] * e[j]) * inverse  # ∂t/∂d
+                    change = -normal * size * (faster * e[i] + along * turned)
+                    if size > 0.0:
+                        change -= normal * n[i] * along * faster / size
+                    change += tangential * abs(along) * (2.0 * faster * e[i] + along * turned)
+                    for b in range(nodes):
+                        blocks[c, i, 3 * b + j] = data[c, SLOPES + b] * change
+
+    @kernel(STIFFNESS)
+    def damping(t, x, v, blocks, cells, data, definite):
+        for c in range(cells.shape[0]):
+            blocks[c] = 0.0
+            e, _ = tangent(x, cells, data, c, nodes)
+            u, normal, tangential = relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL]
+            add_slope(e, u, normal, tangential, blocks[c])
+
+    @kernel(BOUND)
+    def bound(reach, speed, x, mass, rates, cells, data):
+        # Of the turn of a tangent, whose entries are below 2 (c_n + c_t) |u|²/|d| each; a taut line is as long as this.
+        for c in range(cells.shape[0]):
+            w0, w1, w2 = data[c, WIND], data[c, WIND + 1], data[c, WIND + 2]
+            fastest = speed + math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
+            most = 4.0 * (data[c, NORMAL] + data[c, TANGENTIAL]) * fastest * fastest / data[c, LENGTH]
+            for b in range(nodes):
+                rates[cells[c, 0]] += most * abs(data[c, SLOPES + b])
+
+    return force, stiffness, damping, bound

@@ -1,0 +1,127 @@
+"""Drag solved for, node by node, where an explicit method kicks velocities.
+
+A kick of size h takes the velocity of a node from v⁻ to v⁺ = v⁻ + h M⁻¹(f + F(u)), f being all other forces and u the
+mean of both less the wind: the rule of the midpoint, which loses h F·v, whatever h is. For a node that is
+
+    u = u⁻ + ½h M⁻¹(f + F(u)),
+
+whose solution is unique, since −F is the gradient of a convex function of u. Newton's method finds it from
+velocities without drag, from where it comes to the solution from above. No node feels another's drag, so that one sweep
+solves all of them.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ...kernels import GIVE, KEPT, MEET, SWEEP, kernel
+from ..base import Rubbing
+from .force import GROUP, NORMAL, TANGENTIAL, add_slope, drag_on, relative, tangent
+
+CELL, ROW, COUNT, COEFFICIENTS, DIRECTION, START, FORCE, WIDTH = 0, 1, 2, 3, 5, 8, 11, 14
+"""Columns of what feels drag: its cell and row; how many feel it at this row, at the first of them; c_n and c_t; t; u⁻;
+F."""
+MOST, CLOSE = 60, 1e-15
+"""Steps of Newton's method, and their size over that of velocities at which they end."""
+
+
+@kernel()
+def solve_three(a, b):
+    """Solution of a @ y = b for a matrix (3, 3), by Cramer's rule."""
+    c0 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
+    c1 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
+    c2 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
+    whole = a[0, 0] * c0 + a[0, 1] * c1 + a[0, 2] * c2
+    y0 = b[0] * c0 + b[1] * (a[0, 2] * a[2, 1] - a[0, 1] * a[2, 2]) + b[2] * (a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1])
+    y1 = b[0] * c1 + b[1] * (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0]) + b[2] * (a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2])
+    y2 = b[0] * c2 + b[1] * (a[0, 1] * a[2, 0] - a[0, 0] * a[2, 1]) + b[2] * (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])
+    return y0 / whole, y1 / whole, y2 / whole
+
+
+@kernel()
+def settle(h, f, inverse, touches, n, count):
+    """Find the drag on the row of touch n, of ``count`` touches, add what it changes by to f; the change of v [m/s]."""
+    row, matrix, rest, u, ahead = int(touches[n, ROW]), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    for k in range(3):
+        others = f[row, k]
+        for m in range(n, n + count):
+            others -= touches[m, FORCE + k]
+        u[k] = ahead[k] = touches[n, START + k] + 0.5 * h * inverse[row, k] * others
+    for _ in range(MOST):
+        matrix[:] = 0.0
+        for k in range(3):
+            rest[k] = ahead[k] - u[k]
+        for m in range(n, n + count):
+            t = touches[m, DIRECTION], touches[m, DIRECTION + 1], touches[m, DIRECTION + 2]
+            normal, tangential = touches[m, COEFFICIENTS], touches[m, COEFFICIENTS + 1]
+            add_slope(t, (u[0], u[1], u[2]), normal, tangential, matrix)
+            own = drag_on(t, (u[0], u[1], u[2]), normal, tangential)
+            for k in range(3):
+                rest[k] += 0.5 * h * inverse[row, k] * own[k]
+        size = 0.0
+        for k in range(3):
+            for j in range(3):
+                matrix[k, j] *= 0.5 * h * inverse[row, k]
+            matrix[k, k] += 1.0
+            size = max(size, abs(u[k]), abs(ahead[k]))
+        y = solve_three(matrix, (rest[0], rest[1], rest[2]))
+        for k in range(3):
+            u[k] += y[k]
+        if not max(abs(y[0]), abs(y[1]), abs(y[2])) > CLOSE * size:
+            break
+    most = 0.0
+    for m in range(n, n + count):
+        t = touches[m, DIRECTION], touches[m, DIRECTION + 1], touches[m, DIRECTION + 2]
+        own = drag_on(t, (u[0], u[1], u[2]), touches[m, COEFFICIENTS], touches[m, COEFFICIENTS + 1])
+        for k in range(3):
+            change = own[k] - touches[m, FORCE + k]
+            touches[m, FORCE + k] = own[k]
+            f[row, k] += change
+            most = max(most, h * inverse[row, k] * abs(change))
+    return most
+
+
+@kernel(SWEEP)
+def sweep(h, number, f, inverse, touches, count):
+    """Solve row by row; the largest change of a velocity [m/s]."""
+    most, n = 0.0, 0
+    while n < count:
+        here = int(touches[n, COUNT])
+        most = max(most, settle(h, f, inverse, touches, n, here))
+        n += here
+    return most
+
+
+@kernel(KEPT)
+def recall(number, memory, f, touches, begin, end):
+    """Nothing: one sweep solves drag from anywhere."""
+
+
+@kernel(GIVE)
+def give(number, memory, v, touches, begin, end, out):
+    """Write the power of each cell at the velocities v."""
+    for n in range(begin, end):
+        row, power = int(touches[n, ROW]), 0.0
+        for k in range(3):
+            power += touches[n, FORCE + k] * v[row, k]
+        out[int(touches[n, CELL]), 0] = power
+
+
+@functools.cache
+def rubbing(nodes):
+    """The `Rubbing` of cells of so many nodes, where those of a row stand together."""
+
+    @kernel(MEET)
+    def meet(h, x, v, inverse, cells, data, touches, begin):
+        for c in range(cells.shape[0] if begin + cells.shape[0] <= touches.shape[0] else 0):
+            n, (t, _) = begin + c, tangent(x, cells, data, c, nodes)
+            u = relative(v, cells, data, c)
+            touches[n, CELL], touches[n, ROW], touches[n, COUNT] = c, cells[c, 0], data[c, GROUP]
+            touches[n, COEFFICIENTS], touches[n, COEFFICIENTS + 1] = data[c, NORMAL], data[c, TANGENTIAL]
+            for k in range(3):
+                touches[n, DIRECTION + k], touches[n, START + k], touches[n, FORCE + k] = t[k], u[k], 0.0
+        return begin + cells.shape[0]
+
+    return Rubbing(meet, recall, sweep, give, WIDTH, 0)

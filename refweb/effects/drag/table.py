@@ -1,0 +1,172 @@
+"""Drag of a fluid that is at rest or blows steadily, on lines and on free bodies.
+
+The force is in `refweb.effects.drag.force`, and how explicit steps solve for it in `refweb.effects.drag.kick`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...accepted import accepts, by_name
+from ...errors import InputError
+from ...messages import nearest
+from ...net.net import REFERENCE
+from ...tables import Several, Table, field, real, table, vector
+from ..base import Family
+from .force import kernels
+from .kick import rubbing
+
+SPHERE = 0.47
+"""Coefficient of a sphere, at Reynolds numbers from 10³ to 3·10⁵."""
+
+
+@table
+class BodyDrag(Table):
+    """What one body has of drag, ½ ρ C A |u|², whichever way it moves.
+
+    Parameters
+    ----------
+    coefficient : float, optional
+        C; of a sphere 0.47 by default.
+    area : float, optional
+        A [m²]; of a sphere that of its circle by default.
+
+    Examples
+    --------
+        [drag.bodies.hub]
+        coefficient = 1.1
+        area = 0.04
+    """
+
+    coefficient: float | None = real(default=None, at_least=0)
+    area: float | None = real(default=None, above=0, unit="m²")
+
+
+@accepts(by_name(BodyDrag))
+def _bodies(name, value):
+    if not isinstance(value, dict):
+        raise InputError(f"{name} must be a table by body, [drag.bodies.NAME]")
+    return {k: b if isinstance(b, BodyDrag) else BodyDrag.read(f"{name}.{k}", b) for k, b in value.items()}
+
+
+@table
+class Drag(Table):
+    """Drag of a fluid, quadratic in the velocity relative to it; explicit steps are not made shorter by it.
+
+    A line of diameter D that moves across itself with u_n and along itself with u_t is held back by ½ ρ C_n D |u_n| u_n
+    + ½ ρ π C_t D |u_t| u_t per natural length, half of an element's by the node at either end. Reels change natural
+    lengths, and not the drag. A free body is held back by ½ ρ C A |u| u and not turned; what of the wind a body or a
+    line keeps from others is not known.
+
+    In a fluid at rest all that drag takes is ``dissipated_energy``; where wind blows, its power on what moves is
+    ``work``, and may have either sign.
+
+    Parameters
+    ----------
+    density : float
+        ρ of the fluid [kg/m³].
+    normal : float
+        C_n of a line across its own direction.
+    tangential : float
+        C_t along it, of the whole surface.
+    diameter : float, optional
+        D [m]; by default that of a round line of its area.
+    wind : sequence of 3 float
+        Velocity of the fluid [m/s].
+    bodies : dict of str to BodyDrag
+        Coefficient and area of bodies, which free ones other than spheres need.
+
+    Raises
+    ------
+    InputError
+        For numbers out of bounds; from ``on``, for a name in ``bodies`` that no free body has, and a free body that is
+        no sphere whose coefficient or area is missing.
+
+    References
+    ----------
+    S. F. Hoerner, "Fluid-Dynamic Drag", 1965, chapter 3: cylinders across a flow, 1.2, and spheres. M. Hall, A.
+    Goupee, "Validation of a lumped-mass mooring line model with DeepCwind semisubmersible model test data", Ocean Eng.
+    104 (2015) 590–603, doi:10.1016/j.oceaneng.2015.05.035: drag at nodes, with both parts.
+
+    Examples
+    --------
+        [drag]
+        density = 1.2
+        wind = [3.0, 0.0, 0.0]
+    """
+
+    density: float = real(above=0, unit="kg/m³")
+    normal: float = real(default=1.2, at_least=0)
+    tangential: float = real(default=0.01, at_least=0)
+    diameter: float | None = real(default=None, above=0, unit="m")
+    wind: Several = vector(default=(0.0, 0.0, 0.0), unit="m/s")
+    bodies: dict = field(_bodies, default_factory=dict)
+
+    def on(self, net):
+        """The families of the nodes of elements and of free bodies; ``out`` is the power [W]."""
+        free = [body for body in net.bodies if not body.fixed]
+        names = [body.name for body in free]
+        for name in self.bodies:
+            if name not in names:
+                raise InputError(f'bodies."{name}" is not a free body, {nearest(name, names)}')
+        families = [self._family(*self._ends(net))]
+        if free:
+            numbers = np.zeros((len(free), 11))
+            numbers[:, 0], numbers[:, 2:5] = [self._of(body) for body in free], self.wind
+            numbers[:, 8] = numbers[:, 9] = 1.0
+            families.append(self._family(np.array([[body.row] for body in free], dtype=np.int32), numbers))
+        return families
+
+    def _ends(self, net):
+        """Cells and numbers of all nodes of elements, those of a node together."""
+        count, elements = len(net.places), len(net.cells)
+        power = np.arange(count)
+        functions = np.linalg.inv(np.vander(net.places, increasing=True))  # by power, then node
+        shares = functions.T @ (1.0 / (power + 1.0))
+        diameter = np.sqrt(4.0 * net.area / math.pi) if self.diameter is None else np.full(elements, self.diameter)
+        pressed = 0.5 * self.density * diameter * net.natural_length
+        cells, numbers = [], []
+        for a, place in enumerate(net.places):
+            order = [a, *(b for b in range(count) if b != a)]
+            slopes = (power[1:] * place ** (power[1:] - 1)) @ functions[1:]
+            both = np.outer(shares[a] * pressed, [self.normal, math.pi * self.tangential])
+            rest = np.tile([*self.wind], (elements, 1)), net.line_data[:, REFERENCE : REFERENCE + 3]
+            tail = np.zeros((elements, 1)), net.natural_length[:, None], np.tile(slopes[order], (elements, 1))
+            cells.append(net.cells[:, order])
+            numbers.append(np.hstack([both, *rest, *tail]))
+        cells, numbers = np.vstack(cells), np.vstack(numbers)
+        order = np.argsort(cells[:, 0], kind="stable")
+        cells, numbers = cells[order], numbers[order]
+        _, first, group = np.unique(cells[:, 0], return_index=True, return_counts=True)
+        numbers[first, 8] = group
+        return np.ascontiguousarray(cells, dtype=np.int32), np.ascontiguousarray(numbers)
+
+    def _of(self, body):
+        """½ ρ C A of a body [kg/m]."""
+        own, sphere = self.bodies.get(body.name, BodyDrag()), body.shape.once
+        for key in () if sphere else ("coefficient", "area"):
+            if getattr(own, key) is None:
+                raise InputError(f'bodies."{body.name}".{key} is missing: only of spheres it is known')
+        coefficient = SPHERE if own.coefficient is None else own.coefficient
+        return 0.5 * self.density * coefficient * (own.area or math.pi * body.shape.grown().radius ** 2)
+
+    def _family(self, cells, data):
+        blows = any(self.wind)
+        force, stiffness, damping, bound = kernels(cells.shape[1])
+        return Family(
+            name="drag",
+            cells=cells,
+            data=data,
+            force=force,
+            book="work" if blows else "dissipated_energy",
+            stiffness=stiffness if cells.shape[1] > 1 else None,
+            bound=bound if cells.shape[1] > 1 else None,
+            observed=1,
+            power=0,
+            damping=damping,
+            rubbing=rubbing(cells.shape[1]),
+            symmetric=False,
+            at_rest=blows,
+        )
