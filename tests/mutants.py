@@ -76,6 +76,7 @@ MIRRORS = {
     "dynamics/integrators/averages": "dynamics/test_averages.py",
     "dynamics/integrators": "dynamics/integrators/test_cvode.py dynamics/test_dynamics.py",
     "dynamics": "dynamics/test_dynamics.py",
+    "results/observables/apart": "results/test_apart.py",
     "results/observables": "results/test_observable_contract.py dynamics/test_accuracy.py statics/test_statics.py",
     "results/comparison": "results/test_comparison.py",
     "results/vtu_file": "results/test_frames.py",
@@ -199,6 +200,8 @@ MUTANTS = [
     ),
     Mutant("effects/drag/kick", "touches[n, START + k] + 0.5 * h", "touches[n, START + k] + h"),
     Mutant("effects/drag/table", "[self.normal, math.pi * self.tangential]", "[self.normal, self.tangential]"),
+    Mutant("results/observables/apart", "m = n - 1 if n > 0 else rows.size - 1", "m = n - 1 if n > 0 else 0"),
+    Mutant("results/observables/whole_momentum", "(moment * state.v[row] for", "(state.v[row] for"),
     Mutant("effects/orbit", "np.diag([3.0, 0.0, -1.0])", "np.diag([2.0, 0.0, -1.0])"),
     Mutant("effects/pressure", "d0 += couple * x[other, 0]", "d0 -= couple * x[other, 0]"),
     Mutant(

@@ -36,14 +36,21 @@ WHERE = {
     "body": [{"body": "ball"}, {"body": "wall"}],
     "line": [{}, {"line": 0}, {"line": 7}],
     "component": [{}, *({"component": axis} for axis in "xyz")],
+    "to": [{"to": "ball"}],
 }
 """What each key of ``[[observe]]`` is given as; a quantity is looked at for every mixture of those it takes."""
+OWN = {
+    "distance": [{"node": [5, 0]}, {"node": 3, "to": "ball"}, {"body": "ball", "to": "wall"}],
+    **dict.fromkeys(("mouth_area", "mouth_perimeter"), WHERE["node"][2:]),
+}
+"""Places of quantities that are of a few of them together."""
 
 
 def tables(name):
     """All that may ask for a quantity."""
     keys = refweb.Observe(name="_", quantity=name).observable.keys
     places = [place for key in ("node", "body", "line") if key in keys for place in WHERE[key]] or [{}]
+    places = OWN.get(name, places)
     axes = WHERE["component"] if "component" in keys else [{}]
     return [refweb.Observe(name="_", quantity=name, **place, **axis) for place in places for axis in axes]
 

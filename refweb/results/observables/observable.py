@@ -32,7 +32,7 @@ class Observable:
     unit : str
         Unit of its value.
     keys : tuple of str
-        Which of ``node``, ``body``, ``component`` and ``line`` have a meaning; a quantity of the whole net has none.
+        Which of ``node``, ``body``, ``to``, ``component`` and ``line`` have a meaning; one of the whole net has none.
     dynamic : bool
         Whether it has no meaning in statics.
     at : str

@@ -34,6 +34,8 @@ class Observe(Table):
         without ``node`` that is over all.
     body : str, optional
         Body of a nodal quantity; its reaction is the contact force on it.
+    to : str, optional
+        Body that a distance ends at, of one node or another body; without it that of two nodes.
     line : int, str or list, optional
         Lines of a line quantity, by number or group, see `refweb.net.groups`. Of several the one with the largest
         value counts; without ``line`` that is over all.
@@ -74,6 +76,7 @@ class Observe(Table):
     quantity: str = field(_quantity)
     node: Several = nodes(default=None)
     body: str | None = text(default=None)
+    to: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
     component: int | None = component(default=None, axes="xyzw")
     reduce: str = choice("max", "min", "final", default="final")
@@ -85,7 +88,7 @@ class Observe(Table):
             raise InputError(
                 f"name = {shown(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
-        for key in ("node", "body", "component", "line"):
+        for key in ("node", "body", "to", "component", "line"):
             if getattr(self, key) is not None and key not in self.observable.keys:
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')

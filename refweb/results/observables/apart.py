@@ -1,0 +1,148 @@
+"""What lies between nodes: their distance, and the mouth of a net that some of them go round."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...errors import InputError
+from ...kernels import kernel
+from ...messages import nearest
+from ..probes import MAGNITUDE, PROBE, Probe
+from .observable import Observable, Value
+
+
+class Between(Observable):
+    """A length or an area that places of some rows make."""
+
+    unit = "m"
+
+    def rows(self, system):
+        """The rows, in their order, shape (k,)."""
+        raise NotImplementedError
+
+    def on(self, system):
+        """Refuse what the system does not have."""
+        self.rows(system)
+
+    def _number_of(self, system, name):
+        """Row of a body."""
+        names = [body.name for body in system.net.bodies]
+        if name not in names:
+            hint = nearest(name, names) if names else "the scene has no [[body]]"
+            raise InputError(f'body = "{name}" is not a body, {hint}')
+        return system.net.bodies[names.index(name)].row
+
+    def of(self, state):
+        """By the kernel of its probe."""
+        value = self.probe(state.system)
+        rows, data = np.array(value.rows, dtype=np.int64), np.ascontiguousarray(value.data, dtype=float)
+        none = np.zeros((0, 0))
+        return Value(float(value.kernel(0.0, state.x, state.x, state.x, none, rows, data, np.zeros(2, np.int64))), None)
+
+
+class Distance(Between):
+    """Distance of two nodes, of a node and the centre of a body, or of two bodies, ``body`` and ``to``."""
+
+    keys = ("node", "body", "to")
+
+    def rows(self, system):
+        """The two."""
+        observe, found = self.observe, []
+        if observe.node is not None:
+            found += system.net.find(observe.node).tolist()
+        found += [self._number_of(system, name) for name in (observe.body, observe.to) if name is not None]
+        if len(found) != 2:
+            raise InputError(
+                f'quantity = "distance" is of {len(found)} places, must be 2: node = [i, j], a node and to = a body, '
+                "or a body and to = another"
+            )
+        return np.array(found)
+
+    def probe(self, system):
+        """Of x and the reference position."""
+        rows = self.rows(system)
+        return Probe(distance, rows, system.net.points[rows])
+
+
+class Mouth(Between):
+    """What nodes go round, named in their order around; the last is followed by the first."""
+
+    keys = ("node",)
+
+    def rows(self, system):
+        """The nodes."""
+        found = np.zeros(0) if self.observe.node is None else system.net.find(self.observe.node)
+        if len(found) < 3:
+            raise InputError(
+                f'quantity = "{self.observe.quantity}" is of {len(found)} nodes, must be at least 3: name those of the '
+                "mouth in their order around, node = [i, j, k, ...]"
+            )
+        return found
+
+
+class MouthPerimeter(Mouth):
+    """Sum of the distances from node to node, the last to the first."""
+
+    def probe(self, system):
+        """Of x and the reference position."""
+        rows = self.rows(system)
+        return Probe(perimeter, rows, system.net.points[rows])
+
+
+class MouthArea(Mouth):
+    """Size of the area vector ½ Σ pᵢ × pᵢ₊₁ of the closed polygon, or a component of it.
+
+    Of a mouth in a plane it is the area; of another one the largest that it has as seen from any side. A component is
+    that as seen along an axis, positive where the nodes go round counterclockwise.
+    """
+
+    unit, keys = "m²", ("node", "component")
+
+    def probe(self, system):
+        """Of x and the reference position."""
+        rows, component = self.rows(system), self.observe.component
+        component = MAGNITUDE if component is None else component
+        return Probe(area, [component, *rows], system.net.points[rows])
+
+
+@kernel()
+def _apart(x, data, i, j, m, n):
+    """Distance of rows i and j, whose reference positions are rows m and n of data."""
+    a, b = x[j, 0] - x[i, 0] + data[n, 0] - data[m, 0], x[j, 1] - x[i, 1] + data[n, 1] - data[m, 1]
+    c = x[j, 2] - x[i, 2] + data[n, 2] - data[m, 2]
+    return math.sqrt(a * a + b * b + c * c)
+
+
+@kernel(PROBE)
+def distance(t, x, v, f, lines, rows, data, where):
+    """Of two rows."""
+    return _apart(x, data, rows[0], rows[1], 0, 1)
+
+
+@kernel(PROBE)
+def perimeter(t, x, v, f, lines, rows, data, where):
+    """Of the closed polygon of rows."""
+    total = 0.0
+    for n in range(rows.size):
+        m = n - 1 if n > 0 else rows.size - 1
+        total += _apart(x, data, rows[m], rows[n], m, n)
+    return total
+
+
+@kernel(PROBE)
+def area(t, x, v, f, lines, rows, data, where):
+    """Area vector of the closed polygon, as a fan from its first node; ``rows`` is (component, row, row, ...)."""
+    a0 = a1 = a2 = p0 = p1 = p2 = 0.0
+    first = rows[1]
+    for n in range(1, data.shape[0]):
+        row = rows[1 + n]
+        q0 = x[row, 0] - x[first, 0] + data[n, 0] - data[0, 0]
+        q1 = x[row, 1] - x[first, 1] + data[n, 1] - data[0, 1]
+        q2 = x[row, 2] - x[first, 2] + data[n, 2] - data[0, 2]
+        a0, a1, a2 = a0 + p1 * q2 - p2 * q1, a1 + p2 * q0 - p0 * q2, a2 + p0 * q1 - p1 * q0
+        p0, p1, p2 = q0, q1, q2
+    if rows[0] == MAGNITUDE:
+        return 0.5 * math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+    return 0.5 * (a0 if rows[0] == 0 else a1 if rows[0] == 1 else a2)

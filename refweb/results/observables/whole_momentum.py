@@ -1,0 +1,81 @@
+"""Angular momentum of all that moves about its centre of mass, or the part of it that nodes or a body have."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import kernel
+from ..probes import MAGNITUDE, PROBE, Probe
+from .nodal import Nodal
+from .observable import Value
+
+
+class TotalAngularMomentum(Nodal):
+    """Σ m (r − r_c) × (v − v_c), and what bodies turn with, r_c and v_c being those of the centre of mass of all.
+
+    That is of web and free bodies together, with ``node`` or ``body`` the part of these: ``node = "all"`` that of the
+    web. What nothing acts on from outside keeps the whole.
+    """
+
+    unit = "N m s"
+    dynamic = True
+
+    def _parts(self, system):
+        """Masses and reference positions of all (rows, 4), rows that count, and rows of spin with their moments."""
+        net, observe = system.net, self.observe
+        linear = system.rows - net.spins
+        masses = net.mass[:linear].copy()
+        masses[[body.row for body in net.bodies if body.fixed]] = 0.0
+        every = observe.node is None and observe.body is None
+        counted = np.arange(linear) if every else self.rows(system)
+        turning = [b for b in net.bodies if b.spin is not None and not b.fixed and (every or b.name == observe.body)]
+        return np.column_stack([masses, net.points[:linear]]), counted, [(b.spin, b.moment) for b in turning]
+
+    def of(self, state):
+        """By sums over rows."""
+        numbers, counted, spins = self._parts(state.system)
+        mass, linear = numbers[:, :1], len(numbers)
+        place, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
+            state.position, state.v))  # fmt: skip
+        total = np.cross(place, mass * speed)[counted].sum(axis=0)
+        total += sum((moment * state.v[row] for row, moment in spins), np.zeros(3))
+        return Value(float(self.sizes(total[None])[0]), None)
+
+    def place(self, system, at):
+        """Nowhere."""
+        return None
+
+    def probe(self, system):
+        """Of x and v."""
+        numbers, counted, spins = self._parts(system)
+        component = MAGNITUDE if self.observe.component is None else self.observe.component
+        moments = np.array([[moment, 0.0, 0.0, 0.0] for _, moment in spins]).reshape(-1, 4)
+        rows = [component, len(numbers), len(counted), *counted, *(row for row, _ in spins)]
+        return Probe(angular_momentum, rows, np.vstack([numbers, moments]))
+
+
+@kernel(PROBE)
+def angular_momentum(t, x, v, f, lines, rows, data, where):
+    """``rows`` is (component, linear rows, count, counted rows, rows of spin), data (mass, reference position) of all
+    linear rows, then (moment, 0, 0, 0) of rows of spin."""
+    total, linear, count = 0.0, rows[1], rows[2]
+    c, w, a = np.zeros(3), np.zeros(3), np.zeros(3)
+    for r in range(linear):
+        total += data[r, 0]
+        for k in range(3):
+            c[k] += data[r, 0] * (data[r, 1 + k] + x[r, k])
+            w[k] += data[r, 0] * v[r, k]
+    for n in range(count):
+        r = rows[3 + n]
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            one = (data[r, 1 + i] + x[r, i] - c[i] / total) * (v[r, j] - w[j] / total)
+            a[k] += data[r, 0] * (one - (data[r, 1 + j] + x[r, j] - c[j] / total) * (v[r, i] - w[i] / total))
+    for n in range(3 + count, rows.size):
+        for k in range(3):
+            a[k] += data[linear + n - 3 - count, 0] * v[rows[n], k]
+    if rows[0] == MAGNITUDE:
+        return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    return a[rows[0]]
