@@ -516,7 +516,10 @@ OBSERVE = [
     ({"quantity": "tension", "node": 1}, '[[observe]] 1 node = 1 has no meaning for quantity = "tension"'),
     ({"quantity": "tension", "component": 1}, '[[observe]] 1 component = 1 has no meaning for quantity = "tension"'),
     ({"quantity": "displacement", "line": 1}, '[[observe]] 1 line = 1 has no meaning for quantity = "displacement"'),
-    ({"quantity": "displacement", "component": 3}, '[[observe]] 1 component = 3 must be one of 0, 1, 2, "x", "y", "z"'),
+    (
+        {"quantity": "displacement", "component": 3},
+        '[[observe]] 1 component = "w" has no meaning for quantity = "displacement"',
+    ),
     ({"quantity": "displacement", "node": "nix"}, '[[observe]] 1 node = "nix" names no node'),
     ({"quantity": "displacement", "body": "ball"}, '[[observe]] 1 body = "ball"'),
     ({"quantity": "displacement", "reduce": "mean"}, '[[observe]] 1 reduce = "mean" must be one of "max", "min"'),
