@@ -155,11 +155,33 @@ def _compiled_once(dispatcher):
     return dispatcher
 
 
-def _with_signature(function, signature, options):
-    dispatcher = _with_entry(function, options)
-    dispatcher.compile(signature)
-    dispatcher.disable_compile()
-    return dispatcher
+class _OfSignature:
+    """A kernel of one signature, compiled where it is first called or listed: nobody asks for a tangent in vain."""
+
+    def __init__(self, function, signature, options):
+        self.py_func = function
+
+        def compiled(function):
+            dispatcher = _with_entry(function, options)
+            dispatcher.compile(signature)
+            dispatcher.disable_compile()
+            return dispatcher
+
+        self._compiled = functools.cache(lambda: _compile(compiled, function))
+
+    def __call__(self, *arguments):
+        return self._compiled()(*arguments)
+
+    def __getattr__(self, name):
+        if name.startswith("_"):  # of copies and the like
+            raise AttributeError(name)
+        return getattr(self._compiled(), name)
+
+    _numba_type_ = property(lambda self: numba.typeof(self._compiled()))
+
+    def listed(self):
+        """What stands in typed lists."""
+        return self._compiled()
 
 
 def _with_entry(function, options):
@@ -211,7 +233,7 @@ def _content(code):
 
 def _told(value):
     """What tells a captured value apart from all others, the same in every process."""
-    if not isinstance(value, Dispatcher):
+    if not isinstance(value, Dispatcher | _OfSignature):
         return repr(value)
     function = value.py_func
     return f"{function.__module__}.{function.__qualname__} {_content(function.__code__)}"
@@ -226,14 +248,14 @@ def _named(function):
 
 
 def kernel(signature=None, **options) -> Any:
-    """Compile a function, at once where a signature is given, and keep its machine code on disk.
+    """Compile a function, for any arguments or those of one signature, and keep its machine code on disk.
 
     Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
     """
     options = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
     if signature is None:
         return lambda function: _compile(lambda named: _with_body(named, options), _named(function))
-    return lambda function: _compile(lambda named: _with_signature(named, signature, options), _named(function))
+    return lambda function: _OfSignature(_named(function), signature, options)
 
 
 def record(cls):
@@ -287,5 +309,5 @@ def typed_list(item, values) -> Any:
     empty, append = _list_of(types.FunctionType(item) if isinstance(item, Signature) else item)
     result = empty()
     for value in values:
-        append(result, value)
+        append(result, value.listed() if isinstance(value, _OfSignature) else value)
     return result
