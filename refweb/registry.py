@@ -95,6 +95,7 @@ SHAPES = {
     "box": "refweb.net.shapes.box:Box",
     "cylinder": "refweb.net.shapes.cylinder:Cylinder",
     "capsule": "refweb.net.shapes.capsule:Capsule",
+    "mesh": "refweb.net.shapes.mesh:Mesh",
 }
 """Shapes of ``[[body]]``; how to write one says `refweb.net.rigid_body`."""
 
@@ -201,3 +202,31 @@ def name_of(table, value):
     """Name under which the class of a value stands in a table, None where it is not in it."""
     own = f"{type(value).__module__}:{type(value).__qualname__}"
     return next((name for name, reference in table.items() if reference == own), None)
+
+
+FILES = {"web": ("path", "lines"), "body": ("file",)}
+"""Keys of tables of a scene that are paths of files."""
+
+
+def with_files(given, place, tables=tuple(FILES)):
+    """A copy of the dict of a scene with ``place(path)`` for each path of a file in some tables."""
+
+    def placed(table, keys):
+        if not isinstance(table, dict):
+            return table
+        return {k: place(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
+
+    changed = {}
+    for name in tables:
+        if isinstance(own := given.get(name), list):
+            changed[name] = [placed(one, FILES[name]) for one in own]
+        elif isinstance(own, dict):
+            changed[name] = placed(own, FILES[name])
+    return {**given, **changed}
+
+
+def paths_of(given):
+    """Paths of the files that the dict of a scene names."""
+    found = []
+    with_files(given, found.append)
+    return found

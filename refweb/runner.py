@@ -218,6 +218,8 @@ def notices(scene, system):
         from .net.mesh_file import remarks
 
         yield from remarks(system.net.web)
+    for body in system.net.bodies:
+        yield from (f'body "{body.name}": {text}' for text in body.shape.remarks())
     if system.net.bodies and not system.contact:
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, in_file, refused_at
 from .messages import nearest, short, shown
-from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of
+from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of, with_files
 from .settings import START_STATES, Accuracy, Dynamic, Head, Output, Static, Supports
 from .tables import Several, Table, table
 
@@ -182,6 +182,8 @@ class Scene:
 
         ``file`` is the name that begins the messages of `build`.
         """
+        if folder is not None and "body" in given:
+            given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body"])
         known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]
         for key in given:
             if key not in known:
@@ -211,11 +213,8 @@ class Scene:
         """The scene as the dict of its TOML file, defaults filled in and paths absolute."""
         if not isinstance(self.web, Table):
             raise InputError("[web] is a Web made in Python: a scene file cannot hold it; use refweb.Inline")
-        web = self.web.to_dict()
-        if "path" in web:
-            for key in ("path", "lines") if "lines" in web else ("path",):
-                web[key] = str((self.folder or pathlib.Path()).joinpath(web[key]).resolve())
-        return {"schema": 1, "title": self.title, "seed": self.seed, "web": web, **self._tables()}
+        given = {"schema": 1, "title": self.title, "seed": self.seed, "web": self.web.to_dict(), **self._tables()}
+        return with_files(given, lambda path: str((self.folder or pathlib.Path()).joinpath(path).resolve()))
 
     def _tables(self):
         """Its tables but the web."""

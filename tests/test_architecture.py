@@ -23,6 +23,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "*",
         "What is there: nodes, lines, lengths, laws, elements, mass, bodies; it knows no forces, time or solvers.",
     ),
+    (
+        "net.boundary",
+        "*",
+        "Solids that a surface of triangles bounds: read, checked, weighed, and how deep a point is in them.",
+    ),
     ("net.shapes", "*", "What rigid bodies look like, one file a shape; they know nothing of contact."),
     ("effects", "*", "What acts on a net, one file an effect; no effect knows another, a global matrix or a solver."),
     (

@@ -86,6 +86,7 @@ def print_scene(scene, system):
             ("", sizes),
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
+            *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.told()),
             *_stiffness(scene, system),
             ("solve", how),
             *steps,

@@ -93,7 +93,7 @@ class Body(Table):
     ----------
     name : str
         Name in observables and files.
-    shape : {"sphere", "ring", "box", "cylinder", "capsule"}
+    shape : {"sphere", "ring", "box", "cylinder", "capsule", "mesh"}
         Its shape, of `refweb.registry.SHAPES`; "sphere" by default.
     radius : float
         Radius of a sphere, a ring, a cylinder or a capsule [m], > 0.
@@ -102,13 +102,21 @@ class Body(Table):
     size : sequence of 3 float
         Edges of a box [m], > 0.
     axes : list of 2 vectors, optional
-        Directions of the first two edges of a box, at right angles; by default x and y. Its third axis follows.
+        Directions of the first two edges of a box, or of the first two axes of a file, at right angles; by default x
+        and y. The third axis follows.
     length : float
         Length of a cylinder, or of a capsule between the centres of its ends [m], > 0.
     axis : sequence of 3 float
         Axis of a cylinder or a capsule, the third of its axes.
     rounding : float, optional
         Radius of the edges of a box or a cylinder [m], > 0, by default 2 % of its smallest size.
+    file : str
+        Of a mesh: STL, OBJ or VTP file of its closed surface, relative to the scene's folder.
+    scale : float
+        Of a mesh: metres a unit of its file, > 0; 1 by default.
+    grid : int, optional
+        Of a mesh: number of cells along its longest side of the grid on which depth is known; by default 48, or as many
+        as its thinnest wall asks for.
     orientation : sequence of 4 float, optional
         In place of ``axes`` or ``axis``: the quaternion (w, x, y, z), of any length but 0, of the rotation that takes
         x, y and z to the body's axes.
@@ -117,7 +125,7 @@ class Body(Table):
     density : float, optional
         Density [kg/m³] of a body that is solid, > 0, in place of the mass.
     position : sequence of 3 float
-        Position of its centre [m], which is its centre of mass.
+        Position of its centre [m], which is its centre of mass; of a mesh that of a uniform solid.
     velocity : sequence of 3 float
         Initial velocity [m/s].
     angular_velocity : sequence of 3 float
@@ -249,6 +257,7 @@ class Body(Table):
             raise InputError(f'name = "{self.name}" is listed twice: names of bodies are unique')
         if not self.fixed and net.quasi_static:
             raise InputError("fixed = false: a free body cannot be used in statics; fixed = true holds it")
+        self.form.settle()
         mass = self.mass or (self.density * self.form.volume() if self.density else 0.0)
         body = RigidBody(
             name=self.name,

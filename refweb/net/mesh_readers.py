@@ -93,12 +93,12 @@ def read(path):
         raise InputError(f"format {shown(path.suffix)} must be one of {known}: use meshio convert")
     memory.check(memory.READING * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
     if FORMATS[suffix] is None or _asks_for_vtk(path, suffix):
-        return _by_vtk(path)
+        return by_vtk(path)
     try:
-        mesh = _by_meshio(path, FORMATS[suffix])
+        mesh = by_meshio(path, FORMATS[suffix])
     except KeyError as error:  # a type of VTK that meshio has no name for
         if suffix == ".vtk":
-            return _by_vtk(path)
+            return by_vtk(path)
         raise _unread(path, f"KeyError {error}") from None
     if suffix == ".msh":
         return _of_gmsh(mesh)
@@ -126,7 +126,7 @@ def _has_polylines(path, whole):
     """Whether meshio leaves cells of a .vtu file out."""
     said = sum(map(int, re.findall(rb'NumberOfCells="(\d{1,12})"', whole)))
     try:
-        return said != sum(len(block.data) for block in _by_meshio(path, "vtu").cells)
+        return said != sum(len(block.data) for block in by_meshio(path, "vtu").cells)
     except (InputError, KeyError):
         return False
 
@@ -138,7 +138,7 @@ def _unread(path, reason, reader="meshio"):
     return InputError(f"{reader} cannot read {path}; is it whole, and its data numeric? ({reason})")
 
 
-def _by_meshio(path, kind):
+def by_meshio(path, kind):
     """The mesh that meshio reads; it reports some failures by printing and leaving the program."""
     import contextlib
     import io
@@ -159,7 +159,7 @@ def _by_meshio(path, kind):
         ) from None
 
 
-def _by_vtk(path):
+def by_vtk(path):
     """The `Mesh` that VTK reads in a process of its own."""
     import subprocess
     import sys

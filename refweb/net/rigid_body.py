@@ -35,7 +35,8 @@ force is the slope of an energy. That is why edges are rounded, and a body is a 
 grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core is a box, whose half sizes may be 0, or
 round about its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a
 capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn sets
-``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its centre. The
+``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its centre. One
+that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as `refweb.net.shapes.mesh` has. The
 line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
@@ -49,6 +50,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..messages import shown
 from ..tables import Table
 
 
@@ -63,11 +65,20 @@ class Grown(NamedTuple):
         Half sizes of the core along the body's axes [m]; infinite where it has no end.
     round : bool
         Whether the core is a cylinder about the third axis, of the radius that stands first, and not a box.
+    fine : float
+        Length on which the surface may turn [m], of a body that need not be convex; 0 of a convex one.
+    thick : float
+        Least distance from its middle to its surface [m], where that does not follow from the core.
+    field : float
+        Where the numbers of a field stand in memory, of a body that has one.
     """
 
     radius: float
     core: tuple
     round: bool = False
+    fine: float = 0.0
+    thick: float = 0.0
+    field: float = 0.0
 
 
 class Shape(Table):
@@ -82,6 +93,8 @@ class Shape(Table):
         both ends and once in between.
     planar : bool
         Whether it turns about its third axis only, and looks the same then.
+    error : float, optional
+        Largest distance of the surface that lines feel from the one that is meant [m], where these differ.
     directions : tuple of str
         Keys that say where its axes are.
     """
@@ -89,15 +102,33 @@ class Shape(Table):
     free = False
     once = False
     planar = False
+    error: float | None = None
     directions: ClassVar[tuple] = ("axes", "axis", "normal")
 
     def grown(self):
         """Its core and the radius of growth, a `Grown`."""
         raise NotImplementedError
 
+    def settle(self):
+        """Read what is in files, and refuse what cannot be; called when a net is made."""
+
+    @property
+    def extent(self):
+        """Largest distance from its centre to its surface as a web sees it [m]."""
+        radius, core, *_ = self.grown()
+        return radius + float(np.linalg.norm(core))
+
     def frame(self):
         """Unit vectors of its axes, right-handed, shape (3, 3)."""
         return np.eye(3)
+
+    def remarks(self):
+        """Warnings of what it was made of, each a text."""
+        return ()
+
+    def told(self):
+        """What the box of a scene says of it, each a text."""
+        return ()
 
     def volume(self):
         """Its volume [m³]."""
@@ -187,12 +218,12 @@ class RigidBody:
     @property
     def thickness(self):
         """Least distance from its middle to its surface [m]."""
-        return self.radius + min(self.core)
+        return self.shape.grown().thick or self.radius + min(self.core)
 
     @property
     def extent(self):
         """Largest distance from its centre to its surface as a web sees it [m]; infinite for a ring."""
-        return self.radius + float(np.linalg.norm(self.core))
+        return self.shape.extent
 
     @property
     def tumbles(self):
@@ -293,3 +324,16 @@ def axes_about(name, axis):
     first = np.cross(own, np.eye(3)[np.abs(own).argmin()])
     first /= np.linalg.norm(first)
     return np.array([np.cross(first, own), first, own])
+
+
+def axes_of(axes):
+    """Unit vectors, shape (3, 3), along two at right angles and across; those of x, y and z for None."""
+    if axes is None:
+        return np.eye(3)
+    if len(axes) != 2:
+        raise InputError(f"axes = {shown(axes)} must be two vectors, not {len(axes)}")
+    first, second = (unit(f"axes[{i}]", axis) for i, axis in enumerate(axes))
+    if abs(first @ second) > 1e-6:
+        raise InputError(f"axes = {shown(axes)} must be at right angles")
+    second = unit("axes", second - (first @ second) * first)
+    return np.array([first, second, np.cross(first, second)])

@@ -106,7 +106,8 @@ class SolutionData:
         Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
     bodies : dict
         Of each body that the web may touch, by name: its deepest ``overlap`` [m], ``time`` and ``line`` of that, the
-        overlap ``allowed``, and the ``stiffness`` of its contact, ``chosen`` by refweb or given.
+        overlap ``allowed``, and the ``stiffness`` of its contact, ``chosen`` by refweb or given; of a mesh the
+        ``surface_error`` [m], by which its field misses the surface.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
     horizon : dict

@@ -92,7 +92,9 @@ def on_run(summary):
     for name, body in summary.get("bodies", {}).items():
         text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
         text += f" at line {body['line']}" if body["line"] is not None else ""
-        yield "contact", f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]
+        text = f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]
+        error = body.get("surface_error")
+        yield "contact", text + (f", its surface within {error:.1e} m" if error is not None else "")
     if worst := summary.get("utilisation"):
         digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
         yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"

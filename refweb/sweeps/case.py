@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 from ..errors import InputError, SolverError
 from ..messages import one_line
+from ..registry import with_files
 
 
 class Job(NamedTuple):
@@ -137,14 +138,15 @@ def _brought(job, place):
             (own / there.name).write_bytes(content)
             moved[path] = str(own / there.name)
             moved[str(there.parent)] = str(own)
-    web, solve = dict(job.given["web"]), dict(job.given["solve"])
     base = pathlib.Path(job.folder or "")
-    for table, keys in ((web, ("path", "lines")), (solve, ("start",))):
-        for key in keys:
-            if isinstance(table.get(key), str):
-                full = str(base.joinpath(table[key]).resolve())
-                table[key] = moved.get(full, table[key])
-    return {**job.given, "web": web, "solve": solve}
+
+    def brought(path):
+        return moved.get(str(base.joinpath(path).resolve()), path)
+
+    given, solve = with_files(job.given, brought), dict(job.given["solve"])
+    if isinstance(solve.get("start"), str):
+        solve["start"] = brought(solve["start"])
+    return {**given, "solve": solve}
 
 
 def packed(folder):

@@ -15,6 +15,7 @@ from .. import __version__
 from ..errors import InputError, in_file
 from ..messages import short, shown
 from ..reference.paths import with_value
+from ..registry import paths_of, with_files
 from ..scene import Scene
 from .expressions import Expression
 from .study import MOST_CASES, Distribution
@@ -181,8 +182,7 @@ def key_of(scene, known=None):
     told = scene.to_dict()
     del told["title"]
     files = {str(path): _digest(path, {} if known is None else known) for path in files_of(told)}
-    for key in ("path", "lines"):
-        told["web"].pop(key, None) if isinstance(told["web"].get(key), str) else None
+    told = with_files(told, lambda path: "")
     told["solve"].pop("start", None) if files and scene.start_folder else None
     text = json.dumps([__version__, told, list(files.values())], sort_keys=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:KEY]
@@ -190,10 +190,7 @@ def key_of(scene, known=None):
 
 def files_of(given):
     """Files that the scene of a dict with absolute paths reads."""
-    web, start = given["web"], given["solve"].get("start", "web")
-    found = (
-        [web[key] for key in ("path", "lines") if isinstance(web.get(key), str)] if web.get("kind") == "file" else []
-    )
+    found, start = paths_of(given), given["solve"].get("start", "web")
     if pathlib.Path(start).is_absolute():
         found += [str(pathlib.Path(start) / name) for name in ("run.json", "scene.toml", "checkpoint.npz")]
     return found

@@ -223,7 +223,7 @@ REFUSED = [
     (dict(WALL, radius=0.1), 'radius = 0.1 has no meaning for shape = "wall"'),
     (dict(WALL, shape="sphere", radius=0.1), 'normal = .* has no meaning for shape = "sphere"'),
     (dict(WALL, shape="wal"), 'shape = "wal" must be one of .*"wall".* did you mean "wall"'),
-    (dict(WALL, fixed=False, mass=1), 'shape = "wall" must have fixed = true; sphere, .* and capsule may be free'),
+    (dict(WALL, fixed=False, mass=1), 'shape = "wall" must have fixed = true; sphere, .* and mesh may be free'),
     (dict(TOP, lower=0.1), r"lower = 0.1 must be > 0.15 \[m\]"),
 ]
 

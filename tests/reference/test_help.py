@@ -7,6 +7,7 @@ import tomllib
 import meshio
 import numpy as np
 import pytest
+import solids
 from jsonschema import Draft4Validator
 
 import refweb
@@ -64,6 +65,8 @@ def test_examples_pass_the_check(name, tmp_path, monkeypatch, capsys):
     if name == "web.file":
         cells, support = {"line": np.array(LINES)}, {"support": np.arange(9) % 2}
         meshio.write(tmp_path / "net.vtu", meshio.Mesh(np.array(POINTS, float), cells, point_data=support))
+    if name == "body.mesh":
+        solids.write(tmp_path / "satellite.stl", *solids.box((300.0, 300.0, 300.0)))
     import tomli_w
 
     monkeypatch.chdir(tmp_path)

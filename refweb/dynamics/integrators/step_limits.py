@@ -28,7 +28,7 @@ class StepLimits:
         self._corners = system.corners
         bodies = system.net.bodies
         self._thickness = min((body.thickness for body in bodies), default=np.inf)
-        self._outreach = np.array([body.radius + np.linalg.norm(body.core) for body in bodies])
+        self._outreach = np.array([body.extent for body in bodies])
 
     def at_corner(self, t):
         """Whether a table has a corner at a time [s]."""

@@ -31,8 +31,8 @@ from ...net.rotation import to_quaternion
 from ..vectors import cross, dot
 from .nearest_point import lightness, share
 from .pair import lever_of, pair_of, pairing
-from .penalty import SHALLOW, foresight, push_of, slope_of_power, thickness, turn_block
-from .places import PLACES, along_axes, from_axes, hessian_times, place_moves, places, window
+from .penalty import SHALLOW, foresight, rubbed_by, slope_of_power, thickness, turn_block
+from .places import along_axes, from_axes, hessian_times, place_moves, places, window
 from .tumbling import add_push, add_rotation, add_velocities, set_arms
 
 
@@ -165,8 +165,8 @@ def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_
     """
     c, place, pair, (y, d, _, deep, g, bend) = touch.c, touch.place, touch.pair, touch.spot
     w, w1, _ = window(pair.once, place, touch.inner)
-    push = push_of(touch)
-    steep = pair.stiffness * w * slope_of_power(pair.exponent, deep)
+    push = rubbed_by(touch)
+    steep = touch.share * pair.stiffness * w * slope_of_power(pair.exponent, deep)
     u, s, turns = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
     own = friction_force(pair, push, g, u)
     by_velocity(pair, push, g, u, by_u)
@@ -206,7 +206,7 @@ def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
     """Add what a contact has of −∂f/∂v, along the axes of the body; ``by_u (3, 3)`` is space to work in."""
     c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
     u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
-    by_velocity(pair, push_of(touch), touch.spot.gradient, u, by_u)
+    by_velocity(pair, rubbed_by(touch), touch.spot.gradient, u, by_u)
     for b in range(nodes + 2 if spins else nodes + 1):
         part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
         for j in range(3):
@@ -263,19 +263,19 @@ def kernels(depth, pieces, nodes, functions, spins):
         Number of rows behind the body in a cell that are its rotation: 1 or 2, see `refweb.net.rotation`, or 0.
     """
     rows, paired = nodes + (2 if spins else 1), pairing(spins)
-    _, _, contacts, touch_of = places(depth, spins)
+    _, _, contacts, touch_of, (most, columns) = places(depth, spins)
     foreseen = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        found = np.empty((PLACES * pieces, 3))
+        found = np.empty((most * pieces, columns))
         out[:, 0] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
                 u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
-                own = friction_force(pair, push_of(touch), touch.spot.gradient, u)
+                own = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
                 out[c, 0] += dot(own, u)
                 turned = from_axes(pair.axes, own)
                 for k in range(3):
@@ -289,7 +289,7 @@ def kernels(depth, pieces, nodes, functions, spins):
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        found, z, q = np.empty((PLACES * pieces, 3)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        found, z, q = np.empty((most * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
         by_y, by_u, pushes, arms = (
             np.empty((3, 3)),
             np.empty((3, 3)),
@@ -308,7 +308,7 @@ def kernels(depth, pieces, nodes, functions, spins):
                 if spins == 2:
                     pair, place, y = touch.pair, touch.place, touch.spot.y
                     u, _, _ = slip_of(v, cells, touch.c, nodes, spins, functions, pair, place, y)
-                    own = friction_force(pair, push_of(touch), touch.spot.gradient, u)
+                    own = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
                     add_push(pushes[touch.c - first], 1.0, own, place, nodes, functions)
                     add_damping(damped, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
@@ -323,7 +323,7 @@ def kernels(depth, pieces, nodes, functions, spins):
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
-        found, q, by_u = np.empty((PLACES * pieces, 3)), np.empty((3, 3)), np.empty((3, 3))
+        found, q, by_u = np.empty((most * pieces, columns)), np.empty((3, 3)), np.empty((3, 3))
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):

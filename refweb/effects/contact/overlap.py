@@ -117,7 +117,7 @@ class Deepest(NamedTuple):
         size = allowed(self.body)
         own = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
         own |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
-        return own
+        return own | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
 
     def _where(self):
         instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"

@@ -18,7 +18,7 @@ from ...net.rotation import matrix_at, times
 RADIUS, PENALTY, AWAY = 0, 1, 2
 """Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
 _EXPONENT, _DAMPING, _FRICTION, _SLIP, _GROWTH, _CORE, _ROUND, _ONCE, _PLANAR, _AXES = 0, 1, 2, 3, 4, 5, 8, 9, 10, 11
-_MOBILITY, _LEVER = 20, 26
+_FINE, _THICK, _FIELD, _MOBILITY, _LEVER = 20, 21, 22, 23, 29
 """Columns behind the vectors."""
 
 
@@ -71,8 +71,8 @@ def pair_data(body, cells, points, law, tumbles=False):
     """
     away = (points[cells] - points[body.row]).reshape(len(cells), -1)
     shape, (stiffness, *law) = body.shape, law
-    radius, core, round_ = shape.grown()
-    tail = [*law, radius, *core, round_, shape.once, shape.planar, *body.axes.ravel()]
+    radius, core, round_, *field = shape.grown()
+    tail = [*law, radius, *core, round_, shape.once, shape.planar, *body.axes.ravel(), *field]
     tail += [*body.mobility[np.triu_indices(3)], lever(body)] if tumbles else []
     head, tail = (np.tile(part, (len(cells), 1)) for part in ([body.extent, stiffness], tail))
     return np.column_stack([head, away, tail])
@@ -138,7 +138,14 @@ def pair_of(data, c, nodes):
         data[c, at + _DAMPING],
         data[c, at + _FRICTION],
         data[c, at + _SLIP],
-        Grown(data[c, at + _GROWTH], (data[c, k], data[c, k + 1], data[c, k + 2]), data[c, at + _ROUND] != 0.0),
+        Grown(
+            data[c, at + _GROWTH],
+            (data[c, k], data[c, k + 1], data[c, k + 2]),
+            data[c, at + _ROUND] != 0.0,
+            data[c, at + _FINE],
+            data[c, at + _THICK],
+            data[c, at + _FIELD],
+        ),
         (
             (data[c, a], data[c, a + 1], data[c, a + 2]),
             (data[c, a + 3], data[c, a + 4], data[c, a + 5]),

@@ -24,7 +24,7 @@ from ...net.rotation import to_quaternion
 from ..vectors import cross, dot
 from .nearest_point import lightness, point, share
 from .pair import lever_of, pair_of, pairing
-from .places import PLACES, from_axes, hessian_times, place_moves, places, window
+from .places import from_axes, hessian_times, place_moves, places, window
 from .tumbling import add_moments, add_push, add_rotation, set_arms
 
 SHALLOW = 0.05
@@ -32,6 +32,8 @@ SHALLOW = 0.05
 step that has to do with more is iterated for longer, and the next bound knows the depth."""
 SPREAD = 2.5
 """Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
+HOLLOW = 2.0
+"""The same of a body that is not convex, over this: where it is hollow curvature adds δ ∂²δ/∂x² ≤ 1."""
 
 
 @kernel()
@@ -48,9 +50,17 @@ def slope_of_power(exponent, deep):
 
 @kernel(forceinline=True)
 def push_of(touch):
-    """k W δ^p of a contact [N]."""
+    """k W δ^p of a contact [N], less than 0 of a minimum."""
     pair = touch.pair
-    faded = pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
+    faded = touch.weight * pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
+    return faded * power_of_depth(pair.exponent, touch.spot.depth)
+
+
+@kernel(forceinline=True)
+def rubbed_by(touch):
+    """k W δ^p that losses go by [N], see `refweb.effects.contact.several`."""
+    pair = touch.pair
+    faded = touch.share * pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
     return faded * power_of_depth(pair.exponent, touch.spot.depth)
 
 
@@ -70,7 +80,7 @@ def turn_block(blocks, c, rows, axes, q):
 @kernel()
 def thickness(shape):
     """Least distance from the middle of the body to its surface [m]."""
-    return shape.radius + min(shape.core[0], shape.core[1], shape.core[2])
+    return shape.thick if shape.thick > 0.0 else shape.radius + min(shape.core[0], shape.core[1], shape.core[2])
 
 
 class Foreseen(NamedTuple):
@@ -96,7 +106,7 @@ def foresight(depth, spins=0):
     `SHALLOW` of that, and not beyond twice the depth that it already has. ``depth`` is the kernel of the bodies,
     ``spins`` as in `refweb.effects.contact.pair.pairing`.
     """
-    within, deepest, _, _ = places(depth, spins)
+    within, deepest, *_ = places(depth, spins)
 
     @kernel()
     def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
@@ -130,8 +140,8 @@ def add_stiffness(blocks, touch, definite, nodes, functions, z):
     c, place, pair, spot = touch.c, touch.place, touch.pair, touch.spot
     deep, d, g, h = spot.depth, spot.d, spot.gradient, spot.hessian
     w, w1, _ = window(pair.once, place, touch.inner)
-    steep = pair.stiffness * w * slope_of_power(pair.exponent, deep)
-    push = pair.stiffness * power_of_depth(pair.exponent, deep)
+    steep = touch.weight * pair.stiffness * w * slope_of_power(pair.exponent, deep)
+    push = touch.weight * pair.stiffness * power_of_depth(pair.exponent, deep)
     across = w1 * push + steep * dot(g, d)
     turned, push = hessian_times(h, d), w * push
     matrix = ((h[0], h[1], h[2]), (h[1], h[3], h[4]), (h[2], h[4], h[5]))
@@ -158,6 +168,8 @@ def add_row_sums(rates, foreseen, speed, mass, cells, data, c, nodes, spins):
     steep = scale * pair.stiffness * slope_of_power(pair.exponent, deep)
     delta = lightness(mass, cells, c, nodes)
     b, thick, own = cells[c, nodes], thickness(pair.shape), SPREAD * steep
+    if 0.0 < pair.shape.fine < math.inf:
+        own *= HOLLOW
     if pair.once:  # a line turns under a push that slides along it
         tilt = scale * deep / length if length > 0.0 else 0.0
         own = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
@@ -191,12 +203,12 @@ def kernels(depth, pieces, nodes, functions, spins=0):
         2 where the last rows of a cell are those of the rotation of the body, else 0.
     """
     arity, paired = nodes + 1 + spins, pairing(spins)
-    _, _, contacts, touch_of = places(depth, spins)
+    _, _, contacts, touch_of, (most, columns) = places(depth, spins)
     foreseen = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        found = np.empty((PLACES * pieces, 3))
+        found = np.empty((most * pieces, columns))
         out[:, 0] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
@@ -215,24 +227,26 @@ def kernels(depth, pieces, nodes, functions, spins=0):
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
-        found = np.empty((PLACES * pieces, 3))
+        found = np.empty((most * pieces, columns))
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 pair, deep = touch.pair, touch.spot.depth
                 stored = pair.stiffness / (pair.exponent + 1.0) * power_of_depth(pair.exponent, deep) * deep
-                out[touch.c] += window(pair.once, touch.place, touch.inner)[0] * stored
+                out[touch.c] += touch.weight * window(pair.once, touch.place, touch.inner)[0] * stored
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        found, z, q = np.empty((PLACES * pieces, 3)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        found, z, q = np.empty((most * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
         pushes, arms, turning = np.empty((pieces, nodes, 3)), np.empty((nodes, 3)), spins > 0 and not definite
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             pushes[:] = 0.0
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
+                if definite and touch.weight < 0.0:
+                    continue
                 place_moves(touch, touch.inner and not definite, nodes, functions, z)
                 add_stiffness(blocks, touch, definite, nodes, functions, z)
                 if turning:
@@ -252,8 +266,8 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            most = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
-            if most.depth > 0.0:
-                add_row_sums(rates, most, speed, mass, cells, data, c, nodes, spins)
+            ahead = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
+            if ahead.depth > 0.0:
+                add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins)
 
     return force, energy, stiffness, bound

@@ -20,9 +20,6 @@ from ..vectors import dot
 from .nearest_point import SAMPLES, far, point, share
 from .pair import Pair, pair_of, pairing
 
-PLACES = 3
-"""Largest number of contacts of an element."""
-
 
 class Spot(NamedTuple):
     """A place of an element, as a body sees it: vectors are from its centre and along its axes.
@@ -60,6 +57,8 @@ class Touch(NamedTuple):
         The element and the body.
     spot : Spot
         What is there.
+    weight, share : float
+        By what its energy counts, and its losses; 1 but on bodies that are not convex.
     """
 
     c: int
@@ -67,6 +66,8 @@ class Touch(NamedTuple):
     inner: bool
     pair: Pair
     spot: Spot
+    weight: float
+    share: float
 
 
 @kernel()
@@ -133,7 +134,7 @@ def place_moves(touch, moving, nodes, functions, z):
     z[:] = 0.0
     pair, place, spot = touch.pair, touch.place, touch.spot
     curve = rise(pair, place, spot)[1]
-    if not moving or not curve < 0.0:
+    if not moving or not touch.weight * curve < 0.0:
         return
     (w, w1, _), g, turned = window(pair.once, place, True), spot.gradient, hessian_times(spot.hessian, spot.d)
     own = pair.shape.radius - spot.depth if pair.once else (pair.exponent + 1.0) * w
@@ -144,12 +145,13 @@ def place_moves(touch, moving, nodes, functions, z):
 
 
 class Places(NamedTuple):
-    """Kernels that find where lines touch bodies of one depth, see `places`."""
+    """Kernels that find where lines touch bodies of one depth, see `places`, and the shape of what they find."""
 
     within: Callable
     deepest: Callable
     contacts: Callable
     touch_of: Callable
+    found: tuple
 
 
 @functools.cache
@@ -158,16 +160,17 @@ def places(depth, spins=0):
 
     ``within(x, cells, data, c, nodes, functions, place)`` is the `Spot` at a place of cell c, ``deepest`` of all but
     the place (place, depth) of the contact between the ends of a cell. ``contacts`` finds those of a line, and
-    ``touch_of`` is the `Touch` that is one of them.
+    ``touch_of`` is the `Touch` that is one of them. ``found`` is (rows for each element, columns) of what it finds.
 
     Parameters
     ----------
     depth : kernel
-        Depth in the bodies, as `refweb.net.grown_core.depth`.
+        Depth in the bodies, as `refweb.net.grown_core.depth`; where they need not be convex, with ``convex = False``,
+        see `refweb.effects.contact.several`.
     spins : int
         See `refweb.effects.contact.pair.pairing`.
     """
-    paired = pairing(spins)
+    paired, convex = pairing(spins), getattr(depth, "convex", True)
 
     @kernel()
     def within(x, cells, data, c, nodes, functions, place):
@@ -255,6 +258,11 @@ def places(depth, spins=0):
     def touch_of(x, cells, data, nodes, functions, found, n):
         c, place = int(found[n, 0]), found[n, 1]
         spot = within(x, cells, data, c, nodes, functions, place)
-        return Touch(c, place, found[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot)
+        weight, share = (1.0, 1.0) if convex else (found[n, 3], found[n, 4])
+        return Touch(c, place, found[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
 
-    return Places(within, deepest, contacts, touch_of)
+    if convex:
+        return Places(within, deepest, contacts, touch_of, (3, 3))
+    from .several import COLUMNS, PLACES, several
+
+    return Places(within, *several(within, rise), touch_of, (PLACES, COLUMNS))

@@ -41,8 +41,8 @@ from ..base import Rubbing
 from ..vectors import cross, dot
 from .friction import facing
 from .nearest_point import share
-from .penalty import push_of
-from .places import PLACES, along_axes, from_axes, hessian_times, places
+from .penalty import rubbed_by
+from .places import along_axes, from_axes, hessian_times, places
 
 CELL, ROWS, SHARES, AXES, LEVERS, START = 0, 1, 5, 7, 16, 25
 """Columns of what touches: cell; rows of the nodes, the body and its rotation, −1 without; shares of the nodes; the
@@ -199,7 +199,7 @@ def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
         touches[n, FORCE + i] = 0.0
     for i in range(2):
         touches[n, MIXED + i] = weigh(touches, n, 0, 1 + i, inverse)
-    touches[n, PUSH], touches[n, DAMPING] = push_of(touch) * steep, pair.damping * steep
+    touches[n, PUSH], touches[n, DAMPING] = rubbed_by(touch) * steep, pair.damping * steep
     touches[n, FRICTION], touches[n, SLIP] = pair.friction, pair.slip_velocity
     touches[n, THETA] = fitted(h * touches[n, OWN] * touches[n, PUSH] * touches[n, DAMPING])
     touches[n, THETA + 1] = 1.0
@@ -320,11 +320,11 @@ def kernels(depth, pieces, functions, spins):
     depth, pieces, functions, spins
         See `refweb.effects.contact.friction.kernels`.
     """
-    _, _, contacts, touch_of = places(depth, spins)
+    _, _, contacts, touch_of, (most, columns) = places(depth, spins)
 
     @kernel(MEET)
     def meet(h, x, v, inverse, cells, data, touches, begin):
-        found, count = np.empty((PLACES * pieces, 3)), begin
+        found, count = np.empty((most * pieces, columns)), begin
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, 2, functions, found)):
                 if count < touches.shape[0]:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...errors import InputError
-from ...messages import shown
 from ...tables import Several, real, rows, table, vector
-from ..rigid_body import Grown, Shape, unit
+from ..rigid_body import Grown, Shape, axes_of
 from .rounding import check_rounding, edge_radius, shrunk
 
 
@@ -54,12 +51,4 @@ class Box(Shape):
 
     def frame(self):
         """Unit vectors of its edges."""
-        if self.axes is None:
-            return np.eye(3)
-        if len(self.axes) != 2:
-            raise InputError(f"axes = {shown(self.axes)} must be two vectors, not {len(self.axes)}")
-        first, second = (unit(f"axes[{i}]", axis) for i, axis in enumerate(self.axes))
-        if abs(first @ second) > 1e-6:
-            raise InputError(f"axes = {shown(self.axes)} must be at right angles")
-        second = unit("axes", second - (first @ second) * first)
-        return np.array([first, second, np.cross(first, second)])
+        return axes_of(self.axes)

@@ -1,0 +1,219 @@
+"""Surfaces that bound a solid: checked, and mended where a flip does it; volume, centre and moments of the solid.
+
+The moments are those of tetrahedra from one point to each triangle [1]_: with the corners a, b, c from that point and
+s = a + b + c, a tetrahedron has the volume V = a·(b × c)/6, the first moment V s/4, and the second one
+V (s⊗s + a⊗a + b⊗b + c⊗c)/20.
+
+References
+----------
+.. [1] F. Tonon, "Explicit exact formulas for the 3-D tetrahedron inertia tensor in terms of its vertex coordinates",
+   J. Math. Stat. 1 (2005) 8–11, doi:10.3844/jmssp.2005.8.11.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.spatial import ConvexHull, cKDTree
+
+from ...errors import InputError
+
+SAME = 1e-7
+"""Distance at which corners are one, over the largest coordinate or size: STL holds seven digits."""
+THIN = 1e-9
+"""Volume below which a surface is flat, over the cube of its largest size."""
+
+DENT = 1e-6
+"""Share of its volume that a convex solid may lack: rounding of its corners."""
+
+
+class Closed(NamedTuple):
+    """A surface that bounds a solid.
+
+    Attributes
+    ----------
+    points : ndarray, shape (n, 3)
+        Corners.
+    triangles : ndarray of int, shape (t, 3)
+        Those of each triangle, outward.
+    turned : int
+        Number of triangles that faced inward.
+    dropped : int
+        Number of triangles that had no area, two of whose corners are one.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    turned: int
+    dropped: int
+
+
+class Moments(NamedTuple):
+    """Of a uniform solid.
+
+    Attributes
+    ----------
+    volume : float
+        V [m³].
+    centre : ndarray, shape (3,)
+        Centre of mass [m].
+    inertia : ndarray, shape (3, 3)
+        About it, for a density of 1 [m⁵].
+    """
+
+    volume: float
+    centre: np.ndarray
+    inertia: np.ndarray
+
+
+def closed(points, triangles):
+    """The `Closed` surface of some triangles.
+
+    Raises
+    ------
+    InputError
+        For what is not finite, flat, open, not orientable or crosses itself, and for edges of more than two triangles.
+    """
+    if not np.isfinite(points).all():
+        raise InputError("corners must be finite numbers")
+    points, triangles = _joined(points, triangles)
+    count = len(triangles)
+    a, b, c = triangles.T
+    triangles = triangles[(a != b) & (b != c) & (c != a)]
+    if len(triangles) < 4:
+        raise InputError(f"it holds {len(triangles)} triangles with an area: a closed surface has at least 4")
+    pairs, along = _neighbours(points, triangles)
+    piece, turned = _oriented(points, triangles, pairs, along)
+    triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
+    size = np.ptp(points[triangles].reshape(-1, 3), axis=0).max()
+    inward = _inward(points, triangles, piece, THIN * size**3)
+    triangles = np.where(inward[piece][:, None], triangles[:, ::-1], triangles)
+    used, number = np.unique(triangles, return_inverse=True)
+    own = Closed(points[used], number.reshape(-1, 3), int((turned ^ inward[piece]).sum()), count - len(triangles))
+    _refuse_crossings(own)
+    return own
+
+
+def moments(points, triangles):
+    """The `Moments` of the solid that a surface bounds."""
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    a, b, c = ((points - middle)[triangles[:, k]] for k in range(3))
+    own, s = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, a + b + c
+    volume = own.sum()
+    centre = (own[:, None] * s).sum(axis=0) / (4.0 * volume)
+    second = sum(np.einsum("i,ij,ik->jk", own, q, q) for q in (s, a, b, c)) / 20.0
+    second -= volume * np.outer(centre, centre)
+    return Moments(float(volume), middle + centre, np.trace(second) * np.eye(3) - second)
+
+
+def is_convex(points, volume):
+    """Whether a solid with some corners and volume [m³] fills their hull."""
+    return bool(ConvexHull(points).volume <= (1.0 + DENT) * volume)
+
+
+def _joined(points, triangles):
+    """Points of which each place has one, and the triangles between them."""
+    if not len(triangles):
+        return points, triangles
+    near = SAME * max(np.abs(points[triangles]).max(), np.finfo(float).tiny)
+    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
+    _, place = connected_components(graph, directed=False)
+    _, first = np.unique(place, return_index=True)
+    return points[first], place[triangles].astype(np.int64)
+
+
+def _edge(points, one, other):
+    one, other = (", ".join(f"{x:.6g}" for x in points[i]) for i in (one, other))
+    return f"from ({one}) to ({other})"
+
+
+def _neighbours(points, triangles):
+    """(triangles on both sides of each edge (e, 2), whether both run along it in one direction (e,))."""
+    ends = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    sides = np.sort(ends, axis=1)
+    edges, of, count = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    if (count == 1).any():
+        edge = edges[count.argmin()]
+        raise InputError(
+            f"the surface is open: {int((count == 1).sum())} edges have one triangle, such as the one "
+            f"{_edge(points, *edge)}; close it where it is made, as by a filter that fills holes"
+        )
+    if (count > 2).any():
+        edge = edges[count.argmax()]
+        raise InputError(
+            f"{int((count > 2).sum())} edges have more than two triangles, such as the one {_edge(points, *edge)} with "
+            f"{count.max()}: part the solids that touch there, or join them to one, where the surface is made"
+        )
+    order = np.argsort(of.ravel(), kind="stable").reshape(-1, 2)
+    along = (ends[order[:, 0]] == ends[order[:, 1]]).all(axis=1)
+    return order // 3, along
+
+
+def _oriented(points, triangles, pairs, along):
+    """(piece of each triangle, whether it is to be turned so that all of a piece face one side)."""
+    size = len(triangles)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(size, size)).tocsr()
+    graph = graph + graph.T
+    pieces, piece = connected_components(graph, directed=False)
+    differs = coo_matrix((np.where(along, 2.0, 1.0), pairs.T), shape=(size, size)).tocsr()
+    differs = differs.maximum(differs.T)
+    turned = np.zeros(size, dtype=bool)
+    for first in np.unique(piece, return_index=True)[1]:
+        order, before = breadth_first_order(graph, first, directed=False)
+        flips = np.asarray(differs[order[1:], before[order[1:]]]).ravel() == 2.0
+        for t, flip in zip(order[1:].tolist(), flips.tolist(), strict=True):
+            turned[t] = turned[before[t]] ^ flip
+    wrong = np.flatnonzero(turned[pairs[:, 0]] ^ turned[pairs[:, 1]] ^ along)
+    if len(wrong):
+        one, other = pairs[wrong[0]]
+        edge = np.intersect1d(triangles[one], triangles[other])[:2]
+        raise InputError(f"the surface has one side only, as a Möbius band, seen at the edge {_edge(points, *edge)}")
+    return piece, turned
+
+
+def _inward(points, triangles, piece, least):
+    """Whether each piece is to be turned: what is inside another one bounds a hollow."""
+    volume = np.array([
+        moments(points, triangles[piece == i]).volume if _is_thick(points, triangles[piece == i]) else 0.0
+        for i in range(piece.max() + 1)
+    ])  # fmt: skip
+    if np.abs(volume).max() <= least:
+        raise InputError(f"the surface is flat: its volume is {np.abs(volume).max():.3g}, a body has one")
+    hollow = np.zeros(len(volume), dtype=bool)
+    for i in range(len(volume) if len(volume) > 1 else 0):
+        p = points[triangles[piece == i][0, 0]]
+        turns = [_turns(p, points, triangles[piece == j]) for j in range(len(volume)) if j != i]
+        hollow[i] = sum(round(abs(turn)) for turn in turns) % 2
+    return (volume < 0.0) != hollow
+
+
+def _is_thick(points, triangles):
+    return np.abs(np.linalg.det(points[triangles] - points[triangles[0, 0]])).sum() > 0.0
+
+
+def _turns(p, points, triangles):
+    """How often a surface goes around a point: the solid angle that it fills, over 4π."""
+    a, b, c = (points[triangles[:, k]] - p for k in range(3))
+    i, j, k = (np.linalg.norm(q, axis=1) for q in (a, b, c))
+    above = np.einsum("ij,ij->i", a, np.cross(b, c))
+    below = i * j * k + (a * b).sum(1) * k + (b * c).sum(1) * i + (c * a).sum(1) * j
+    return float(np.arctan2(above, below).sum() / (2.0 * np.pi))
+
+
+def _refuse_crossings(surface):
+    """Refuse a surface that crosses itself."""
+    from .crossings import crossing
+
+    one, other = crossing(surface.points, surface.triangles)
+    if one < 0:
+        return
+    where = surface.points[surface.triangles[one]].mean(axis=0)
+    place = ", ".join(f"{x:.6g}" for x in where)
+    raise InputError(
+        f"the surface crosses itself: triangle {one} about ({place}) and triangle {other} pass through each other; "
+        "join the solids to one (a boolean union) where the surface is made"
+    )

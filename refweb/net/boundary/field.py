@@ -1,0 +1,231 @@
+"""Depth in a solid as a field on a grid, once and again differentiable.
+
+The distance from the surface is known at the points of a grid, see `refweb.net.boundary.distances`. Between them depth
+is a sum of cubic B-splines, whose gradient and Hessian are continuous: so a force that is the slope of an energy made
+of it conserves that energy. Its coefficients are the distances δ less a sixth of their second differences,
+
+    c = δ − (δ(+1) − 2 δ + δ(−1))/6 of each axis,
+
+which reproduces cubic polynomials [1]_: the field misses a smooth surface by O(h⁴), and rounds edges by 0.2 h. Unlike
+the splines that interpolate δ it has small waves beside edges: on the surface of a box gradients of 1.09, not 1.19.
+
+References
+----------
+.. [1] C. de Boor, G. J. Fix, "Spline approximation by quasiinterpolants", J. Approx. Theory 8 (1973) 19–45,
+   doi:10.1016/0021-9045(73)90029-4.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from ... import memory
+from ...kernels import kernel
+
+ORIGIN, FINE, COUNTS, MARGIN, HEAD = 0, 3, 4, 7, 8
+"""Where numbers of a field stand: first point of the grid [m], points a metre, numbers of points, distance of the
+body from the end of the field [m]; behind them the coefficients."""
+AROUND = 4
+"""Number of points of the grid on each side of the body."""
+BYTES = 40.0
+"""Memory for a point of a grid while its field is made."""
+LOOKS, OPPOSITE, BEYOND, THINNER = 4000, -0.8, 1.5, 0.01
+"""Number of places from which walls are looked for; rate at which depth falls beyond the middle of one, so many cells
+behind it; share of the surface that may be thinner."""
+
+
+def _number_at(typing, address, index):
+    def generate(context, builder, signature, args):
+        pointer = builder.inttoptr(args[0], ir.DoubleType().as_pointer())
+        return builder.load(builder.gep(pointer, [args[1]]))
+
+    return types.float64(types.int64, types.int64), generate
+
+
+number_at: Any = intrinsic(_number_at)
+"""In kernels, ``number_at(address, index)``: the number that stands so many numbers behind an address."""
+
+
+@kernel(forceinline=True)
+def _weights(t):
+    """Values of the four splines at a place of a cell, their slopes and bends."""
+    r = 1.0 - t
+    return (
+        (r * r * r / 6.0, (3.0 * t - 6.0) * t * t / 6.0 + 2.0 / 3.0, ((3.0 - 3.0 * t) * t + 3.0) * t / 6.0 + 1.0 / 6.0,
+         t * t * t / 6.0),
+        (-0.5 * r * r, (1.5 * t - 2.0) * t, (1.0 - 1.5 * t) * t + 0.5, 0.5 * t * t),
+        (r, 3.0 * t - 2.0, 1.0 - 3.0 * t, t),
+    )  # fmt: skip
+
+
+@kernel()
+def _outside(u, v, w, fine, most0, most1, most2, margin):
+    """As `depth`, where no field is: no nearer than the body can be."""
+    a, b, c = u - min(max(u, 1.0), most0), v - min(max(v, 1.0), most1), w - min(max(w, 1.0), most2)
+    off = math.sqrt(a * a + b * b + c * c)
+    return -margin - off / fine, (-a / off, -b / off, -c / off), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel(forceinline=True)
+def depth_at(p, address):
+    """As `depth`, of a field whose numbers stand at an address."""
+    at = int(address)
+    fine = number_at(at, FINE)
+    u = (p[0] - number_at(at, ORIGIN)) * fine
+    v = (p[1] - number_at(at, ORIGIN + 1)) * fine
+    w = (p[2] - number_at(at, ORIGIN + 2)) * fine
+    n0, n1, n2 = int(number_at(at, COUNTS)), int(number_at(at, COUNTS + 1)), int(number_at(at, COUNTS + 2))
+    if not (1.0 <= u <= n0 - 2.0 and 1.0 <= v <= n1 - 2.0 and 1.0 <= w <= n2 - 2.0):
+        return _outside(u, v, w, fine, n0 - 2.0, n1 - 2.0, n2 - 2.0, number_at(at, MARGIN))
+    i, j, k = min(int(u), n0 - 3), min(int(v), n1 - 3), min(int(w), n2 - 3)
+    (x, dx, ddx), (y, dy, ddy), (z, dz, ddz) = _weights(u - i), _weights(v - j), _weights(w - k)
+    f = f0 = f1 = f2 = f00 = f01 = f02 = f11 = f12 = f22 = 0.0
+    for a in range(4):
+        g = g1 = g2 = g11 = g12 = g22 = 0.0
+        for b in range(4):
+            start = HEAD + ((i - 1 + a) * n1 + j - 1 + b) * n2 + k - 1
+            c0, c1 = number_at(at, start), number_at(at, start + 1)
+            c2, c3 = number_at(at, start + 2), number_at(at, start + 3)
+            s = z[0] * c0 + z[1] * c1 + z[2] * c2 + z[3] * c3
+            s2 = dz[0] * c0 + dz[1] * c1 + dz[2] * c2 + dz[3] * c3
+            s22 = ddz[0] * c0 + ddz[1] * c1 + ddz[2] * c2 + ddz[3] * c3
+            g, g2, g22 = g + y[b] * s, g2 + y[b] * s2, g22 + y[b] * s22
+            g1, g12, g11 = g1 + dy[b] * s, g12 + dy[b] * s2, g11 + ddy[b] * s
+        f, f1, f2 = f + x[a] * g, f1 + x[a] * g1, f2 + x[a] * g2
+        f11, f12, f22 = f11 + x[a] * g11, f12 + x[a] * g12, f22 + x[a] * g22
+        f0, f01, f02, f00 = f0 + dx[a] * g, f01 + dx[a] * g1, f02 + dx[a] * g2, f00 + ddx[a] * g
+    bend = fine * fine
+    hessian = bend * f00, bend * f01, bend * f02, bend * f11, bend * f12, bend * f22
+    return f, (fine * f0, fine * f1, fine * f2), hessian
+
+
+@kernel()
+def depth(p, grown):
+    """As `refweb.net.grown_core.depth`, of the field whose numbers stand at ``grown.field``."""
+    return depth_at(p, grown.field)
+
+
+depth.convex = False
+
+
+@kernel()
+def depths(places, address, found):
+    """Write the depth of places (n, 3) and its gradient to ``found (n, 4)``."""
+    for i in range(places.shape[0]):
+        deep, g, _ = depth_at((places[i, 0], places[i, 1], places[i, 2]), address)
+        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = deep, g[0], g[1], g[2]
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """The depth in a solid.
+
+    Attributes
+    ----------
+    numbers : ndarray
+        What kernels read, see `ORIGIN`.
+    spacing : float
+        Distance of the points of its grid h [m].
+    counts : tuple of 3 int
+        Numbers of points.
+    error : float
+        Largest depth or distance that it has on the surface, where it should be 0 [m]: at corners, on edges and in the
+        middle of triangles.
+    thickness : float
+        Least distance from the middle of a wall to its surface [m], see `thickness_of`.
+    """
+
+    numbers: np.ndarray
+    spacing: float
+    counts: tuple
+    error: float
+    thickness: float
+
+    @property
+    def address(self):
+        """Where its numbers stand in memory, which kernels read as long as there is this field."""
+        return float(self.numbers.ctypes.data)
+
+    def at(self, places):
+        """(depth (n,) [m], gradient (n, 3)) at places (n, 3)."""
+        found = np.empty((len(places), 4))
+        depths(np.ascontiguousarray(places), self.address, found)
+        return found[:, 0], found[:, 1:]
+
+
+def field_of(points, triangles, cells):
+    """The `Field` of the solid that a surface bounds, with so many cells along its longest side.
+
+    Raises
+    ------
+    InputError
+        For a grid that does not fit into memory.
+    """
+    from .distances import signed
+
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    h = float(size.max()) / cells
+    counts = np.ceil(size / h).astype(np.int64) + 1 + 2 * AROUND
+    shape = tuple(counts.tolist())
+    memory.check(BYTES * float(np.prod(counts.astype(float))), f"the {' × '.join(map(str, shape))} points of its grid")
+    origin = low + 0.5 * size - 0.5 * h * (counts - 1)
+    deep, nearest = np.full(shape, np.inf), np.full(shape, -1, dtype=np.int32)
+    signed(points, triangles, origin, h, deep, nearest, np.zeros(shape, dtype=np.uint8))
+    del nearest
+    head = [*origin, 1.0 / h, *counts, (AROUND - 1) * h]
+    numbers = np.concatenate([head, _coefficients(deep).ravel()])
+    field = Field(numbers, h, shape, 0.0, 0.0)
+    error = np.abs(field.at(_on_surface(points, triangles))[0]).max()
+    return replace(field, error=float(error), thickness=_thickness(field, points, triangles))
+
+
+def _coefficients(deep):
+    """Coefficients of the splines."""
+    c = deep.copy()
+    for axis in range(3):
+        d, into = np.moveaxis(deep, axis, 0), np.moveaxis(c, axis, 0)
+        into[1:-1] -= (d[2:] - 2.0 * d[1:-1] + d[:-2]) / 6.0
+    return c
+
+
+def _on_surface(points, triangles):
+    """Places of a surface where the field may miss it most."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    edges = [(1.0 - t) * p + t * q for p, q in ((a, b), (b, c), (c, a)) for t in (0.25, 0.5)]
+    return np.vstack([points, *edges, (a + b + c) / 3.0])
+
+
+def _thickness(field, points, triangles):
+    """Least distance from the middle of a wall to its surface [m], but for `THINNER` of the surface.
+
+    From places on the surface depth grows along the inner normal, and then falls at the rate at which the surface ahead
+    comes nearer; where that is opposite, it is a wall. None is thicker than the deepest place is deep.
+    """
+    rng = np.random.default_rng(0)
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1)
+    t = rng.choice(len(triangles), LOOKS, p=area / area.sum())
+    u, v = rng.random((2, LOOKS))
+    fold = u + v > 1.0
+    u, v = np.where(fold, 1.0 - u, u)[:, None], np.where(fold, 1.0 - v, v)[:, None]
+    places, inward = a[t] + u * (b[t] - a[t]) + v * (c[t] - a[t]), -normal[t] / area[t][:, None]
+    deepest, walls, way = 0.0, np.full(LOOKS, np.inf), 0.5 * field.spacing
+    look = np.arange(LOOKS)
+    while len(look):
+        deep, gradient = field.at(places[look] + way * inward[look])
+        deepest = max(deepest, float(deep.max()))
+        past = (gradient * inward[look]).sum(axis=1) < 0.5
+        over = look[past]
+        _, beyond = field.at(places[over] + (way + BEYOND * field.spacing) * inward[over])
+        wall = over[(beyond * inward[over]).sum(axis=1) < OPPOSITE]
+        walls[wall] = way
+        look, way = look[~past], way + 0.5 * field.spacing
+    return float(min(np.sort(walls)[int(THINNER * LOOKS)], deepest))
