@@ -6,7 +6,7 @@ mean of both less the wind: the rule of the midpoint, which loses h F·v, whatev
     u = u⁻ + ½h M⁻¹(f + F(u)),
 
 whose solution is unique, since −F is the gradient of a convex function of u. Newton's method finds it from
-velocities without drag, from where it comes to the solution from above. No node feels another's drag, so that one sweep
+velocities without drag, or with that of the sweep before. No node feels another's drag, so that one sweep
 solves all of them.
 """
 
@@ -23,8 +23,8 @@ from .force import GROUP, NORMAL, TANGENTIAL, add_slope, drag_on, relative, tang
 CELL, ROW, COUNT, COEFFICIENTS, DIRECTION, START, FORCE, WIDTH = 0, 1, 2, 3, 5, 8, 11, 14
 """Columns of what feels drag: its cell and row; how many feel it at this row, at the first of them; c_n and c_t; t; u⁻;
 F."""
-MOST, CLOSE = 60, 1e-15
-"""Steps of Newton's method, and their size over that of velocities at which they end."""
+MOST, CLOSE = 60, 4e-16
+"""Steps of Newton's method, and what they leave of the equations, over velocities, at which they end."""
 
 
 @kernel()
@@ -41,14 +41,18 @@ def solve_three(a, b):
 
 
 @kernel()
-def settle(h, f, inverse, touches, n, count):
-    """Find the drag on the row of touch n, of ``count`` touches, add what it changes by to f; the change of v [m/s]."""
-    row, matrix, rest, u, ahead = int(touches[n, ROW]), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+def settle(h, f, inverse, touches, n, count, matrix, vectors):
+    """Find the drag on the row of touch n, of ``count`` touches, add what it changes by to f; the change of v [m/s].
+
+    ``matrix (3, 3)`` and ``vectors (3, 3)`` are space to work in.
+    """
+    row, rest, u, ahead = int(touches[n, ROW]), vectors[0], vectors[1], vectors[2]
     for k in range(3):
-        others = f[row, k]
+        own = 0.0
         for m in range(n, n + count):
-            others -= touches[m, FORCE + k]
-        u[k] = ahead[k] = touches[n, START + k] + 0.5 * h * inverse[row, k] * others
+            own += touches[m, FORCE + k]
+        u[k] = touches[n, START + k] + 0.5 * h * inverse[row, k] * f[row, k]
+        ahead[k] = u[k] - 0.5 * h * inverse[row, k] * own
     for _ in range(MOST):
         matrix[:] = 0.0
         for k in range(3):
@@ -66,11 +70,11 @@ def settle(h, f, inverse, touches, n, count):
                 matrix[k, j] *= 0.5 * h * inverse[row, k]
             matrix[k, k] += 1.0
             size = max(size, abs(u[k]), abs(ahead[k]))
+        if not max(abs(rest[0]), abs(rest[1]), abs(rest[2])) > CLOSE * size:
+            break
         y = solve_three(matrix, (rest[0], rest[1], rest[2]))
         for k in range(3):
             u[k] += y[k]
-        if not max(abs(y[0]), abs(y[1]), abs(y[2])) > CLOSE * size:
-            break
     most = 0.0
     for m in range(n, n + count):
         t = touches[m, DIRECTION], touches[m, DIRECTION + 1], touches[m, DIRECTION + 2]
@@ -86,10 +90,10 @@ def settle(h, f, inverse, touches, n, count):
 @kernel(SWEEP)
 def sweep(h, number, f, inverse, touches, count):
     """Solve row by row; the largest change of a velocity [m/s]."""
-    most, n = 0.0, 0
+    most, n, matrix, vectors = 0.0, 0, np.empty((3, 3)), np.empty((3, 3))
     while n < count:
         here = int(touches[n, COUNT])
-        most = max(most, settle(h, f, inverse, touches, n, here))
+        most = max(most, settle(h, f, inverse, touches, n, here, matrix, vectors))
         n += here
     return most
 

@@ -60,6 +60,9 @@ class Drag(Table):
     lengths, and not the drag. A free body is held back by ½ ρ C A |u| u and not turned; what of the wind a body or a
     line keeps from others is not known.
 
+    Where a start is so fast that drag takes much of it in one step, the run is repeated with shorter steps, until
+    the book of energy closes.
+
     In a fluid at rest all that drag takes is ``dissipated_energy``; where wind blows, its power on what moves is
     ``work``, and may have either sign.
 
