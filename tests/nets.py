@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.elasticity import Elasticity
 from refweb.net import discretisation
 from refweb.net.cable import Cable
@@ -119,3 +120,22 @@ def system(web, cable, effects=(), quasi_static=True, supported=None):
         supported = np.zeros((len(net.points), 3), dtype=bool)
         supported[web.rim] = True
     return System(net, [Elasticity(), *effects], supported)
+
+
+def thrown(body, count, stiffness, duration=0.05):
+    """A net that falls on a fixed body, in some equal steps: (displacement, drift of energy, depth)."""
+    web = refweb.Window(mesh="square", rows=3, columns=3, side=0.15).web()
+    cable = refweb.Cable(law="linear", modulus=1e6, area=1e-5, density=1000.0)
+    body = refweb.Body(**{"name": "it", "fixed": True, **body})
+    falling = system(web, cable, [body, refweb.Contact(stiffness=stiffness)], False)
+    v = np.zeros((falling.rows, 3))
+    v[: len(web.points)] = (0.0, 0.0, -4.0)
+    v[falling.supported] = 0.0
+    method = CentralDifference(falling, step_size=duration / count * (1.0 + 1e-12))
+    run, stored = method.start(None, v), []
+    family = next(family for family in falling.families if family.contact)
+    for row in np.linspace(0.0, duration, 11)[1:]:
+        method.advance(run, np.array([row]))
+        stored.append(falling.energy_of(family, row, run.x).max())
+    assert run.nsteps == count
+    return run.x.copy(), run.drift, np.sqrt(2.0 * max(stored) / stiffness)

@@ -27,6 +27,23 @@ def gradient(v, cells, c, q, nodes, gradients):
 
 
 @kernel()
+def direction(x, cells, data, c, nodes, along, slopes):
+    """(dx/dξ over its length |d|, 1/|d|), or zeros, of the cell c of so many ``nodes``.
+
+    From column ``along`` on data have d in the web's position, and from ``slopes`` on ∂d/∂x of each node.
+    """
+    d0, d1, d2 = data[c, along], data[c, along + 1], data[c, along + 2]
+    for b in range(nodes):
+        row, slope = cells[c, b], data[c, slopes + b]
+        d0 += slope * x[row, 0]
+        d1 += slope * x[row, 1]
+        d2 += slope * x[row, 2]
+    length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    inverse = 1.0 / length if length > 0.0 else 0.0
+    return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
+
+
+@kernel()
 def law_of(law, data, c):
     """Number of the law of cell c, where ``law`` is that of all cells or `MIXED`."""
     return np.int64(data[c, LAW]) if law == MIXED else law

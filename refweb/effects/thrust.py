@@ -11,7 +11,6 @@ It has no potential. A line that has no length at the node has no direction, and
 from __future__ import annotations
 
 import functools
-import math
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import shown
 from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table
+from .line_kernels import direction
 from .outer_load import factor_at, outer_load
 
 SHORTER = 0.5
@@ -30,20 +30,6 @@ SHORTER = 0.5
 ALONG, SLOPES = 1, 4
 
 
-@kernel()
-def direction(x, cells, data, c, nodes):
-    """(e, 1/|d| or 0)."""
-    d0, d1, d2 = data[c, ALONG], data[c, ALONG + 1], data[c, ALONG + 2]
-    for b in range(nodes):
-        row, slope = cells[c, b], data[c, SLOPES + b]
-        d0 += slope * x[row, 0]
-        d1 += slope * x[row, 1]
-        d2 += slope * x[row, 2]
-    length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-    inverse = 1.0 / length if length > 0.0 else 0.0
-    return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
-
-
 @functools.cache
 def kernels(nodes):
     """Force, stiffness and bound kernels of elements with so many nodes."""
@@ -52,7 +38,7 @@ def kernels(nodes):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            (e0, e1, e2), _ = direction(x, cells, data, c, nodes)
+            (e0, e1, e2), _ = direction(x, cells, data, c, nodes, ALONG, SLOPES)
             row, pull = cells[c, 0], data[c, 0] * factor_at(t, data[c], times)
             f[row, 0] += pull * e0
             f[row, 1] += pull * e1
@@ -63,7 +49,7 @@ def kernels(nodes):
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            e, inverse = direction(x, cells, data, c, nodes)
+            e, inverse = direction(x, cells, data, c, nodes, ALONG, SLOPES)
             turn = data[c, 0] * factor_at(t, data[c], times) * inverse
             for b in range(nodes if not definite else 0):
                 for i in range(3):
@@ -74,7 +60,7 @@ def kernels(nodes):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            _, inverse = direction(x, cells, data, c, nodes)
+            _, inverse = direction(x, cells, data, c, nodes, ALONG, SLOPES)
             turn = 1.4 * abs(data[c, 0]) * data[c, times] * inverse / SHORTER  # row sums of I − e⊗e are below 1.4
             for b in range(nodes):
                 rates[cells[c, 0]] += turn * abs(data[c, SLOPES + b])

@@ -63,10 +63,8 @@ def check_speed(system, t):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
     family = system.rotating[0]
-    speed, key = (
-        np.linalg.norm(family.angular_velocity),
-        "angular_velocity" if family.name == "frame" else "mean_motion",
-    )
+    speed = np.linalg.norm(family.angular_velocity)
+    key = "angular_velocity" if family.name == "frame" else "mean_motion"
     raise SolverError(
         f"no equilibrium: [{family.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
         f"centrifugal forces outgrow any tension: lower {key} or the masses, or raise modulus × area"

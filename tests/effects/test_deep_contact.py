@@ -6,7 +6,6 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import refweb
-from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.net.grown_core import EXACT, WIDENING, depth
 from refweb.net.rigid_body import Grown
 
@@ -224,26 +223,11 @@ def test_a_line_over_an_edge_rests(press, offset):
         assert min(potential(q + size * rng.standard_normal(4), press, offset) for _ in range(5)) > here
 
 
-def thrown(count, duration=0.05):
-    """A net that falls deep over edges and corners of a box askew, in some steps: (displacement, drift, depth)."""
-    web = refweb.Window(mesh="square", rows=3, columns=3, side=0.15).web()
+def thrown(count):
+    """A net that falls deep over edges and corners of a box askew, in some steps."""
     axes = [(2.0, 1.0, -1.0), (-1.0, 2.0, 0.0)]
-    box = refweb.Body(
-        name="it", shape="box", size=(0.3, 0.4, 0.5), axes=axes, position=(0.02, -0.03, -0.25), fixed=True
-    )
-    cable = refweb.Cable(law="linear", modulus=1e6, area=1e-5, density=1000.0)
-    system = nets.system(web, cable, [box, refweb.Contact(stiffness=STIFFNESS)], False)
-    v = np.zeros((system.rows, 3))
-    v[: len(web.points)] = (0.0, 0.0, -4.0)
-    v[system.supported] = 0.0
-    method = CentralDifference(system, step_size=duration / count * (1.0 + 1e-12))
-    run, stored = method.start(None, v), []
-    family = next(family for family in system.families if family.contact)
-    for row in np.linspace(0.0, duration, 11)[1:]:
-        method.advance(run, np.array([row]))
-        stored.append(system.energy_of(family, row, run.x).max())
-    assert run.nsteps == count
-    return run.x.copy(), run.drift, np.sqrt(2.0 * max(stored) / STIFFNESS)
+    box = dict(shape="box", size=(0.3, 0.4, 0.5), axes=axes, position=(0.02, -0.03, -0.25))
+    return nets.thrown(box, count, STIFFNESS)
 
 
 def test_a_net_over_edges_keeps_its_energy():

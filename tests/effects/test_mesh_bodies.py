@@ -10,7 +10,6 @@ import pytest
 import solids
 
 import refweb
-from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.contact.several import share_out
 
 SIZE, ROUND = (0.3, 0.4, 0.24), 0.08
@@ -110,23 +109,9 @@ def test_energy_nowhere_jumps(files, name):
     assert np.median(left) < 1e-10 and max(left) < 2e-4
 
 
-def thrown(body, count, duration=0.05, stiffness=300.0):
-    """A net that falls on a body, in some steps: (displacement, drift of energy, overlap)."""
-    web = refweb.Window(mesh="square", rows=3, columns=3, side=0.15).web()
-    cable = refweb.Cable(law="linear", modulus=1e6, area=1e-5, density=1000.0)
-    body = refweb.Body(**{"name": "it", "fixed": True, "axes": AXES, **body})
-    system = nets.system(web, cable, [body, refweb.Contact(stiffness=stiffness)], False)
-    v = np.zeros((system.rows, 3))
-    v[: len(web.points)] = (0.0, 0.0, -4.0)
-    v[system.supported] = 0.0
-    method = CentralDifference(system, step_size=duration / count * (1.0 + 1e-12))
-    run, stored = method.start(None, v), []
-    family = next(family for family in system.families if family.contact)
-    for row in np.linspace(0.0, duration, 11)[1:]:
-        method.advance(run, np.array([row]))
-        stored.append(system.energy_of(family, row, run.x).max())
-    assert run.nsteps == count
-    return run.x.copy(), run.drift, np.sqrt(2.0 * max(stored) / stiffness)
+def thrown(body, count, stiffness=300.0):
+    """A net that falls on a body, in some steps."""
+    return nets.thrown({"axes": AXES, **body}, count, stiffness)
 
 
 @pytest.mark.parametrize("name, place", [("ell", (0.02, -0.03, -0.16)), ("torus", (0.02, -0.03, -0.15))])

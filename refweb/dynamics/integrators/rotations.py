@@ -32,13 +32,12 @@ class Rotations:
 
     def __init__(self, system):
         self.turns = turns = Turns.of(system.net)
-        self._body, self._spin, self._turn = turns.rows.T
+        _, self._spin, self._turn = turns.rows.T
         number = np.full(3 * system.rows, -1)
         number[system.free] = np.arange(len(system.free))
         spin = number[3 * self._spin[:, None] + np.arange(3)]
         self.places = np.column_stack([number[3 * self._turn], spin])
         self.spins = spin
-        self._system, self._at = system, None
         body = [b for b in system.net.bodies if b.turn is not None]
         self._extent = np.array([b.extent for b in body])
 
@@ -114,7 +113,7 @@ class Rotations:
         return rates
 
     def pattern(self):
-        """Rows and columns of the entries of X, and of V, that `values` has; they are unknowns."""
+        """Rows and columns of the entries of X, and of V, numbers of unknowns."""
         rows, other = np.broadcast_arrays(self.places[:, :, None], self.places[:, None, :])
         slow, fast = np.broadcast_arrays(self.places[:, :, None], self.spins[:, None, :])
         return (rows.ravel(), other.ravel()), (slow.ravel(), fast.ravel())

@@ -27,12 +27,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
-from ...net.rotation import to_quaternion
+from ...net.rotation import times, times_transposed, to_quaternion
 from ..vectors import cross, dot
 from .nearest_point import lightness, share
 from .pair import lever_of, pair_of, pairing
 from .penalty import SHALLOW, foresight, rubbed_by, slope_of_power, thickness, turn_block
-from .places import along_axes, from_axes, hessian_times, place_moves, places, window
+from .places import hessian_times, place_moves, places, window
 from .tumbling import add_push, add_rotation, add_velocities, set_arms
 
 
@@ -86,10 +86,10 @@ def slip_of(v, cells, c, nodes, spins, functions, pair, place, y):
         value, slope = share(a, nodes, functions, place)
         u0, u1, u2 = u0 + value * v[i, 0], u1 + value * v[i, 1], u2 + value * v[i, 2]
         s0, s1, s2 = s0 + slope * v[i, 0], s1 + slope * v[i, 1], s2 + slope * v[i, 2]
-    u, s = along_axes(pair.axes, (u0, u1, u2)), along_axes(pair.axes, (s0, s1, s2))
+    u, s = times(pair.axes, (u0, u1, u2)), times(pair.axes, (s0, s1, s2))
     if spins:
         r = cells[c, nodes + 1]
-        w = angular(pair, spins, along_axes(pair.axes, (v[r, 0], v[r, 1], v[r, 2])))
+        w = angular(pair, spins, times(pair.axes, (v[r, 0], v[r, 1], v[r, 2])))
         wy = cross(w, y)
         u = u[0] - wy[0], u[1] - wy[1], u[2] - wy[2]
     return Slip(u, s, w)
@@ -277,13 +277,13 @@ def kernels(depth, pieces, nodes, functions, spins):
                 u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
                 own = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
                 out[c, 0] += dot(own, u)
-                turned = from_axes(pair.axes, own)
+                turned = times_transposed(pair.axes, own)
                 for k in range(3):
                     for a in range(nodes):
                         f[cells[c, a], k] += share(a, nodes, functions, place)[0] * turned[k]
                     f[cells[c, nodes], k] -= turned[k]
                 if spins:
-                    moment = from_axes(pair.axes, turned_by(pair.planar, cross(y, own)))
+                    moment = times_transposed(pair.axes, turned_by(pair.planar, cross(y, own)))
                     for k in range(3):
                         f[cells[c, nodes + 1], k] -= moment[k]
 

@@ -7,6 +7,7 @@ position; behind these stands the rest of a `Pair`, which spheres alone do not n
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -155,3 +156,9 @@ def pair_of(data, c, nodes):
         data[c, at + _PLANAR] != 0.0,
         (1.0, 0.0, 0.0, 1.0, 0.0, 1.0),
     )
+
+
+@kernel()
+def power_of_depth(exponent, deep):
+    """δ^p of a depth δ > 0, p being 1 or 1.5."""
+    return deep if exponent == 1.0 else deep * math.sqrt(deep)

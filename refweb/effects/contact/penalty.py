@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ...net.rotation import to_quaternion
+from ...net.rotation import times_transposed, to_quaternion
 from ..vectors import cross, dot
 from .nearest_point import lightness, point, share
-from .pair import lever_of, pair_of, pairing
-from .places import from_axes, hessian_times, place_moves, places, window
+from .pair import lever_of, pair_of, pairing, power_of_depth
+from .places import hessian_times, place_moves, places, window
 from .tumbling import add_moments, add_push, add_rotation, set_arms
 
 SHALLOW = 0.05
@@ -34,12 +34,6 @@ SPREAD = 2.5
 """Bound on the row sums of the stiffness of an element's contacts, both ends and one between, over k p δ^(p − 1)."""
 HOLLOW = 2.0
 """The same of a body that is not convex, over this: where it is hollow curvature adds δ ∂²δ/∂x² ≤ 1."""
-
-
-@kernel()
-def power_of_depth(exponent, deep):
-    """δ^p of a depth δ > 0, p being 1 or 1.5."""
-    return deep if exponent == 1.0 else deep * math.sqrt(deep)
 
 
 @kernel()
@@ -71,9 +65,9 @@ def turn_block(blocks, c, rows, axes, q):
         for s in range(0, 3 * rows, 3):
             for i in range(3):
                 row = blocks[c, r + i, s], blocks[c, r + i, s + 1], blocks[c, r + i, s + 2]
-                q[i, 0], q[i, 1], q[i, 2] = from_axes(axes, row)
+                q[i, 0], q[i, 1], q[i, 2] = times_transposed(axes, row)
             for j in range(3):
-                column = from_axes(axes, (q[0, j], q[1, j], q[2, j]))
+                column = times_transposed(axes, (q[0, j], q[1, j], q[2, j]))
                 blocks[c, r, s + j], blocks[c, r + 1, s + j], blocks[c, r + 2, s + j] = column
 
 
@@ -215,13 +209,13 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
                 c, push = touch.c, push_of(touch)
                 out[c, 0] = max(out[c, 0], touch.spot.depth)
-                g = from_axes(touch.pair.axes, touch.spot.gradient)
+                g = times_transposed(touch.pair.axes, touch.spot.gradient)
                 for k in range(3):
                     for a in range(nodes):
                         f[cells[c, a], k] -= share(a, nodes, functions, touch.place)[0] * push * g[k]
                     f[cells[c, nodes], k] += push * g[k]
                 if spins:
-                    moment = from_axes(touch.pair.axes, cross(touch.spot.y, touch.spot.gradient))
+                    moment = times_transposed(touch.pair.axes, cross(touch.spot.y, touch.spot.gradient))
                     for k in range(3):
                         f[cells[c, nodes + 1], k] += push * moment[k]
 

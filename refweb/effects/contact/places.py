@@ -16,6 +16,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ...kernels import kernel
+from ...net.rotation import times
 from ..vectors import dot
 from .nearest_point import SAMPLES, far, point, share
 from .pair import Pair, pair_of, pairing
@@ -68,26 +69,6 @@ class Touch(NamedTuple):
     spot: Spot
     weight: float
     share: float
-
-
-@kernel()
-def along_axes(axes, p):
-    """A vector's components along the axes of the body."""
-    return (
-        axes[0][0] * p[0] + axes[0][1] * p[1] + axes[0][2] * p[2],
-        axes[1][0] * p[0] + axes[1][1] * p[1] + axes[1][2] * p[2],
-        axes[2][0] * p[0] + axes[2][1] * p[1] + axes[2][2] * p[2],
-    )
-
-
-@kernel()
-def from_axes(axes, q):
-    """The vector of components along the axes of the body."""
-    return (
-        axes[0][0] * q[0] + axes[1][0] * q[1] + axes[2][0] * q[2],
-        axes[0][1] * q[0] + axes[1][1] * q[1] + axes[2][1] * q[2],
-        axes[0][2] * q[0] + axes[1][2] * q[1] + axes[2][2] * q[2],
-    )
 
 
 @kernel()
@@ -176,7 +157,7 @@ def places(depth, spins=0):
     def within(x, cells, data, c, nodes, functions, place):
         pair = paired(x, cells, data, c, nodes)
         p, d, e = point(x, cells, data, c, nodes, functions, place)
-        p, d, e = along_axes(pair.axes, p), along_axes(pair.axes, d), along_axes(pair.axes, e)
+        p, d, e = times(pair.axes, p), times(pair.axes, d), times(pair.axes, e)
         deep, gradient, hessian = depth(p, pair.shape)
         return Spot(p, d, e, deep, gradient, hessian)
 

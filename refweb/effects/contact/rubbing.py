@@ -37,12 +37,13 @@ import math
 import numpy as np
 
 from ...kernels import GIVE, KEPT, MEET, SWEEP, kernel
+from ...net.rotation import times, times_transposed
 from ..base import Rubbing
 from ..vectors import cross, dot
 from .friction import facing
 from .nearest_point import share
 from .penalty import rubbed_by
-from .places import along_axes, from_axes, hessian_times, places
+from .places import hessian_times, places
 
 CELL, ROWS, SHARES, AXES, LEVERS, START = 0, 1, 5, 7, 16, 25
 """Columns of what touches: cell; rows of the nodes, the body and its rotation, −1 without; shares of the nodes; the
@@ -165,7 +166,7 @@ def set_axis(touches, n, i, axis, y, pair, spins):
         arm = turn * normal[0], turn * normal[1], turn * normal[2]
     lever = arm
     if spins == 2:
-        lever = from_axes(pair.axes, hessian_times(pair.mobility, along_axes(pair.axes, arm)))
+        lever = times_transposed(pair.axes, hessian_times(pair.mobility, times(pair.axes, arm)))
     for k in range(3):
         touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = axis[k], lever[k]
         touches[n, ARMS + 3 * i + k] = arm[k]
@@ -182,7 +183,7 @@ def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
         touches[n, ROWS + 3] = -1.0
     for a in range(2):
         touches[n, SHARES + a] = share(a, 2, functions, touch.place)[0]
-    y, g = from_axes(pair.axes, touch.spot.y), from_axes(pair.axes, touch.spot.gradient)
+    y, g = times_transposed(pair.axes, touch.spot.y), times_transposed(pair.axes, touch.spot.gradient)
     steep, g = facing(g)
     g = g if steep > 0.0 else (1.0, 0.0, 0.0)  # nothing pushes
     least = (1.0, 0.0, 0.0) if abs(g[0]) < 0.6 else (0.0, 1.0, 0.0)

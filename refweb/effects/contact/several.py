@@ -23,7 +23,7 @@ import numpy as np
 from ...kernels import kernel
 from ..vectors import dot
 from .nearest_point import far, point
-from .pair import pair_of
+from .pair import pair_of, power_of_depth
 
 SAMPLES = 256
 """Largest number of parts of an element between whose ends slopes are looked at."""
@@ -41,12 +41,6 @@ WEIGHT, SHARE, RISE = 3, 4, 5
 """Columns of what is found: 1 of a maximum or an end and −1 of a minimum; share of the push that losses have; F."""
 COLUMNS = 6
 """Number of columns."""
-
-
-@kernel()
-def power_of_depth(exponent, deep):
-    """δ^p of a depth δ > 0, p being 1 or 1.5."""
-    return deep if exponent == 1.0 else deep * math.sqrt(deep)
 
 
 @kernel()

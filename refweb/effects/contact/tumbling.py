@@ -13,6 +13,7 @@ with that by δθ = 2 (q₀ δq − δq₀ q + q × δq)/|q|². All but the last
 from __future__ import annotations
 
 from ...kernels import kernel
+from ...net.rotation import times
 from .nearest_point import share
 from .pair import AWAY
 
@@ -32,11 +33,8 @@ def set_arms(x, cells, data, c, nodes, axes, arms):
     b = cells[c, nodes]
     for a in range(nodes):
         i, at = cells[c, a], AWAY + 3 * a
-        p0, p1, p2 = (
-            data[c, at] + x[i, 0] - x[b, 0], data[c, at + 1] + x[i, 1] - x[b, 1], data[c, at + 2] + x[i, 2] - x[b, 2]
-        )  # fmt: skip
-        for k in range(3):
-            arms[a, k] = axes[k][0] * p0 + axes[k][1] * p1 + axes[k][2] * p2
+        p = data[c, at] + x[i, 0] - x[b, 0], data[c, at + 1] + x[i, 1] - x[b, 1], data[c, at + 2] + x[i, 2] - x[b, 2]
+        arms[a, 0], arms[a, 1], arms[a, 2] = times(axes, p)
 
 
 @kernel()
@@ -95,11 +93,7 @@ def add_velocities(block, damping, v, cells, c, nodes, axes):
     at = 3 * (nodes + 1)
     for b in range(nodes + 2):
         r = cells[c, b]
-        own = (
-            axes[0][0] * v[r, 0] + axes[0][1] * v[r, 1] + axes[0][2] * v[r, 2],
-            axes[1][0] * v[r, 0] + axes[1][1] * v[r, 1] + axes[1][2] * v[r, 2],
-            axes[2][0] * v[r, 0] + axes[2][1] * v[r, 1] + axes[2][2] * v[r, 2],
-        )
+        own = times(axes, (v[r, 0], v[r, 1], v[r, 2]))
         for i in range(at + 3):
             k0, k1, k2 = damping[i, 3 * b], damping[i, 3 * b + 1], damping[i, 3 * b + 2]
             block[i, at] -= k2 * own[1] - k1 * own[2]

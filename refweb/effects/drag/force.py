@@ -15,25 +15,12 @@ import functools
 import math
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
+from ..line_kernels import direction
 from ..vectors import dot
 
 NORMAL, TANGENTIAL, WIND, ALONG, GROUP, LENGTH, SLOPES = 0, 1, 2, 5, 8, 9, 10
 """Columns of data: c_n and c_t [kg/m]; w; d = dx/dξ of the web; the number of cells of one row, where they begin, else
 0; natural length [m]; ∂d/∂x of each node, the first of which bears the force."""
-
-
-@kernel()
-def tangent(x, cells, data, c, nodes):
-    """(t, 1/|d| or 0)."""
-    d0, d1, d2 = data[c, ALONG], data[c, ALONG + 1], data[c, ALONG + 2]
-    for b in range(nodes):
-        row, slope = cells[c, b], data[c, SLOPES + b]
-        d0 += slope * x[row, 0]
-        d1 += slope * x[row, 1]
-        d2 += slope * x[row, 2]
-    length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-    inverse = 1.0 / length if length > 0.0 else 0.0
-    return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
 
 
 @kernel()
@@ -78,7 +65,7 @@ def kernels(nodes):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            row, (e, _) = cells[c, 0], tangent(x, cells, data, c, nodes)
+            row, (e, _) = cells[c, 0], direction(x, cells, data, c, nodes, ALONG, SLOPES)
             own = drag_on(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
             power = 0.0
             for k in range(3):
@@ -90,7 +77,7 @@ def kernels(nodes):
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            e, inverse = tangent(x, cells, data, c, nodes)
+            e, inverse = direction(x, cells, data, c, nodes, ALONG, SLOPES)
             along, n, size = split(e, relative(v, cells, data, c))
             normal, tangential = data[c, NORMAL], data[c, TANGENTIAL]
             for j in range(3 if not definite else 0):
@@ -108,7 +95,7 @@ def kernels(nodes):
     def damping(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
-            e, _ = tangent(x, cells, data, c, nodes)
+            e, _ = direction(x, cells, data, c, nodes, ALONG, SLOPES)
             u, normal, tangential = relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL]
             add_slope(e, u, normal, tangential, blocks[c])
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from ...kernels import GIVE, KEPT, MEET, SWEEP, kernel
 from ..base import Rubbing
-from .force import GROUP, NORMAL, TANGENTIAL, add_slope, drag_on, relative, tangent
+from ..line_kernels import direction
+from .force import ALONG, GROUP, NORMAL, SLOPES, TANGENTIAL, add_slope, drag_on, relative
 
 CELL, ROW, COUNT, COEFFICIENTS, DIRECTION, START, FORCE, WIDTH = 0, 1, 2, 3, 5, 8, 11, 14
 """Columns of what feels drag: its cell and row; how many feel it at this row, at the first of them; c_n and c_t; t; u⁻;
@@ -120,7 +121,7 @@ def rubbing(nodes):
     @kernel(MEET)
     def meet(h, x, v, inverse, cells, data, touches, begin):
         for c in range(cells.shape[0] if begin + cells.shape[0] <= touches.shape[0] else 0):
-            n, (t, _) = begin + c, tangent(x, cells, data, c, nodes)
+            n, (t, _) = begin + c, direction(x, cells, data, c, nodes, ALONG, SLOPES)
             u = relative(v, cells, data, c)
             touches[n, CELL], touches[n, ROW], touches[n, COUNT] = c, cells[c, 0], data[c, GROUP]
             touches[n, COEFFICIENTS], touches[n, COEFFICIENTS + 1] = data[c, NORMAL], data[c, TANGENTIAL]

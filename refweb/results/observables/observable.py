@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...errors import InputError
+from ...messages import nearest
 from ...net.net import LENGTH
 
 ROUNDING, SHARE = 4.0 * np.finfo(float).eps, 1e-7
@@ -60,6 +62,16 @@ class Observable:
     def probe(self, system):
         """The `refweb.results.probes.Probe` that finds the same value in every step of a run."""
         raise NotImplementedError
+
+    def body(self, net):
+        """The body it is of: the one that is named or the only one. Refused where it is none, or one of several."""
+        name, names = self.observe.body, [body.name for body in net.bodies]
+        if name is None and len(names) > 1:
+            quantity = self.observe.quantity
+            raise InputError(f'body is missing: quantity = "{quantity}" needs one body, {nearest("", names)}')
+        if name is not None and name not in names:
+            raise InputError(f'body = "{name}" is not a body, {nearest(name, names)}')
+        return next(body for body in net.bodies if name in (None, body.name))
 
     def place(self, system, at):
         """Node or line of the scene, where the probe says it stands at row or element ``at``; None for the whole."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from ...messages import nearest
 from .observable import Observable, Value
 
 
@@ -19,27 +18,19 @@ class Overlap(Observable):
 
     def on(self, system):
         """Refuse a scene without contact, a body that is none, and none where there are several."""
-        names, body = [body.name for body in system.net.bodies], self.observe.body
         if not system.contact:
             raise InputError('quantity = "overlap" needs [contact] in the scene')
-        if body is None and len(names) > 1:
-            raise InputError(f'body is missing: quantity = "overlap" needs one body, {nearest("", names)}')
-        if body is not None and body not in names:
-            raise InputError(f'body = "{body}" is not a body, {nearest(body, names)}')
-
-    def _body(self, net):
-        """The body it is of."""
-        return next(body for body in net.bodies if self.observe.body in (None, body.name))
+        self.body(system.net)
 
     def of(self, state):
         """The deepest over all lines."""
-        deep = state.overlap(self._body(state.system.net))
+        deep = state.overlap(self.body(state.system.net))
         at = int(np.argmax(deep))
         return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
 
     def probe(self, system):
         """Of what the family of its contact shows."""
-        return probe_of(system, self._body(system.net))
+        return probe_of(system, self.body(system.net))
 
     def place(self, system, at):
         """The line of an element, None where nothing is touched."""

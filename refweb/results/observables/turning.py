@@ -11,7 +11,6 @@ import numpy as np
 
 from ...errors import InputError
 from ...kernels import kernel
-from ...messages import nearest
 from ...net.rotation import matrix_at, quaternion_of, times, times_transposed
 from ..probes import MAGNITUDE, PROBE, Probe
 from .observable import Observable, Value
@@ -28,23 +27,13 @@ class Turning(Observable):
 
     def on(self, system):
         """Refuse a body that is none, and none where there are several or no body."""
-        names, body = [body.name for body in system.net.bodies], self.observe.body
-        if not names:
+        if not system.net.bodies:
             raise InputError(f'quantity = "{self.observe.quantity}" needs a [[body]] in the scene')
-        if body is None and len(names) > 1:
-            raise InputError(
-                f'body is missing: quantity = "{self.observe.quantity}" needs one body, {nearest("", names)}'
-            )
-        if body is not None and body not in names:
-            raise InputError(f'body = "{body}" is not a body, {nearest(body, names)}')
-
-    def body(self, system):
-        """The body it is of."""
-        return next(body for body in system.net.bodies if self.observe.body in (None, body.name))
+        self.body(system.net)
 
     def rows(self, system):
         """Component and rows of rotation of the body, −1 where there is none."""
-        component, body = self.observe.component, self.body(system)
+        component, body = self.observe.component, self.body(system.net)
         rows = (MAGNITUDE if component is None else component, body.spin, body.turn)
         return [-1 if row is None else row for row in rows]
 
@@ -67,7 +56,7 @@ class Orientation(Turning):
     def on(self, system):
         """Refuse a ball, which looks the same however it turns."""
         super().on(system)
-        body = self.body(system)
+        body = self.body(system.net)
         if body.spin is not None and body.turn is None and not body.shape.planar:
             raise InputError(
                 f'body = "{body.name}" has no orientation that is followed: a sphere with one moment of inertia looks '
@@ -82,7 +71,7 @@ class Orientation(Turning):
 
     def probe(self, system):
         """Of x alone."""
-        body, component = self.body(system), self.observe.component
+        body, component = self.body(system.net), self.observe.component
         component = -1 if component is None else component
         return Probe(
             orientation,
@@ -98,11 +87,11 @@ class AngularVelocity(Turning):
 
     def of(self, state):
         """By momentum and inertia."""
-        return self._sized(self.body(state.system).turning(state.x, state.v))
+        return self._sized(self.body(state.system.net).turning(state.x, state.v))
 
     def probe(self, system):
         """Of x and v."""
-        body = self.body(system)
+        body = self.body(system.net)
         whirl = np.eye(3) if body.turn is None else body.axes.T @ body.mobility @ body.axes
         return Probe(angular_velocity, self.rows(system), whirl)
 
@@ -114,12 +103,12 @@ class AngularMomentum(Turning):
 
     def of(self, state):
         """By the velocity of its row of rotation."""
-        body = self.body(state.system)
+        body = self.body(state.system.net)
         return self._sized(np.zeros(3) if body.spin is None else body.moment * state.v[body.spin])
 
     def probe(self, system):
         """Of v alone."""
-        body = self.body(system)
+        body = self.body(system.net)
         return Probe(angular_momentum, self.rows(system), np.array([[body.moment if body.spin is not None else 0.0]]))
 
 
