@@ -37,6 +37,7 @@ EFFECTS = {
     "bending": "refweb.effects.bending:Bending",
     "reel": "refweb.effects.reel:Reel",
     "temperature": "refweb.effects.temperature:Temperature",
+    "rupture": "refweb.effects.rupture:Rupture",
 }
 """Effects by the name of their table."""
 FACTORIZATIONS = ("qdldl", "rslab")
@@ -80,6 +81,7 @@ OBSERVABLES = {
     "bending_energy": "refweb.results.observables.book:BendingEnergy",
     "frame_energy": "refweb.results.observables.book:FrameEnergy",
     "orbit_energy": "refweb.results.observables.book:OrbitEnergy",
+    "rupture_energy": "refweb.results.observables.book:RuptureEnergy",
     "dissipated_energy": "refweb.results.observables.book:DissipatedEnergy",
     "total_energy": "refweb.results.observables.book:TotalEnergy",
     "work": "refweb.results.observables.book:Work",
@@ -120,7 +122,13 @@ class Method(NamedTuple):
         ``looked_at`` are probes, sums and events, see `refweb.dynamics.integrators.integrator.Integrator`.
         """
         given = {key: value for key in self.keys if (value := getattr(solve, key)) is not None}
-        return load(self.integrator)(system, *looked_at, **(given | keys))
+
+        def make(system):
+            return load(self.integrator)(system, *looked_at, **(given | keys))
+
+        if system.weakness is None:
+            return make(system)
+        return load("refweb.dynamics.integrators.rupture:Rupturing")(make, system)
 
 
 _STEPS, _TOLERANCES = ("safety", "step_size"), ("rtol", "atol_position", "atol_velocity")

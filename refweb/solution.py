@@ -295,6 +295,7 @@ def load(folder) -> Solution:
         for key in ("status", "message", "web", "events", "solver", "cost", "versions", "warnings"):
             setattr(found, key, summary[key])
         found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
+        found.breaks = summary.get("breaks")
         if used := summary.get("utilisation"):
             found.utilisation = used["value"], used["line"]
         found.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
@@ -343,10 +344,15 @@ def _last_state(folder, scene):
     try:
         with np.load(path) as kept:
             time, x, v = float(kept["time"]), kept["displacements"], kept["velocities"]
+            broken = [kept[name] for name in ("broken", "broken_energies") if name in kept]
     except Exception as error:  # whatever a spoilt file makes of it
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None
     if x.shape != (system.rows, 3):
         raise InputError(f"{short(str(path))}: is not that of a run that scene.toml leads to")
+    if broken and len(broken[0]):
+        from .system.torn import torn
+
+        system = torn(system, *broken)
     return State(system, time, x, v)
 
 

@@ -96,7 +96,7 @@ class Watch:
     sums : list of refweb.dynamics.integrators.integrator.Sum
         Of the observables that are followed in every step.
     events : list of refweb.dynamics.integrators.events.Event
-        In the order of the scene.
+        In the order of the scene, and last that a line breaks, where stress breaks lines.
     columns : list of str
         Names of the columns of ``history.csv``, with units.
     """
@@ -112,6 +112,8 @@ class Watch:
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
         self.events = self._add_events(scene.event)
+        if system.weakness is not None and system.weakness.watched:
+            self.events.append(Event(self._of_warning("utilisation"), 1.0, True, stop=True))
         own = dict.fromkeys(f.book for f in system.families if f.book != "work")
         work = ["work"] if "work" in [f.book for f in system.families] or system.drives or system.line_drives else []
         energies = ["kinetic_energy", *own, *work, "total_energy"]
@@ -173,7 +175,7 @@ class Watch:
         """Results by name, without errors; ``last`` is the last row of ``history.csv``."""
         results, extremes, unfilled = {}, course.extremes, self.unfilled(course)
         neglected = self._neglected(course)
-        state = State(self.system, course.time, course.x, course.v)
+        state = self.state(course)
         for i, o in enumerate(self._observables):
             value, when, where = float(last[1 + i]), course.time, None
             slot = self._slot(o)
@@ -187,6 +189,30 @@ class Watch:
             left_out = None if neglected is None else abs(value) * neglected
             results[o.name] = Result(value, None, o.unit, when, where, neglected=left_out, at=at)
         return results
+
+    def state(self, course):
+        """The `refweb.results.state.State` that a course is in."""
+        system, breaks = self.system, course.breaks
+        if breaks is not None and len(breaks.elements):
+            from ..system.torn import torn
+
+            system = torn(system, breaks.elements, breaks.energies)
+        return State(system, course.time, course.x, course.v)
+
+    def breaks(self, course):
+        """The breaks of a course, for ``run.json``."""
+        net, found = self.system.net, course.breaks
+        return [
+            {
+                "line": int(net.line[element]),
+                "element": int(element),
+                "time": float(time),
+                "error": None,
+                "place": place.tolist(),
+                "energy": float(energy),
+            }
+            for element, time, energy, place, _ in zip(*found, strict=True)
+        ]
 
     def _neglected(self, course):
         """Largest distance from the origin of an orbit over its radius [1], None without one."""

@@ -23,10 +23,26 @@ class Start(NamedTuple):
         Displacement [m], None for the web as it is.
     v : ndarray, shape (rows, 3), optional
         Velocity [m/s], None for those of the scene.
+    broken : ndarray of int, optional
+        Elements that are broken, None where none are.
     """
 
     x: np.ndarray | None = None
     v: np.ndarray | None = None
+    broken: np.ndarray | None = None
+
+    @property
+    def motion(self):
+        """(x, v), from which an integrator starts."""
+        return self.x, self.v
+
+    def torn(self, system):
+        """The system as it is there: with what is broken."""
+        if self.broken is None:
+            return system
+        from ..system.torn import torn
+
+        return torn(system, self.broken, np.zeros(len(self.broken)))
 
 
 def start_of(scene, system):
@@ -119,7 +135,11 @@ def stored(system, folder):
         )
     if "lines" in given and not np.array_equal(given["lines"], net.web.lines):
         raise InputError(f"{name} holds other lines between its nodes than this scene: it must be the same web")
+    broken = given.get("broken", np.zeros(0, dtype=np.int64))
+    if len(broken) and system.weakness is None:
+        raise InputError(f"{name} line {net.line[broken[0]]} is broken there: this scene needs a [rupture]")
     start = _start_at(system, positions, displacements, velocities, bodies)
+    start = start._replace(broken=broken if len(broken) else None)
     x, v = (given.get(f"twin_{one}") for one in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None

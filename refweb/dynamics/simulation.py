@@ -72,6 +72,16 @@ class Simulation:
 
             self._ways = Ways(scene, system, kept)
             scene = self._ways.scene
+        self.begin, self.begin_of_twin = Start(), None
+        if kept is not None:
+            self.begin = Start(*(kept.get(f"begin_{name}") for name in Start._fields))
+            if "twin_begin_x" in kept:
+                self.begin_of_twin = Start(kept["twin_begin_x"], kept["twin_begin_v"])
+        elif scene.start_folder is not None:
+            self.begin, self.begin_of_twin = stored(system, scene.start_folder)
+            if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
+                solution.warnings.append(NO_TWIN)
+        system = self.begin.torn(system)
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self.overlaps = _overlaps_of(scene, system)
@@ -79,15 +89,6 @@ class Simulation:
         _check_step(scene)
         self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
-        self.begin, self.begin_of_twin = Start(), None
-        if kept is not None:
-            self.begin = Start(kept.get("begin_x"), kept.get("begin_v"))
-            if "twin_begin_x" in kept:
-                self.begin_of_twin = Start(kept["twin_begin_x"], kept["twin_begin_v"])
-        elif scene.start_folder is not None:
-            self.begin, self.begin_of_twin = stored(system, scene.start_folder)
-            if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
-                solution.warnings.append(NO_TWIN)
         if kept is None and len(system.corners) > FEW_CORNERS:
             from .corners import remarks_on_corners
 
@@ -220,7 +221,7 @@ class Simulation:
     def _set_off(self, folder):
         """The course at its start, or where its checkpoint has it, and the number of the row ahead."""
         if self._kept is None:
-            return self.integrator.start(*self.begin), 0
+            return self.integrator.start(*self.begin.motion), 0
         own = {key.removeprefix("run_"): array for key, array in self._kept.items() if key.startswith("run_")}
         course, row = self.integrator.load(own), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
@@ -245,10 +246,12 @@ class Simulation:
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
         if np.isfinite(course.x).all():
-            solution.state = State(self.system, course.time, course.x.copy(), course.v.copy())
+            solution.state = self._state(course)
+        if course.breaks is not None:
+            solution.breaks = self.watch.breaks(course)
         solution.events = [
             {"name": event.name, "time": float(time) if np.isfinite(time) else None, "error": None}
-            for event, time in zip(self.scene.event, course.events["time"], strict=True)
+            for event, time in zip(self.scene.event, course.events["time"][: len(self.scene.event)], strict=True)
         ]
         spent = dict(nsteps=course.nsteps, **course.drifts, **self.integrator.spent(course))
         outer = (f for f in self.system.families if not f.internal and f.impulse is None)
@@ -258,16 +261,21 @@ class Simulation:
         solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 
+    def _state(self, course):
+        """The state of a course, which stays as it is."""
+        state = self.watch.state(course)
+        return State(state.system, state.time, state.x.copy(), state.v.copy())
+
     def _frame(self, number, folder, course):
         """Keep a state, in the folder with a checkpoint."""
-        state = State(self.system, course.time, course.x.copy(), course.v.copy())
+        state = self._state(course)
         if folder is None:
             self.solution.frames.append((number, state))
             return
         kept = {f"run_{name}": array for name, array in self.integrator.save(course).items()}
         kept |= {f"begin_{name}": array for name, array in self.begin._asdict().items() if array is not None}
         if self.begin_of_twin is not None:
-            kept |= {f"twin_begin_{name}": array for name, array in self.begin_of_twin._asdict().items()}
+            kept |= {f"twin_begin_{name}": array for name, array in zip("xv", self.begin_of_twin.motion, strict=True)}
         kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
@@ -277,7 +285,8 @@ class Simulation:
             return
         if self._largest_stress is not None:
             yield from floor_remark(self.system.net, self._largest_stress)
-        yield from strength_remark(self.solution.utilisation)
+        if self.system.weakness is None:
+            yield from strength_remark(self.solution.utilisation)
         yield from strain_remark(self._strain)
         yield from self.system.remarks()
         if self.overlaps is not None:

@@ -94,7 +94,7 @@ class Twin:
         try:
             integrator = made()
             begin = simulation.begin if simulation.begin_of_twin is None else simulation.begin_of_twin
-            course = integrator.start(*begin)
+            course = integrator.start(*begin.motion)
             for block in blocks(integrator, course, simulation.schedule):
                 table = simulation.watch.table(block.compared)
                 rows.append(simulation.watch.compared(table))
@@ -238,12 +238,17 @@ def add_errors(simulation, run, twin, rows):
     drifts = simulation.watch.drifts(one, other, np.diff(rows[-2:, 0]).sum())
     compared = run.results, run.corrections, twin.results, rows, twin.rows
     solution.reduced = with_errors(*compared, factor, drifts, one.largest)
-    for found, width, time in zip(solution.events, one.events["width"], other.events["time"], strict=True):
+    own, count = zip(one.events["width"], other.events["time"], strict=True), len(solution.events)
+    for found, (width, time) in zip(solution.events, list(own)[:count], strict=True):
         if found["time"] is not None and np.isfinite(time):
             off = abs(found["time"] - float(time))
             found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
     if one.stopped and len(rows) > 1:
         _add_lateness(solution, rows[-2:])
+    if solution.breaks:
+        from .break_errors import add_errors_of_breaks
+
+        add_errors_of_breaks(solution, one.breaks, other.breaks, SPREAD * factor)
 
 
 def _add_lateness(solution, rows):

@@ -5,7 +5,7 @@ matrix and knows no other effect.
 
 ``on(net)``
     A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
-    `Drive`, a `LineDrive` or a `Constraint`.
+    `Drive`, a `LineDrive`, a `Constraint` or a `Weakness`.
 ``extend(net)``
     The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
     has no ``on`` first.
@@ -108,6 +108,10 @@ class Family:
         Whether it acts on what does not move; statics leaves out what does not.
     times : sequence of float
         Times at which the force has a corner [s]; no step of an implicit method passes one.
+    elements : ndarray of int, shape (cells,) or (cells, 2), optional
+        Elements of the net that each cell acts through, and with which it ends; None for what acts on nodes.
+    sever : callable, optional
+        Changes rows of ``data`` in place so that their cells do nothing, where one of their ``elements`` is broken.
     """
 
     name: str
@@ -134,6 +138,8 @@ class Family:
     symmetric: bool = True
     at_rest: bool = True
     times: tuple = ()
+    elements: np.ndarray | None = None
+    sever: Callable | None = None
 
     @property
     def dead(self):
@@ -212,6 +218,27 @@ class Constraint:
         np.subtract.at(total, self.cells[:, 0], along)
         np.add.at(total, self.cells[:, 1], along)
         return total
+
+
+@dataclass(frozen=True, eq=False)
+class Weakness:
+    """Elements that break.
+
+    Attributes
+    ----------
+    limits : ndarray, shape (elements,)
+        Tension at which each breaks [N], infinite for those that hold.
+    times : tuple of (float, int)
+        Times at which elements break whatever holds them [s], increasing, with the element.
+    """
+
+    limits: np.ndarray
+    times: tuple = ()
+
+    @property
+    def watched(self):
+        """Whether any tension breaks anything."""
+        return bool(np.isfinite(self.limits).any())
 
 
 @dataclass(frozen=True, eq=False)

@@ -213,4 +213,11 @@ class Bending(Table):
             bound=bound,
             book="bending_energy",
             internal=True,
+            elements=elements,
+            sever=_sever,
         )
+
+
+def _sever(numbers):
+    """Leave nothing of springs at broken elements."""
+    numbers[:, 0] = 0.0

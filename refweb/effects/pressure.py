@@ -149,7 +149,7 @@ class Pressure(Table):
         pushed = self.value * sides[net.line[at], None] * normal
         data = np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3]])
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
-        own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
+        own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False, elements=at, sever=_sever)
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
 
     def _sides(self, web, lines, normal):
@@ -160,6 +160,11 @@ class Pressure(Table):
         for line in lines[side[lines] == 0.0][:1]:
             raise InputError(f"away_from = {list(self.away_from)} is on neither side of line {line}")
         return np.sign(side)
+
+
+def _sever(numbers):
+    """Leave nothing of the pressure on broken elements."""
+    numbers[:, NORMAL : NORMAL + 3] = 0.0
 
 
 def _integrals(places):

@@ -68,6 +68,11 @@ def kernels(nodes):
     return force, stiffness, bound
 
 
+def _sever(numbers):
+    """Leave nothing of a force along a broken element, which has no direction."""
+    numbers[:, 0] = 0.0
+
+
 @table
 class Thrust(Table):
     """A force on a node at the end of a line, along the line's current direction there.
@@ -122,6 +127,7 @@ class Thrust(Table):
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
         own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
+        own |= dict(elements=np.array([cell]), sever=_sever)
         return outer_load(net, "thrust", cells, data, self.factor, **own)
 
     def _line(self, web, node):

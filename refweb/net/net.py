@@ -131,6 +131,11 @@ class Net:
         return replace(self, line_data=numbers, columns=(*self.columns, name))
 
     @property
+    def broken(self):
+        """Elements that are broken, which have no stiffness, shape (k,)."""
+        return np.flatnonzero(self.line_data[:, AXIAL_STIFFNESS] == 0.0)
+
+    @property
     def natural_length(self):
         """Natural length of each element [m], shape (cells,)."""
         return self.line_data[:, LENGTH]

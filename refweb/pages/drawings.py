@@ -62,6 +62,9 @@ def _view(head):
     """The canvas and its controls."""
     single = len(head["numbers"]) == 1 and head["kind"] != "modes"
     marks = [tag("span", "slack", id="slack", class_="mark slack")]
+    if head["broken"]:
+        colour = ",".join(map(str, head["broken"]))
+        marks.append(Html(f'<span class="mark" style="--mark:rgb({colour})">{tag("span", "broken")}</span>'))
     marks += [tag("span", "support", class_="mark support")] if head["arrays"]["supports"]["length"] else []
     for body in head["bodies"]:
         colour = ",".join(str(round(255 * share)) for share in body["colour"])

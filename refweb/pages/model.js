@@ -81,9 +81,10 @@ class Model {
     this.version++;
   }
 
-  // Colours of a frame: the levels of a field between limits; slack lines grey where the field is theirs to be so.
+  // Colours of a frame: the levels of a field between limits; slack lines grey where the field is theirs to be so; broken ones in
+  // a colour of their own.
   paint(frame, field, low, high) {
-    const { tints, head, arrays, head: { along, grey, numbers }, arrays: { colours, slack } } = this;
+    const { tints, head, arrays, head: { along, grey, broken, numbers }, arrays: { colours, slack } } = this;
     const lines = slack.length / numbers.length, levels = arrays[field.array], first = field.constant ? 0 : frame * lines;
     const [least, most] = field.ranges[frame], place = new Uint8Array(255);
     for (let i = 0; i < 255; i++) {
@@ -92,9 +93,10 @@ class Model {
     }
     const two = head.two.flat();
     for (let line = 0, t = 0; line < lines; line++) {
-      const level = levels[first + line], loose = field.grey && slack[frame * lines + line] === 1;
+      const level = levels[first + line], torn = slack[frame * lines + line] === 2;
+      const loose = torn || field.grey && slack[frame * lines + line] === 1;
       const value = least + (most - least) * level / 254;
-      const [from, at] = field.two ? [two, value > 0.5 ? 3 : 0] : loose || level === 255 ? [grey, 0] : [colours, 3 * place[level]];
+      const [from, at] = torn ? [broken, 0] : field.two ? [two, value > 0.5 ? 3 : 0] : loose || level === 255 ? [grey, 0] : [colours, 3 * place[level]];
       for (let k = 0; k < along; k++, t += 4) {
         tints[t] = from[at];
         tints[t + 1] = from[at + 1];

@@ -14,14 +14,14 @@ import numpy as np
 
 from ..errors import InputError
 from ..pictures.camera import choose, nearby
-from ..pictures.stage import BODIES, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, UNITS, colour_map
+from ..pictures.stage import BODIES, BROKEN, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, UNITS, colour_map
 from .packed import PLACES, UNKNOWN, VALUES, differences, levels, pack
 
 LARGEST = 2_400_000
 """Bytes that the frames may take as text where their number is not asked for."""
 MOST = 400
 """Frames that a page has at most where their number is not asked for."""
-HIDDEN = ("slack", "support", "line", "natural_length", "mass")
+HIDDEN = ("slack", "broken", "support", "line", "natural_length", "mass")
 """Fields that do not change much, or are marked anyway; they stand last among the fields to choose from."""
 LEFT_OUT = ("support", "line")
 FIRST = ("shape", "stress", "tension", "strain", "displacement", "velocity", "reaction")
@@ -133,7 +133,7 @@ def _space(record, frames, missing):
         "origin": single[points],
         "moves": differences(steps[:, points].transpose(0, 2, 1)),
         "segments": segments.astype(np.uint32),
-        "slack": np.array([frame.slack for frame in frames]).astype(np.uint8),
+        "slack": np.array([np.where(frame.broken, 2, frame.slack) for frame in frames]).astype(np.uint8),
         "supports": place[_supports(frames)].astype(np.uint32),
         "colours": np.rint(255 * colour_map()(np.linspace(0, 1, 256))[:, :3]).astype(np.uint8),
     }
@@ -147,6 +147,7 @@ def _space(record, frames, missing):
         "bodies": _bodies(frames, arrays),
         "two": [[round(255 * share) for share in colour] for colour in TWO.values()],
         "grey": [round(255 * share) for share in SLACK],
+        "broken": [round(255 * share) for share in BROKEN] if any(frame.broken.any() for frame in frames) else None,
         "support": [round(255 * share) for share in SUPPORT],
         **_camera(frames, origin, moved),
     }

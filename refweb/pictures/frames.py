@@ -65,6 +65,11 @@ class Frame(NamedTuple):
     lifted: np.ndarray
     swing: np.ndarray | None
 
+    @property
+    def broken(self):
+        """Broken lines, which are slack as well, bool, shape (lines,)."""
+        return np.asarray(self.fields.get("broken", np.zeros(len(self.paths)))) > 0.5
+
     def held_as(self, last):
         """The frame with the supports of the last one, where it knows none of its own."""
         return self if len(self.supports) else self._replace(supports=last.supports, lifted=last.lifted)

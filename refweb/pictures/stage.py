@@ -17,6 +17,8 @@ DARK, PALE, BEFORE, SUPPORT, SLACK = "#333333", "#888888", "#999999", (0.25, 0.2
 BODIES = ((0.45, 0.55, 0.68), (0.70, 0.55, 0.45), (0.55, 0.62, 0.50))
 TWO = {"taut": (0.11, 0.37, 0.55), "slack": (0.90, 0.62, 0.10)}
 """Colours of the field ``slack``."""
+BROKEN, THIN = (0.86, 0.36, 0.30), 0.4
+"""Colour of broken lines, which are drawn straight between their ends, and their radius over that of others."""
 GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
@@ -62,6 +64,8 @@ class Seen(NamedTuple):
         Whether the lines close no loop.
     slack : bool
         Whether some line is drawn as slack.
+    broken : bool
+        Whether some line is broken.
     least, most : float
         Values of lines that are not [SI].
     """
@@ -73,6 +77,7 @@ class Seen(NamedTuple):
     moved: float
     tree: bool
     slack: bool
+    broken: bool
     least: float
     most: float
 
@@ -85,13 +90,24 @@ class Seen(NamedTuple):
         least, most = (float(values.min()), float(values.max())) if len(values) else (np.inf, -np.inf)
         bodies = {name: body.points for name, body in frame.bodies.items()}
         moved = float(np.abs(frame.paths - frame.origin).max())
-        slack = bool(frame.slack.any() if field == "slack" else grey.any())
+        slack = bool(frame.slack.any() if field == "slack" else (grey & ~frame.broken).any())
         points = frame.paths.reshape(-1, 3)
         if len(points) > MANY and frame.paths.shape[1] == 2:  # each node once, not with every line that ends there
             place = np.zeros(frame.ends.max() + 1, dtype=int)
             place[frame.ends.ravel()] = np.arange(len(points))
             points = points[place]
-        return cls(points, frame.supports, bodies, frame.origin, moved, frame.tree, slack, least, most)
+        return cls(
+            points,
+            frame.supports,
+            bodies,
+            frame.origin,
+            moved,
+            frame.tree,
+            slack,
+            bool(frame.broken.any()),
+            least,
+            most,
+        )
 
     def spanned(self):
         """The same with only those points that span the others, to two hundredths of their extent."""
@@ -110,6 +126,7 @@ class Seen(NamedTuple):
             bodies=bodies,
             moved=max(self.moved, other.moved),
             slack=self.slack or other.slack,
+            broken=self.broken or other.broken,
             least=min(self.least, other.least),
             most=max(self.most, other.most),
         )
@@ -163,8 +180,8 @@ class Stage:
         else:
             grey, (low, high) = _grey(frame, self.look.field), self.look.limits
             colours = colour_map()(np.clip((frame.fields[self.look.field] - low) / (high - low), 0, 1))[:, :3]
-        colours[grey] = SLACK
-        radius = np.where(grey, 0.8, 1.0) * self.radius
+        colours[grey], colours[frame.broken] = SLACK, BROKEN
+        radius = np.where(frame.broken, THIN, np.where(grey, 0.8, 1.0)) * self.radius
         model: list[Tubes | Surface | Balls] = [Tubes(frame.paths, colours, radius)]
         if len(frame.supports):
             model.append(Balls(frame.supports, SUPPORT, 2.2 * self.radius))
@@ -204,6 +221,8 @@ class Stage:
             marks = [Line2D([], [], color=colour, lw=4, label=name) for name, colour in TWO.items()]
         else:
             self._bar(figure)
+        if self.seen.broken:
+            marks.append(Line2D([], [], color=BROKEN, lw=2, label="broken"))
         if self._seen_in(self.views, self.seen.supports):
             marks.append(Line2D([], [], color=SUPPORT, marker="o", ls="", ms=7, label="support"))
         if self._seen_in(parallel, self.origin.reshape(-1, 3)):

@@ -11,7 +11,7 @@ from ..errors import InputError
 from .paraview import camera_of
 from .pictures import stage_of
 from .record import of_folder
-from .stage import BODIES, DARK, GREY_WHERE_SLACK, SLACK, SUPPORT, TWO, colour_map, scaled_unit
+from .stage import BODIES, BROKEN, DARK, GREY_WHERE_SLACK, SLACK, SUPPORT, THIN, TWO, colour_map, scaled_unit
 
 SIZE = (1400, 900)
 """Of the window [pixel]."""
@@ -91,17 +91,20 @@ def _draw(plotter, frame, stage):
     field, (low, high) = stage.look.field, stage.look.limits
     factor, unit = scaled_unit(field, max(abs(low), abs(high)))
     values = factor * frame.fields[field]
-    grey = frame.slack & (field in GREY_WHERE_SLACK)
+    broken = frame.broken
+    grey = frame.slack & (field in GREY_WHERE_SLACK) & ~broken
     name = field.replace("_", " ") + (f" [{unit}]" if unit else "")
     colours = {"cmap": colour_map(), "clim": (factor * low, factor * high), "show_scalar_bar": False}
     if field == "slack":
         colours["cmap"] = list(TWO.values())
-    for part, chosen, radius in (("lines", ~grey, stage.radius), ("slack", grey, 0.8 * stage.radius)):
+    parts = ("lines", ~(grey | broken), 1.0), ("slack", grey, 0.8), ("broken", broken, THIN)
+    for part, chosen, share in parts:
         if not chosen.any():
             plotter.remove_actor(part)
             continue
-        tubes = _tubes(frame.paths[chosen], values[chosen], radius)
-        look = {"color": SLACK} if part == "slack" else {"scalars": "value", **colours}
+        tubes = _tubes(frame.paths[chosen], values[chosen], share * stage.radius)
+        plain = {"slack": SLACK, "broken": BROKEN}
+        look = {"color": plain[part]} if part in plain else {"scalars": "value", **colours}
         actor = plotter.add_mesh(tubes, name=part, reset_camera=False, **look, **MATTER)
         if part == "lines" and name not in plotter.scalar_bars:
             plotter.add_scalar_bar(name, mapper=actor.mapper, color=DARK, vertical=True, fmt="%.3g", n_labels=5)

@@ -294,6 +294,11 @@ class Folder:
             arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
             arrays |= {"supported": state.system.supported, "bodies": np.array(row_names(net.bodies), dtype=str)}
             arrays |= {"lines": net.web.lines, "scene": self._scene}
+            if state.system.weakness is not None:
+                arrays |= {
+                    "broken": net.broken,
+                    "broken_energies": net.line_data[net.broken, net.column("rupture_energy")],
+                }
             arrays |= run or {}
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self.listed([(number, state.time if shape is None else number)], net.bodies)

@@ -115,6 +115,9 @@ class SolutionData:
         for.
     events : list of dict
         Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
+    breaks : list of dict, optional
+        Of each element that has broken, in the order in which they did, its ``line``, ``element``, ``time`` [s] and the
+        ``error`` of that, the ``place`` of its middle [m] and the ``energy`` [J] that it held; None where nothing may.
     frames : list of (int, refweb.results.state.State)
         Row numbers and states of a run that writes no folder. One that does keeps none: its frames are files, which
         are read when they are looked at.
@@ -134,6 +137,7 @@ class SolutionData:
     message: str = ""
     warnings: list = field(default_factory=list)
     events: list = field(default_factory=list)
+    breaks: list | None = None
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
     horizon: dict = field(default_factory=dict)
@@ -172,6 +176,7 @@ class SolutionData:
             "results": plain(self.results),
             "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
             "events": self.events,
+            **({} if self.breaks is None else {"breaks": self.breaks}),
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,

@@ -71,7 +71,10 @@ class State:
         """Strain of each element, its largest over quadrature points [1], shape (cells,)."""
         from ..effects.elasticity import strains
 
-        return strains(self.system.at(self.time).net, self.x).max(axis=1)
+        strain = strains(self.system.at(self.time).net, self.x).max(axis=1)
+        if self.system.weakness is not None:
+            strain[self.system.net.broken] = 0.0
+        return strain
 
     @cached_property
     def element_slack(self):

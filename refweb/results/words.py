@@ -9,6 +9,9 @@ from typing import NamedTuple
 
 from .units import other_errors, place, readable, scale_of, with_error
 
+FEW_BREAKS = 5
+"""Number of breaks that are told one by one."""
+
 
 class Rows(NamedTuple):
     """Rows of text below names of columns; the `last` row, where there is one, is a remark on the columns."""
@@ -83,7 +86,7 @@ def on_results(results):
 
 
 def on_run(summary):
-    """(Name, sentence) of what else is known: horizon, contact, strength."""
+    """(Name, sentence) of what else is known: horizon, contact, breaks, strength."""
     if horizon := summary.get("horizon"):
         yield "horizon", _horizon(horizon)
         for name, r in horizon.get("ensemble", {}).items():
@@ -95,6 +98,8 @@ def on_run(summary):
         text = f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]
         error = body.get("surface_error")
         yield "contact", text + (f", its surface within {error:.1e} m" if error is not None else "")
+    if (breaks := summary.get("breaks")) is not None:
+        yield from _breaks(breaks)
     if worst := summary.get("utilisation"):
         digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
         yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"
@@ -137,6 +142,17 @@ def between(interval, unit):
 
 def _place(result):
     return place(result["where"], result.get("at") or "number")
+
+
+def _breaks(breaks):
+    """(Name, sentence) of the first breaks, and how many there are."""
+    if not breaks:
+        yield "breaks", "none"
+    for n, one in enumerate(breaks[:FEW_BREAKS]):
+        when = readable(one["time"], one["error"], "s")
+        yield "breaks" * (n == 0), f"line {one['line']} at t = {when}, which held {readable(one['energy'], None, 'J')}"
+    if len(breaks) > FEW_BREAKS:
+        yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
 
 
 def _horizon(horizon):

@@ -86,6 +86,8 @@ class Simulation:
     def _take(self, found, smoothing):
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        if self.system.weakness is not None:
+            self._refuse_break(found)
         if self._passage is not None:
             self._passage.note(state)
             solution.bodies = self._passage.overlaps.plain()
@@ -110,6 +112,13 @@ class Simulation:
             solution.utilisation = float(used.max()), int(used.argmax())
         self._remarks.note(found.step, remarks_on(state, stats, solution.utilisation, found))
         return row
+
+    def _refuse_break(self, found):
+        """Refuse an equilibrium in which a line is broken."""
+        from .rupture import refuse_break
+
+        before = self.solution.steps[-1]["step"] if self.solution.steps else 0.0
+        refuse_break(self.system, load(STATICS[self.scene.solve.method]), found, before)
 
     def _results(self, found, state, smoothing):
         """The observables of an equilibrium by name, with their errors."""

@@ -43,7 +43,7 @@ def horizon(simulation, results, ensemble=None, tell=None):
     tell = tell or (lambda text, share: None)
     times = simulation.schedule.times[1:]
     pair = [_integrator(simulation) for _ in range(2)]
-    courses = [pair[0].start(*simulation.begin), pair[1].start(*_beside(simulation, 1))]
+    courses = [pair[0].start(*simulation.begin.motion), pair[1].start(*_beside(simulation, 1).motion)]
     apart, size = [np.abs(courses[0].x - courses[1].x).max()], [np.abs(courses[0].x).max()]
     for n, end in enumerate(times, 1):
         for integrator, course in zip(pair, courses, strict=True):
@@ -89,7 +89,7 @@ def _ensemble(simulation, count, tell):
     watch, values = simulation.watch, []
     for seed in range(1, count + 1):
         integrator = _integrator(simulation)
-        course = integrator.start(*_beside(simulation, seed))
+        course = integrator.start(*_beside(simulation, seed).motion)
         for block in blocks(integrator, course, simulation.schedule):
             table = watch.table(block.history)
         values.append([result.value for result in watch.results(course, table[-1]).values()])

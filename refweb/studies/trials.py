@@ -186,8 +186,9 @@ class Dynamics:
     """
 
     def __init__(self, scene, system, observable):
-        self.system, self.observable, self.times = system, observable, row_times(scene)
-        self.probes, self.begin = [observable.probe(system)._replace(sign=0.0)], start_of(scene, system)
+        self.begin = start_of(scene, system)
+        self.system, self.observable, self.times = self.begin.torn(system), observable, row_times(scene)
+        self.probes = [observable.probe(system)._replace(sign=0.0)]
         self._linear = system.rows - system.net.spins  # the others are angles
         self._per_evaluation = self._fewest = None  # of forces by explicit steps: CPU time [s], and least number
         self._ahead = {}  # evaluations of each trial
@@ -199,10 +200,15 @@ class Dynamics:
             return
         integrator = self._integrator(trial)
         with contextlib.suppress(SolverError):  # energies of a first moment may be too small for their book
-            integrator.advance(integrator.start(*self.begin), [1e-9 * self.times[-1]])
+            integrator.advance(integrator.start(*self.begin.motion), [1e-9 * self.times[-1]])
 
     def _integrator(self, trial):
-        return trial.make(self.system, self.probes, **{trial.key: trial.value})
+        make = functools.partial(trial.make, **{trial.key: trial.value})
+        if self.system.weakness is None:
+            return make(self.system, self.probes)
+        from ..dynamics.integrators.rupture import with_breaks
+
+        return with_breaks(make, self.system, self.probes)
 
     def expected(self, trial):
         """Estimate of the CPU time of a trial before any of its method has run [s].
@@ -234,7 +240,7 @@ class Dynamics:
         if ahead is None:  # steps are its own and may be looked into; explicit ones follow from the rows
             split = -(-PIECES // (len(times) - 1))
             times = np.interp(np.arange(split * (len(times) - 1) + 1) / split, np.arange(len(times)), times)
-        course, values = integrator.start(*self.begin), []
+        course, values = integrator.start(*self.begin.motion), []
         began = clock()
         for block in blocks(integrator, course, Schedule(times, np.array([len(times) - 1]))):
             values.append(block.history.probes[:, 0])

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import Constraint, Drive, Family, LineDrive
+from ..effects.base import Constraint, Drive, Family, LineDrive, Weakness
 from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
@@ -47,6 +47,8 @@ class System:
         One per effect that prescribes natural lengths.
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
+    weakness : refweb.effects.base.Weakness or None
+        Which elements break; None where none does.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     """
@@ -67,6 +69,7 @@ class System:
         self.line_drives = [a for a in acting if isinstance(a, LineDrive)]
         self.drives = [a for a in acting if isinstance(a, Drive)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
+        self.weakness = next((a for a in acting if isinstance(a, Weakness)), None)
         if sum(family.lines and family.power is not None for family in self.families) > 1:
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
@@ -254,11 +257,14 @@ class System:
 
     def forces(self, t, x, v=None):
         """The `Forces` at displacement x and velocity v, by default at rest."""
+        return Forces(self.force_to(self._observed, t, x, self._zero if v is None else v), self._observed)
+
+    def force_to(self, per_cell, t, x, v):
+        """Force on every row [N]; what families show is written to the arrays of ``per_cell``."""
         f = np.zeros((self.rows, 3))
-        v = self._zero if v is None else v
-        for family, out in zip(self.families, self._observed, strict=True):
+        for family, out in zip(self.families, per_cell, strict=True):
             family.force(t, x, v, f, family.cells, self._data(family, t), out)
-        return Forces(f, self._observed)
+        return f
 
     def force_of(self, family, t, x, v=None):
         """Force on every row of one family [N]."""

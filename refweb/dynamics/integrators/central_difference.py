@@ -114,7 +114,7 @@ class CentralDifference(Integrator):
             raise InputError(
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
-        outs = tuple(system.per_cell())
+        self._outs = outs = tuple(system.per_cell())
         self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
         self._events, self._least = event_rows(events), least_energy(net)
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
@@ -191,8 +191,10 @@ class CentralDifference(Integrator):
         return course.arrays()
 
     def load(self, arrays):
-        """The `ExplicitCourse` of a checkpoint."""
-        return ExplicitCourse.of_arrays(arrays)
+        """The `ExplicitCourse` of a checkpoint; families show what they do there."""
+        course = ExplicitCourse.of_arrays(arrays)
+        self.system.force_to(self._outs, course.time, course.x, course.v)
+        return course
 
     @property
     def _keys(self) -> dict:

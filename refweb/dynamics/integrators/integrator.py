@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from .averages import Averages
 from .events import ended_by
 from .extremes import Extremes
 from .momentum_book import Ledger
+
+if TYPE_CHECKING:
+    from ...system.torn import Breaks
 
 SAME = 1e-12
 """Share of a time within which another is the same: corners of tables, rows and ends of steps are sums."""
@@ -84,6 +87,8 @@ class Course:
         Largest |ΔE − work| of the rows [J].
     share : float
         |ΔE − work| at the last row over ``largest`` there [1], infinite before the first.
+    breaks : refweb.system.torn.Breaks, optional
+        What has broken, where anything may.
     """
 
     time: float
@@ -101,6 +106,7 @@ class Course:
     largest: float = 0.0
     worst: float = 0.0
     share: float = np.inf
+    breaks: Breaks | None = field(default=None, metadata={"saved": False})
 
     @property
     def stopped(self):

@@ -20,6 +20,9 @@ from ..base import Family
 from .nearest_point import near
 from .pair import AWAY, pair_data
 
+OUT_OF_REACH = 1e6, 7e5, 4e5
+"""How far from every body broken elements are taken to be [m]."""
+
 
 @accepts({"enum": [1, 1.5]})
 def _exponent(name, value):
@@ -162,6 +165,15 @@ class Contact(Table):
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         return np.ascontiguousarray(np.vstack(cells), dtype=np.int32), np.ascontiguousarray(np.vstack(data))
 
+    @staticmethod
+    def _sever(nodes):
+        """What moves the elements of cells of so many nodes out of reach of every body."""
+
+        def sever(numbers):
+            numbers[:, AWAY : AWAY + 3 * nodes] += np.tile(OUT_OF_REACH, nodes)
+
+        return sever
+
     def _penalty(self, net, element, depth, spins, bodies):
         """The family of bodies of one depth, or without one of spheres alone; with ``spins`` of 2 they turn."""
         cells, data = self._numbers(net, bodies, spins)
@@ -179,6 +191,8 @@ class Contact(Table):
             contact=True,
             cells=cells,
             data=data,
+            elements=np.tile(np.arange(len(net.cells)), len(bodies)),
+            sever=self._sever(element[1]),
             force=force,
             energy=energy,
             stiffness=stiffness,
@@ -205,6 +219,8 @@ class Contact(Table):
             contact=True,
             cells=cells,
             data=data,
+            elements=np.tile(np.arange(len(net.cells)), len(bodies)),
+            sever=self._sever(element[1]),
             force=force,
             energy=None,
             stiffness=stiffness,

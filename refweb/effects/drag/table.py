@@ -123,7 +123,7 @@ class Drag(Table):
         return families
 
     def _ends(self, net):
-        """Cells and numbers of all nodes of elements, those of a node together."""
+        """Cells and numbers of all nodes of elements, those of a node together, and the element of each."""
         count, elements = len(net.places), len(net.cells)
         power = np.arange(count)
         functions = np.linalg.inv(np.vander(net.places, increasing=True))  # by power, then node
@@ -144,7 +144,7 @@ class Drag(Table):
         cells, numbers = cells[order], numbers[order]
         _, first, group = np.unique(cells[:, 0], return_index=True, return_counts=True)
         numbers[first, 8] = group
-        return np.ascontiguousarray(cells, dtype=np.int32), np.ascontiguousarray(numbers)
+        return np.ascontiguousarray(cells, dtype=np.int32), np.ascontiguousarray(numbers), order % elements
 
     def _of(self, body):
         """½ ρ C A of a body [kg/m]."""
@@ -155,7 +155,7 @@ class Drag(Table):
         coefficient = SPHERE if own.coefficient is None else own.coefficient
         return 0.5 * self.density * coefficient * (own.area or math.pi * body.shape.grown().radius ** 2)
 
-    def _family(self, cells, data):
+    def _family(self, cells, data, elements=None):
         blows = any(self.wind)
         force, stiffness, damping, bound = kernels(cells.shape[1])
         return Family(
@@ -172,4 +172,11 @@ class Drag(Table):
             rubbing=rubbing(cells.shape[1]),
             symmetric=False,
             at_rest=blows,
+            elements=elements,
+            sever=_sever,
         )
+
+
+def _sever(numbers):
+    """Leave nothing of the drag of broken elements."""
+    numbers[:, :2] = 0.0

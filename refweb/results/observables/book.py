@@ -90,6 +90,13 @@ class OrbitEnergy(Booked):
     needs = "[orbit]"
 
 
+class RuptureEnergy(Booked):
+    """What lines held when they broke."""
+
+    dynamic = True
+    needs = "[rupture]"
+
+
 class DissipatedEnergy(Booked):
     """What damping and friction have taken."""
 

@@ -1,0 +1,57 @@
+"""± of the times at which lines break, and how far their order is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def add_errors_of_breaks(solution, own, other, share):
+    """Add ± to the times of breaks, as far as a run and its twin break the same lines in the same order.
+
+    Behind the first break at which they differ nothing is known of either run by the other: what is found there has no
+    ±, and a warning says so.
+
+    Parameters
+    ----------
+    solution : refweb.Solution
+        At the end of the run, with its breaks and results.
+    own, other : refweb.system.torn.Breaks
+        Of the run and of its twin.
+    share : float
+        ± over the difference of the two.
+    """
+    for n, found in enumerate(solution.breaks):
+        alike = n < len(other.elements) and own.elements[n] == other.elements[n]
+        if not alike:
+            break
+        off = abs(found["time"] - float(other.times[n]))
+        widths = float(own.widths[n] + other.widths[n])
+        found["error"] = share * off + widths + 4.0 * np.finfo(float).eps * found["time"]
+    else:
+        n = len(solution.breaks)
+        if len(other.elements) == n:
+            return
+    _end_of_knowledge(solution, own, other, n)
+
+
+def _end_of_knowledge(solution, own, other, n):
+    """Take back the ± of what comes from break ``n`` on, and say so."""
+    times = [breaks.times[n] for breaks in (own, other) if n < len(breaks.times)]
+    since = float(min(times))
+    net = solution.state.system.net
+    words = [
+        f"is of line {net.line[breaks.elements[n]]} at t = {breaks.times[n]:.6g} s"
+        if n < len(breaks.times)
+        else "is none"
+        for breaks in (own, other)
+    ]
+    solution.warnings.append(
+        f"the order of breaks is beyond the horizon from t = {since:.6g} s on: break {n + 1} {words[0]}, in the "
+        f"twin it {words[1]}; what is found from then on has no ±"
+    )
+    for name, result in solution.reduced.items():
+        if result.time >= since:
+            solution.reduced[name] = result._replace(error=None)
+    for event in solution.events:
+        if event["time"] is not None and event["time"] >= since:
+            event["error"] = None

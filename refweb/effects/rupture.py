@@ -1,0 +1,155 @@
+"""Rupture: lines that break, and the energy that each held.
+
+A broken element has no stiffness: its tension, strain and energy are 0, and what acts through it ends. What it held,
+and what ended with it, is the energy of a family that does nothing else, so that the book of energies closes through
+every break. `refweb.dynamics.integrators.rupture` finds the moments.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels import ENERGY, FORCE, kernel
+from ..net.groups import givers
+from ..net.net import AXIAL_STIFFNESS
+from ..tables import Several, Table, by_group, real, rows, table
+from .base import STRAIN, TENSION, Family, Weakness
+
+HELD = "rupture_energy"
+"""Column of the numbers of the lines with what a broken element held [J]."""
+
+
+@functools.cache
+def kernels(held):
+    """Force and energy kernels; what elements held is in the column ``held`` of the numbers of the lines."""
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            if data[c, AXIAL_STIFFNESS] == 0.0:
+                out[c, TENSION] = 0.0
+                out[c, STRAIN] = 0.0
+
+    @kernel(ENERGY)
+    def energy(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            out[c] = data[c, held]
+
+    return force, energy
+
+
+@table
+class GroupRupture(Table):
+    """What may differ on the lines of one group; None keeps the value of `Rupture`.
+
+    Examples
+    --------
+        [rupture.groups.rim]
+        strength = 3e9
+    """
+
+    strength: float | None = real(default=None, above=0, unit="Pa")
+
+
+@table
+class Rupture(Table):
+    """Lines that break, where their stress reaches their strength or at given times.
+
+    A line breaks at that of its elements whose stress is first to reach the strength, and there alone: the rest of it
+    hangs on at both ends, with its mass. A line of one element goes as a whole, and half of its mass stays with either
+    end; the inner nodes of a curved element fly on by themselves. A broken element has neither tension nor strain any
+    more, and contact, bending, drag, pressure and thrust through it end. What it held is ``rupture_energy``. Elements
+    whose stress over strength is within 1e-9 of the largest at that moment break together, as symmetry asks for.
+
+    In dynamics ``run.json`` has each break with its line, element, time and place. The order of breaks is compared with
+    that of the twin run: behind the first that differs results are beyond the horizon of what is known, and have no ±.
+    Statics, whose equilibria behind a break depend on how it happens, ends where the first line would break.
+
+    Parameters
+    ----------
+    strength : float, optional
+        Nominal stress T/A at which a line breaks [Pa], damping included; by default the strength of ``[cable]`` and its
+        groups. Lines without either do not break by stress.
+    at : sequence of (line, t), optional
+        Lines that break at a time [s] whatever their stress, in the middle, or in the element behind it; in statics t
+        is the load step.
+    groups : dict of str to GroupRupture
+        Strengths that differ by group of lines; groups that share lines give it once.
+
+    Raises
+    ------
+    InputError
+        For a strength that is not > 0, times < 0, and a line that breaks at two times; from ``on``, for a line or a
+        group that the web does not have, where nothing can break, for nodes without mass that move, and for a
+        consistent mass, which would tie the ends of a broken line together.
+
+    Examples
+    --------
+        [rupture]
+        strength = 2.5e9
+        at = [[12, 0.5]]
+    """
+
+    strength: float | None = real(default=None, above=0, unit="Pa")
+    at: Several = rows(2, default=None)
+    groups: dict = by_group(GroupRupture, "rupture", default_factory=dict)
+
+    def check(self):
+        """Refuse breaks that are no line and time, and a line that breaks twice."""
+        lines = [line for line, _ in self.at or ()]
+        for i, (line, time) in enumerate(self.at or ()):
+            if line != int(line) or line < 0:
+                raise InputError(f"at[{i}][0] = {line:g} must be the number of a line")
+            if not time >= 0.0:
+                raise InputError(f"at[{i}][1] = {time:g} must be ≥ 0 [s]")
+            if line in lines[:i]:
+                raise InputError(f"at[{i}][0] = {line:g}: this line breaks at two times, name it once")
+
+    def extend(self, net):
+        """The net with the strengths of its lines, and what broken elements held in one more column."""
+        web = net.web
+        own = np.full(len(web.lines), np.nan if self.strength is None else self.strength)
+        given = givers(web.groups, self.groups, len(web.lines)).get("strength", np.full(len(own), -1))
+        for number, group in enumerate(self.groups.values()):
+            if group.strength is not None:
+                own[given == number] = group.strength
+        strength = np.where(np.isnan(own[net.line]), net.strength, own[net.line])
+        return replace(net, strength=strength).with_column(HELD, 0.0)
+
+    def on(self, net):
+        """The elements that break and, but in statics, the family that holds what they held."""
+        limits, count = net.strength * net.area, len(net.web.lines)
+        for i, (line, _) in enumerate(self.at or ()):
+            if line >= count:
+                raise InputError(f"at[{i}][0] = {line:g} is not a line, must be 0 … {count - 1}")
+        if not self.at and not np.isfinite(limits).any():
+            raise InputError(
+                "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"
+            )
+        middles = [(time, int(line) * net.subdivide + net.subdivide // 2) for line, time in self.at or ()]
+        weakness = Weakness(limits, tuple(sorted(middles)))
+        if net.quasi_static:
+            return weakness
+        if net.consistent_minus_lumped is not None:
+            raise InputError(
+                'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
+                '"lumped"'
+            )
+        force, energy = kernels(net.column(HELD))
+        family = Family(
+            name="rupture",
+            cells=net.cells,
+            data=net.line_data,
+            force=force,
+            energy=energy,
+            book="rupture_energy",
+            observed=2,
+            lines=True,
+            internal=True,
+            at_rest=False,
+        )
+        return [family, weakness]

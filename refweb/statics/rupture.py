@@ -1,0 +1,78 @@
+"""Statics ends where the first line breaks, and says at which load step that is.
+
+What comes behind a break depends on how the web moves then; that is dynamics. The load step is found by Brent's method
+on equilibria between the last load step at which nothing breaks and the first at which something does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SolverError
+
+FINE = 1e-6
+"""Error of the load step over that at which the break was seen."""
+TRIALS = 30
+"""Largest number of equilibria that are looked for to find it."""
+
+
+def shares(system, found):
+    """Tension of each element over its limit in a `refweb.statics.equilibrium.Equilibrium`."""
+    return system.forces(found.step, found.x).per_cell.tension / system.weakness.limits
+
+
+def refuse_break(system, solve, found, before):
+    """Refuse an equilibrium in which a line is broken.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a `refweb.effects.base.Weakness`.
+    solve : callable
+        The method of statics, see `refweb.registry.STATICS`.
+    found : refweb.statics.equilibrium.Equilibrium
+        The equilibrium.
+    before : float
+        A load step at which no line breaks, 0 where none is known.
+
+    Raises
+    ------
+    SolverError
+        With the load step and the line of the first break.
+    """
+    net, due = system.net, [(t, element) for t, element in system.weakness.times if t <= found.step]
+    own = shares(system, found)
+    step, element = found.step, int(own.argmax())
+    if own[element] >= 1.0:
+        step, element = _first(system, solve, found, before)
+    elif not due:
+        return
+    if due and due[0][0] <= step:
+        step, element = due[0]
+        why = "as [rupture] at says"
+    else:
+        strength = net.strength[element]
+        why = f"where its stress reaches its strength of {strength:.6g} Pa"
+    raise SolverError(
+        f"line {net.line[element]} would break at load step {step:.6g}, {why}: what comes then depends on the motion; "
+        'use kind = "dynamic", or load steps below that'
+    )
+
+
+def _first(system, solve, found, before):
+    """(Load step, element) of the first break, as far as equilibria before it are found."""
+    known = [found]
+
+    def over(step):
+        known[0] = next(iter(solve(system, [step], None))) if step != found.step else found
+        return float(shares(system, known[0]).max()) - 1.0
+
+    try:
+        if found.step > before and over(before) < 0.0:
+            from scipy.optimize import brentq
+
+            step = brentq(over, before, found.step, xtol=FINE * abs(found.step), maxiter=TRIALS)
+            return step, int(np.argmax(shares(system, known[0])))
+    except (SolverError, RuntimeError):  # nothing to be found between: what is known is the load step itself
+        known[0] = found
+    return known[0].step, int(np.argmax(shares(system, known[0])))
