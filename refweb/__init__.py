@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .effects.point_mass import PointMass as PointMass
     from .effects.pressure import Pressure as Pressure
     from .effects.reel import Reel as Reel
+    from .effects.rupture import Rupture as Rupture
     from .effects.temperature import Temperature as Temperature
     from .effects.thrust import Thrust as Thrust
     from .effects.velocity import Velocity as Velocity

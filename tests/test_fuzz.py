@@ -138,6 +138,7 @@ EFFECTS = {
     "frame": table(angular_velocity=VECTOR),
     "drag": table(density=ANY, optional={"wind": VECTOR, "normal": ANY}),
     "orbit": table(mean_motion=ANY),
+    "rupture": table(strength=ANY),
     "pressure": st.lists(table(lines=LINES, normal=VECTOR, value=SIGNED), min_size=1, max_size=1),
     "thrust": st.lists(
         table(node=NUMBER, line=NUMBER, force=SIGNED, optional={"factor": TABLE}),

@@ -240,6 +240,7 @@ TABLES = {
     "bending": {"stiffness": 1e-3},
     "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
     "temperature": {"expansion": 1e-5, "change": 10.0},
+    "rupture": {"strength": 1e9},
 }
 SOLVED = ("what touches", "forces before", "sweep", "power")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
@@ -251,6 +252,7 @@ KERNELS["contact"] = {**FAMILY, "near": 1}
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
 KERNELS["orbit"] = KERNELS["frame"]
+KERNELS["rupture"] = FAMILY
 KERNELS["drag"] = {**FAMILY, **dict.fromkeys(SOLVED, 1)}
 KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
 KERNELS |= {name: {} for name in ("point_mass", "velocity", "body")}

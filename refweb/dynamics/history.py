@@ -112,8 +112,9 @@ class Watch:
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
         self.events = self._add_events(scene.event)
-        if system.weakness is not None and system.weakness.watched:
-            self.events.append(Event(self._of_warning("utilisation"), 1.0, True, stop=True))
+        used = self._of_warning("utilisation")
+        if system.weakness is not None and used is not None:
+            self.events.append(Event(used, 1.0, True, stop=True))
         own = dict.fromkeys(f.book for f in system.families if f.book != "work")
         work = ["work"] if "work" in [f.book for f in system.families] or system.drives or system.line_drives else []
         energies = ["kinetic_energy", *own, *work, "total_energy"]

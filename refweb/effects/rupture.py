@@ -91,17 +91,22 @@ class Rupture(Table):
     --------
         [rupture]
         strength = 2.5e9
-        at = [[12, 0.5]]
+        at = [[3, 0.5]]
     """
 
     strength: float | None = real(default=None, above=0, unit="Pa")
     at: Several = rows(2, default=None)
     groups: dict = by_group(GroupRupture, "rupture", default_factory=dict)
 
+    @property
+    def _due(self) -> tuple:
+        """(Line, t) of ``at``."""
+        return self.at or ()
+
     def check(self):
         """Refuse breaks that are no line and time, and a line that breaks twice."""
-        lines = [line for line, _ in self.at or ()]
-        for i, (line, time) in enumerate(self.at or ()):
+        lines = [line for line, _ in self._due]
+        for i, (line, time) in enumerate(self._due):
             if line != int(line) or line < 0:
                 raise InputError(f"at[{i}][0] = {line:g} must be the number of a line")
             if not time >= 0.0:
@@ -123,14 +128,14 @@ class Rupture(Table):
     def on(self, net):
         """The elements that break and, but in statics, the family that holds what they held."""
         limits, count = net.strength * net.area, len(net.web.lines)
-        for i, (line, _) in enumerate(self.at or ()):
+        for i, (line, _) in enumerate(self._due):
             if line >= count:
                 raise InputError(f"at[{i}][0] = {line:g} is not a line, must be 0 … {count - 1}")
-        if not self.at and not np.isfinite(limits).any():
+        if not self._due and not np.isfinite(limits).any():
             raise InputError(
                 "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"
             )
-        middles = [(time, int(line) * net.subdivide + net.subdivide // 2) for line, time in self.at or ()]
+        middles = [(time, int(line) * net.subdivide + net.subdivide // 2) for line, time in self._due]
         weakness = Weakness(limits, tuple(sorted(middles)))
         if net.quasi_static:
             return weakness
