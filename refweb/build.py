@@ -65,6 +65,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
     _check_bare(system)
+    _check_carried(system, supported, solve)
     _check_motions(system)
     if system.constraints:
         _check_links(solve)
@@ -170,6 +171,24 @@ def _check_motions(system):
         raise InputError(f"[[motion]] node = {rows[times > 1][0]} is moved by two tables: merge them")
 
 
+def _check_carried(system, supported, solve):
+    """Refuse nodes on bodies that are held, moved or linked as well, and what cannot follow free bodies with nodes."""
+    attached = [node for body in system.net.bodies for node in body.carried]
+    linked = np.concatenate([[], *(constraint.cells.ravel() for constraint in system.constraints)])
+    for node in attached:
+        if supported[node].any():
+            raise InputError(f"[[attach]] node {node} is supported as well: leave it out of the supports")
+        if sum((drive.cells[:, 0] == node).sum() for drive in system.drives) > (not system.carried[node]):
+            raise InputError(f"[[attach]] node {node} is moved by [[motion]] as well: leave out one of them")
+        if node in linked:
+            raise InputError(f"[[attach]] node {node} has a [[link]] as well: tie the link to a node beside it")
+    if system.carried.any() and solve.mass == "consistent":
+        raise InputError(
+            '[solve] mass = "consistent" must be "lumped" with [[attach]] to a free body, which has the mass of its '
+            "nodes as points"
+        )
+
+
 def _takes_links(method):
     """Whether a method holds lengths exactly; methods of statics do not."""
     return method in INTEGRATORS and getattr(load(INTEGRATORS[method].integrator), "takes_links", False)
@@ -229,6 +248,12 @@ def _check_event(event, earlier, observables, system):
         if not system.contact:
             raise InputError('kind = "contact" needs a [contact] in the scene')
         bodies = [body.name for body in system.net.bodies]
+        pulled = [b.name for b in system.net.bodies if b.carried and not b.fixed and event.body in (None, b.name)]
+        for name in pulled:
+            raise InputError(
+                f'kind = "contact" does not tell what touches body "{name}" from what the nodes of [[attach]] pull at '
+                'it with: use kind = "threshold" and an observable of quantity = "overlap"'
+            )
         if event.body is not None and event.body not in bodies:
             raise InputError(f"body = {shown(event.body)} is not a body, {nearest(event.body, bodies)}")
     if event.kind == "taut":

@@ -27,6 +27,7 @@ EFFECTS = {
     "velocity": "refweb.effects.velocity:Velocity",
     "body": "refweb.effects.body:Body",
     "contact": "refweb.effects.contact.table:Contact",
+    "attach": "refweb.effects.attach:Attach",
     "link": "refweb.effects.link:Link",
     "frame": "refweb.effects.frame:Frame",
     "orbit": "refweb.effects.orbit:Orbit",

@@ -71,6 +71,7 @@ EXAMPLES = {
     ],
     "Damping": [dict(time=0.02), dict(rate=3.0)],
     "Bending": [dict(stiffness=2.0)],
+    "Attach": [dict(body="wall", node=[1, 3]), dict(body="wall", node=2, point=(0.1, 0.2, -0.3))],
     "Link": [dict(nodes=[0, 4]), dict(nodes=[5, 4, 2, 3])],
     "Reel": [
         dict(lines=[2, "tie"], factor=[(0.0, 1.0), (1.0, 0.9)]),
@@ -111,11 +112,11 @@ def example(name, i):
 
 
 def make(name, i, law, tensionless=False):
-    """(net, system of one effect); a contact has bodies to touch, with ends of lines and with their middles."""
+    """(net, system of one effect); contact has bodies to touch, with ends of lines and with their middles."""
     web = replace(nets.skew_web(), natural_length=None) if tensionless else nets.skew_web()
     pieces = 3 if name == "Bending" else 1  # no line of it continues another
     net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
-    bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name == "Contact" else []
+    bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name in ("Contact", "Attach") else []
     system = System(net, [*bodies, example(name, i)], np.zeros((len(net.points), 3), dtype=bool))
     return system.net, system
 
@@ -280,7 +281,7 @@ def test_derivatives_in_hard_states(name, i, law, place):
 @pytest.mark.parametrize("name, i", cases("extend"))
 def test_extension(name, i):
     """Rows and mass are added, what was there stays, and the given net is left alone."""
-    net = skew_net()
+    net = example("Body", 1).extend(skew_net()) if name == "Attach" else skew_net()
     before = net.points.copy(), net.mass.copy()
     effect = example(name, i)
     longer = effect.extend(net)
@@ -292,7 +293,7 @@ def test_extension(name, i):
     assert longer.web is net.web and longer.cells is net.cells
     np.testing.assert_array_equal(longer.line_data[:, : net.line_data.shape[1]], net.line_data)
     added = getattr(effect, "mass", 0.0) or 0.0
-    times = len(effect.node) if hasattr(effect, "node") else 1
+    times = len(effect.node) if added and hasattr(effect, "node") else 1
     np.testing.assert_allclose(longer.mass.sum() - net.mass.sum(), times * added, rtol=1e-14)
 
 

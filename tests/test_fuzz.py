@@ -132,6 +132,9 @@ EFFECTS = {
     ),
     "body": st.lists(BODY, min_size=1, max_size=2),
     "contact": CONTACT,
+    "attach": st.lists(
+        table(body=st.sampled_from(["ball", "b"]), node=NODE, optional={"point": VECTOR}), min_size=1, max_size=1
+    ),
     "link": st.lists(table(nodes=NUMBERS), min_size=1, max_size=1),
     "damping": table(optional={"time": ANY, "rate": ANY}),
     "bending": table(stiffness=ANY),

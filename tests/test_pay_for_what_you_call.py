@@ -61,7 +61,7 @@ EVERY |= {
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
 TANGENT = {"system.sparsity", "system.factorization"}
-STATICS = {"statics", "statics.equilibrium", "system.unsupported_parts"}
+STATICS = {"statics", "statics.equilibrium", "system.at_rest", "system.unsupported_parts"}
 LOAD_STEPS = {"statics.simulation", "statics.remarks"}
 NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.floating", "statics.energy_search"}
 NEWTON |= {"system.conjugate_gradients"}
@@ -222,6 +222,7 @@ PLAIN = {
     "accuracy": {"error": "none"},
 }
 BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, -0.3], "velocity": [0.0, 0.0, 1.0]}
+WALL = {"name": "wall", "radius": 0.1, "position": [0.0, 5.0, 0.0], "fixed": True}
 TABLES = {
     "gravity": {"acceleration": [0.0, 0.0, -9.81]},
     "load": {"node": 5, "force": [0.0, 0.0, 1.0]},
@@ -230,6 +231,7 @@ TABLES = {
     "velocity": {"node": 5, "value": [0.0, 0.0, 1.0]},
     "body": BALL,
     "contact": {"stiffness": 1e4},
+    "attach": {"body": "wall", "node": 9},
     "link": {"nodes": [5, 6]},
     "frame": {"angular_velocity": [0.0, 0.0, 1.0]},
     "orbit": {"mean_motion": 1.0},
@@ -249,6 +251,7 @@ FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
 KERNELS["contact"] = {**FAMILY, "near": 1}
+KERNELS["attach"] = {"motion": 1}  # to a body that is fixed
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
 KERNELS["orbit"] = KERNELS["frame"]
@@ -265,6 +268,8 @@ def scene_of(*effects):
         given[name] = [TABLES[name]] if load(EFFECTS[name]).several else TABLES[name]
     if "contact" in effects:
         given["body"] = [BALL]
+    if "attach" in effects:
+        given["body"] = [*given.get("body", []), WALL]
     if "link" in effects:
         given["solve"] = {**given["solve"], "method": "ida"}
     return refweb.Scene.from_dict(given)
@@ -312,10 +317,12 @@ def expected(*effects):
         rows += 1
     if "contact" in effects:
         pairs = pairs + [(node, rows - 1) for node in range(rows - 1)]
+    if "attach" in effects:  # behind the ball, where there is one
+        held, rows = held | {TABLES["attach"]["node"], rows}, rows + 1
     if {"frame", "orbit"} & set(effects):  # the axes of a row with each other
         pairs = pairs + [(row, row) for row in range(rows)]
     if "drag" in effects and {"body", "contact"} & set(effects):
-        pairs = pairs + [(rows - 1, rows - 1)]
+        pairs = pairs + [(len(web.points), len(web.points))]
     return coupled(pairs, held, rows)
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, LENGTH
+from ..net.rotation import Turns, carry_rates
 from ..registry import INTEGRATORS
 from ..results.units import prefixed
 from .method_choice import step_price
@@ -58,12 +59,13 @@ def ruling(integrator, system, reach, speed):
 
 def _parts(system, bounds, reach, speed):
     """What each family adds to the bounds of the row sums, shape (families, rows)."""
-    rates, parts = np.zeros(system.rows), []
+    rates, parts, turns = np.zeros(system.rows), [], Turns.of(system.net)
     for family, bound in zip(system.families, bounds, strict=True):
         before, data = rates.copy(), system.net.line_data if family.lines else family.data
         if bound is not None:
             bound(reach, speed, np.zeros((system.rows, 3)), system.net.mass, rates, family.cells, data)
         parts.append(rates - before)
+        carry_rates(parts[-1], turns)
     return np.array(parts)
 
 

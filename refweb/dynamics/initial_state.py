@@ -61,8 +61,9 @@ def remarks_on(start, system):
     moved = np.flatnonzero((there != before).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
-        yield f"[[motion]] has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    off = np.linalg.norm(np.where(system.supported, there, 0.0)[: system.net.nodes], axis=1)
+        by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
+        yield f"{by} has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+    off = np.linalg.norm(np.where(system.held, there, 0.0)[: system.net.nodes], axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
         worst = int(off.argmax())
@@ -84,8 +85,9 @@ def equilibrium(system, progress=None):
         Where there is no equilibrium, or none is found.
     """
     from ..statics.load_steps import solve
+    from ..system.at_rest import at_rest
 
-    (found,) = solve(system.at_rest(), [0.0], progress)
+    (found,) = solve(at_rest(system), [0.0], progress)
     return found
 
 

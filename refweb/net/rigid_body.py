@@ -191,6 +191,12 @@ class RigidBody:
         Its row of rotation, where it has one.
     turn : int, optional
         The second one, where its orientation counts, see `refweb.net.rotation`.
+    carried : tuple of int
+        Nodes that it carries, whose mass its own has.
+    points : ndarray, shape (carried, 3)
+        Where it does, along its axes from its row [m].
+    offset : ndarray, shape (3,)
+        Centre of its shape, along its axes from its row [m]: that is the centre of mass of all.
     """
 
     name: str
@@ -204,6 +210,9 @@ class RigidBody:
     turns: bool = False
     spin: int | None = None
     turn: int | None = None
+    carried: tuple = ()
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)), compare=False)
+    offset: np.ndarray = field(default_factory=lambda: np.zeros(3), compare=False)
 
     @property
     def radius(self):
@@ -222,14 +231,17 @@ class RigidBody:
 
     @property
     def extent(self):
-        """Largest distance from its centre to its surface as a web sees it [m]; infinite for a ring."""
-        return self.shape.extent
+        """Largest distance from its row to its surface as a web sees it [m]; infinite for a ring."""
+        return self.shape.extent + float(np.linalg.norm(self.offset))
 
     @property
     def tumbles(self):
-        """Whether its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia."""
+        """Whether its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia.
+
+        Of a body that carries nodes it does.
+        """
         one = (self.inertia == self.inertia[0, 0] * np.eye(3)).all()
-        return not (self.fixed or self.shape.planar or self.shape.once and one)
+        return not (self.fixed or self.shape.planar or self.shape.once and one and not self.carried)
 
     @property
     def moment(self):
@@ -268,10 +280,10 @@ class RigidBody:
         return axes.T @ (self.mobility @ (axes @ v[self.spin]))
 
     def surface(self, centre, rotation=None):
-        """Its surface about a centre as points (n, 3) [m] and triangles (t, 3), outward; turned by a matrix."""
+        """Its surface with its row at a centre: points (n, 3) [m] and triangles (t, 3), outward; turned by a matrix."""
         local, triangles = self.shape.surface()
         axes = self.axes if rotation is None else self.axes @ rotation.T
-        return np.asarray(centre) + local @ axes, triangles
+        return np.asarray(centre) + (local + self.offset) @ axes, triangles
 
 
 def row_names(bodies):

@@ -13,6 +13,9 @@ other, since all is quadratic. The poles of the motion lie at imaginary times of
 that steps of `TURN` converge as 0.16ⁿ. That is the flow of the kinetic energy itself, symplectic and reversible as the
 closed form of van Zon and Schofield [1]_ is, in splittings of any order, and takes no Jacobi functions nor cases.
 
+A body may carry nodes of the web, see `refweb.effects.attach`: they are where it takes them, and what acts on them acts
+on it.
+
 References
 ----------
 .. [1] R. van Zon, J. Schofield, "Numerical implementation of the exact dynamics of free rigid bodies", J. Comput. Phys.
@@ -110,6 +113,14 @@ class Turns(NamedTuple):
         Space for quaternions.
     room : ndarray, shape (TERMS + 1, 10)
         Space for the terms of a series: of q, of L/I and of ω along the axes of the body.
+    carried : ndarray of int, shape (carried, 2)
+        Nodes that bodies carry, and the number of the body of each.
+    arms : ndarray, shape (carried, 3)
+        Vectors from the centre of mass to them at the start [m].
+    ahead : ndarray, shape (carried, 3)
+        Their displacements at the start [m], 0 where the body takes them where the web has them.
+    scales : ndarray, shape (carried, 3)
+        What makes rates of the nodes those of the body, see `carry_rates`.
     """
 
     rows: np.ndarray
@@ -118,6 +129,10 @@ class Turns(NamedTuple):
     reach: np.ndarray
     before: np.ndarray
     room: np.ndarray
+    carried: np.ndarray
+    arms: np.ndarray
+    ahead: np.ndarray
+    scales: np.ndarray
 
     @classmethod
     def of(cls, net):
@@ -126,6 +141,9 @@ class Turns(NamedTuple):
         count = len(bodies)
         mobility = np.array([b.axes.T @ b.mobility @ b.axes for b in bodies]).reshape(count, 3, 3)
         fastest = [np.linalg.eigvalsh(b.mobility)[-1] for b in bodies]
+        carried = [(node, n) for n, body in enumerate(bodies) for node in body.carried]
+        arms = np.array([arm for b in bodies for arm in b.points @ b.axes]).reshape(-1, 3)
+        ahead = [net.points[bodies[n].row] - net.points[node] for node, n in carried]
         return cls(
             rows=np.array([(b.row, b.spin, b.turn) for b in bodies], dtype=np.int64).reshape(count, 3),
             moment=np.array([b.moment for b in bodies], dtype=float),
@@ -133,7 +151,35 @@ class Turns(NamedTuple):
             reach=np.array([b.extent * fast for b, fast in zip(bodies, fastest, strict=True)], dtype=float),
             before=np.zeros((count, 4)),
             room=np.zeros((TERMS + 1, 10)),
+            carried=np.array(carried, dtype=np.int64).reshape(-1, 2),
+            arms=arms,
+            ahead=_exact(np.array(ahead).reshape(-1, 3), arms),
+            scales=np.array(
+                [row for body in bodies for row in _scales(body, net.mass[body.row], net.mass[net.heavy])]
+            ).reshape(-1, 3),
         )
+
+
+def _exact(a, b):
+    """a + b, 0 where that is of rounding."""
+    total = a + b
+    return np.where(np.abs(total) > 1e-13 * np.abs(a).max(initial=0.0), total, 0.0)
+
+
+def _scales(body, own, mass):
+    """What makes rates of the nodes of a body its own, see `carry_rates`, by all masses [kg]; shape (carried, 3)."""
+    if not body.carried:
+        return np.zeros((0, 3))
+    size, axes = np.linalg.eigh(body.mobility)
+    root = axes * np.sqrt(size) @ axes.T
+    across = [np.cross(np.eye(3), point) @ root for point in body.points]
+    pulls = [[root @ (p[k] * np.eye(3) - np.outer(p, np.eye(3)[k])) @ root for k in range(3)] for p in body.points]
+    lever = np.linalg.norm(across, 2, axis=(1, 2))
+    light = mass.min()
+    angle = min(0.5 / max(float(lever.max()), 1e-300), math.sqrt(light / body.moment))
+    place = min(0.5, math.sqrt(light / own))
+    pull = np.linalg.norm(np.linalg.norm(pulls, 2, axis=(2, 3)), axis=1)
+    return np.column_stack([np.full(len(lever), 1.0 / place), lever / angle, pull])
 
 
 @kernel()
@@ -226,13 +272,15 @@ def turn_on(h, v, x, turns):
         x[turns.rows[n, 2], 0] = q[0] - 1.0
         for k in range(3):
             x[s, k] = q[1 + k]
+    carry(x, v, turns)
 
 
 @kernel()
-def turns_within(s, h, old, x, v, turns, here):
-    """Write rotations at the share s of a step of size h that begins at ``old`` (position, velocity, ...).
+def turns_within(s, h, old, x, v, turns, here, speed):
+    """Write rotations, and what bodies carry, to ``here`` and ``speed``.
 
-    They lie on the cubic through quaternions and their rates at either end.
+    They are those at the share s of a step of size h that begins at ``old`` (position, velocity, ...), and lie on the
+    cubic through quaternions and their rates at either end.
     """
     r = 1.0 - s
     way, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
@@ -245,6 +293,58 @@ def turns_within(s, h, old, x, v, turns, here):
         here[t, 0] = first[0] - 1.0 + way * (last[0] - first[0]) + rate0 * d0[0] + rate1 * d1[0]
         for k in range(3):
             here[p, k] = first[1 + k] + way * (last[1 + k] - first[1 + k]) + rate0 * d0[1 + k] + rate1 * d1[1 + k]
+    carry(here, speed, turns)
+
+
+@kernel()
+def carry(x, v, turns):
+    """Write places and velocities of the nodes that bodies carry."""
+    for c in range(turns.carried.shape[0]):
+        i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]
+        b = turns.rows[n, 0]
+        arm = times(matrix_at(x, turns.rows[n, 1], turns.rows[n, 2]), (a[0], a[1], a[2]))
+        w = angular_velocity(n, x, v, turns)
+        for k in range(3):
+            x[i, k] = x[b, k] + (arm[k] - a[k]) + turns.ahead[c, k]
+        v[i, 0] = v[b, 0] + w[1] * arm[2] - w[2] * arm[1]
+        v[i, 1] = v[b, 1] + w[2] * arm[0] - w[0] * arm[2]
+        v[i, 2] = v[b, 2] + w[0] * arm[1] - w[1] * arm[0]
+
+
+@kernel()
+def hand_on(x, f, turns):
+    """Add the forces on nodes that bodies carry, and their moments, to those on the bodies."""
+    for c in range(turns.carried.shape[0]):
+        i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]
+        b, s = turns.rows[n, 0], turns.rows[n, 1]
+        arm = times(matrix_at(x, s, turns.rows[n, 2]), (a[0], a[1], a[2]))
+        for k in range(3):
+            f[b, k] += f[i, k]
+        f[s, 0] += arm[1] * f[i, 2] - arm[2] * f[i, 1]
+        f[s, 1] += arm[2] * f[i, 0] - arm[0] * f[i, 2]
+        f[s, 2] += arm[0] * f[i, 1] - arm[1] * f[i, 0]
+
+
+@kernel()
+def carry_rates(rates, turns):
+    """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
+
+    A node at the arm a moves by δ + θ × a. In place of its displacement there are two unknowns, scaled to be no more
+    than half of it: so rows of other nodes keep their sums, and those of the body are its own over these scales.
+    """
+    for c in range(turns.carried.shape[0]):
+        i, n = turns.carried[c, 0], turns.carried[c, 1]
+        rates[turns.rows[n, 0]] += turns.scales[c, 0] * rates[i]
+        rates[turns.rows[n, 1]] += turns.scales[c, 1] * rates[i]
+
+
+@kernel()
+def pull_rates(rates, f, turns):
+    """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
+    for c in range(turns.carried.shape[0]):
+        i = turns.carried[c, 0]
+        pull = math.sqrt(f[i, 0] ** 2 + f[i, 1] ** 2 + f[i, 2] ** 2)
+        rates[turns.rows[turns.carried[c, 1], 1]] += 2.0 * turns.scales[c, 2] * pull
 
 
 @kernel()

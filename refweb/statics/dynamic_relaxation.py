@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels import FORCE, INDICES, MATRIX, kernel, typed_list
+from ..system.at_rest import at_rest
 from .equilibrium import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
 
 SAFETY = 0.6
@@ -70,7 +71,7 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
     SolverError
         Where there is no equilibrium, or none is found.
     """
-    system = system.at_rest()
+    system = at_rest(system)
     relaxation, x = Relaxation(system, progress, most, tolerance), np.zeros((system.rows, 3))
     for t in load_steps:
         state = relaxation.solve(t, x)

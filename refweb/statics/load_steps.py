@@ -11,6 +11,7 @@ import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, G0
 from ..net.tension_laws import LINEAR, TENSION_ONLY
+from ..system.at_rest import at_rest
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 from .newton import Newton
 
@@ -43,7 +44,7 @@ def solve(system, load_steps, progress=None):
     SolverError
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
-    system = system.at_rest()
+    system = at_rest(system)
     newton, states = Newton(system, progress, load_steps[0]), []
     for t in load_steps:
         state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from ..errors import SolverError
 from ..results.state import State
+from ..system.at_rest import at_rest
 from .newton import Newton
 
 SHARE = 0.1
@@ -24,7 +25,7 @@ class Smoothing:
         groups = {name: _less_smooth(group) for name, group in cable.groups.items()}
         self._observables = scene.observables
         self._system = scene.replace(cable=replace(_less_smooth(cable), groups=groups)).build()
-        self._newton = Newton(self._system.at_rest())
+        self._newton = Newton(at_rest(self._system))
 
     def errors(self, equilibrium, values):
         """Of each value in an equilibrium its distance from the value at η → 0; None where that was not found."""

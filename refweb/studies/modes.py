@@ -18,6 +18,7 @@ from ..results.state import State
 from ..scene import Scene
 from ..solution import Solution
 from ..statics.remarks import Remarks, open_rows
+from ..system.at_rest import at_rest
 from ..tables import checked, integer
 from .mode_remarks import left_out, remarks_on
 from .spectrum import spectrum
@@ -150,7 +151,7 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
 
 def _at_rest(system):
     """The system that vibrates; refuses what has no modes."""
-    rest = system.at_rest()
+    rest = at_rest(system)
     if rest.constraints:
         raise InputError("[[link]]: modes cannot hold lengths exactly: make it a stiff line")
     for family in rest.families:

@@ -49,6 +49,8 @@ class System:
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
         Which elements break; None where none does.
+    carried : ndarray of bool, shape (rows,)
+        Nodes that free bodies carry: those move with these.
     free : ndarray of int
         Components 3 row + axis of the unknowns, increasing.
     """
@@ -77,12 +79,16 @@ class System:
             self.supported[body.row] = body.fixed
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
+        self.carried = np.zeros(self.rows, dtype=bool)
+        self.carried[[node for body in net.bodies if not body.fixed for node in body.carried]] = True
+        self.supported[self.carried] = True
         self._factorization = factorization
         if factorization == "rslab":
             _ = self.library  # which refuses it where it is not installed
-        self._arrange()
+        self.arrange()
 
-    def _arrange(self):
+    def arrange(self):
+        """Find what follows from what is supported and acts."""
         self.free = np.flatnonzero(~self.supported)
         self._zero = np.zeros((self.rows, 3))
         self._observed = self.per_cell()
@@ -98,6 +104,11 @@ class System:
         return Library(self._factorization)
 
     @property
+    def held(self):
+        """Components that supports hold, or prescribed motion, shape (rows, 3)."""
+        return self.supported & ~self.carried[:, None]
+
+    @property
     def factorized_by(self):
         """The library that has factorized and the reason, in words; None where none has."""
         return self.library.why if "library" in self.__dict__ else None
@@ -105,30 +116,6 @@ class System:
     def remarks(self):
         """What a reader of results has to know of their factorizations, each a text."""
         return self.library.remarks if "library" in self.__dict__ else []
-
-    def at_rest(self):
-        """The system as statics sees it: free bodies are held and felt by nothing, what needs velocity is left out."""
-        waiting = [body.row for body in self.net.bodies if not body.fixed]
-        if not waiting and all(family.at_rest for family in self.families):
-            return self
-        _ = self.library  # both say what factorizes for either
-        rest = copy.copy(self)
-        for kept in ("pattern", "unsupported_parts", "mass", "links"):
-            rest.__dict__.pop(kept, None)
-        rest.supported = self.supported.copy()
-        rest.supported[waiting] = True
-        rest.supported[self.rows - self.net.spins :] = True
-        rest.families = []
-        for family in self.families:
-            if not family.at_rest:
-                continue
-            felt = ~np.isin(family.cells, waiting).any(axis=1)
-            if felt.all():
-                rest.families.append(family)
-            elif felt.any():
-                rest.families.append(replace(family, cells=family.cells[felt], data=family.data[felt]))
-        rest._arrange()
-        return rest
 
     def initial_velocity(self):
         """Velocities at the start [m/s], shape (rows, 3): those of the effects and bodies."""
@@ -157,9 +144,18 @@ class System:
         """The fixed `refweb.system.sparsity.Pattern` of the tangent."""
         from .sparsity import Pattern
 
-        turns = [[(body.spin, body.turn)] for body in self.net.bodies if body.turn is not None]  # by their equations
-        also = [np.array(pair, dtype=np.int32) for pair in turns]
+        also = [np.array([(b.spin, b.turn)], dtype=np.int32) for b in self.net.bodies if b.turn is not None]
+        also += self.carriers.cells if self.carriers else []
         return Pattern(self.rows, self.free, [f.cells for f in self._in_tangent], self.library, also)
+
+    @cached_property
+    def carriers(self):
+        """The `refweb.system.carried.Carried` of bodies that carry nodes; None where none does."""
+        if not self.carried.any():
+            return None
+        from .carried import Carried
+
+        return Carried(self.net, self._in_tangent)
 
     @cached_property
     def mass(self):
@@ -246,10 +242,12 @@ class System:
         return force
 
     def drive(self, t, x, v=None):
-        """Write the prescribed displacements [m] and velocities [m/s] at time t into x and v."""
+        """Write displacements [m] and velocities [m/s] that are prescribed, at time t, or a body's into x and v."""
         v = np.zeros_like(x) if v is None else v
         for d in self.drives:
             d.kernel(t, x, v, self._zero, d.cells, d.data, self._zero)
+        if self.carriers:
+            self.carriers.carry(x, v)
 
     def force(self, t, x, v=None):
         """Force on every row [N], supports included, shape (rows, 3)."""
@@ -264,6 +262,8 @@ class System:
         f = np.zeros((self.rows, 3))
         for family, out in zip(self.families, per_cell, strict=True):
             family.force(t, x, v, f, family.cells, self._data(family, t), out)
+        if self.carriers:
+            self.carriers.hand_on(x, f)
         return f
 
     def force_of(self, family, t, x, v=None):
@@ -326,12 +326,15 @@ class System:
                 blocks[:] = 0.0
             else:
                 family.stiffness(t, x, v, blocks, family.cells, self._data(family, t), definite)
-        return self.pattern.assemble(self._blocks)
+        values = self.pattern.assemble(self._blocks)
+        if self.carriers:
+            self.carriers.add_stiffness(values, self, t, x, v, self._blocks)
+        return values
 
     @property
     def symmetric(self):
         """Whether K and C are symmetric."""
-        return all(f.symmetric for f in self.families)
+        return all(f.symmetric for f in self.families) and not self.carried.any()
 
     @cached_property
     def turning(self):
@@ -387,7 +390,10 @@ class System:
             blocks[:] = 0.0
             if family.damping is not None:
                 family.damping(t, x, v, blocks, family.cells, self._data(family, t), False)
-        return self.pattern.assemble(self._blocks)
+        values = self.pattern.assemble(self._blocks)
+        if self.carriers:
+            self.carriers.add_damping(values, self, x, v, self._blocks)
+        return values
 
     def assemble_lines(self, blocks):
         """Values in the fixed pattern of one block (3 nodes, 3 nodes) per line element, shape (cells, ., .)."""

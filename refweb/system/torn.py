@@ -60,8 +60,9 @@ def torn(system, elements, energies):
     broken = np.zeros(len(net.cells), dtype=bool)
     broken[elements] = True
     other.families = [_severed(family, broken, numbers) for family in system.families]
-    other.__dict__.pop("unsupported_parts", None)
-    other._arrange()
+    for kept in ("unsupported_parts", "carriers"):
+        other.__dict__.pop(kept, None)
+    other.arrange()
     return other
 
 

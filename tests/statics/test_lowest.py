@@ -8,6 +8,7 @@ from scipy.optimize import minimize_scalar, root_scalar
 import refweb
 from refweb.statics.lowest import _above, _forces, _without_smoothing
 from refweb.statics.newton import Newton
+from refweb.system.at_rest import at_rest
 
 AXIAL, RISE = 1e3, 0.1
 
@@ -52,7 +53,7 @@ def test_an_arch_that_could_snap_through(smoothing):
 def test_the_bound_holds_from_the_arch():
     """The arch lies above the state that hangs by less than the bound, which is not ten times that."""
     force, smoothing = 0.1, 1e-2
-    system = scene(force, smoothing).build().at_rest()
+    system = at_rest(scene(force, smoothing).build())
     newton = Newton(system)
     arch = newton.solve(1.0, np.zeros((3, 3)))
     assert (arch.tension < 0.0).all()

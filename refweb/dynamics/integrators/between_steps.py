@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import copy_rows, kernel
-from ...net.rotation import note_turns, turn_on, turns_within
+from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
 from .extremes import EDGE, Extremes, correction, look, look_at_sums, take_over, time_of_top
@@ -98,6 +98,7 @@ def forces_at(t, x, v, f, lines, model):
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
     for i in model.rubbed.families:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
+    hand_on(x, f, model.inertia.turns)
     show_near(model.nearby, families)
 
 
@@ -133,7 +134,7 @@ def state_within(t, now, h, x, v, f, smooth, inside, model):
     else:
         interpolate_kicks(share, h, inside.before, x, v, inverse, f, here[0], here[1])
     if model.inertia.turns.moment.size:
-        turns_within(share, h, inside.before, x, v, model.inertia.turns, here[0])
+        turns_within(share, h, inside.before, x, v, model.inertia.turns, here[0], here[1])
     forces_at(t, here[0], here[1], here[2], inside.lines, model)
 
 

@@ -114,6 +114,12 @@ class CentralDifference(Integrator):
             raise InputError(
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
+        for family in system.families if system.carried.any() else []:
+            if family.rubbing is not None:
+                raise InputError(
+                    f"[{family.name}] has losses that {self.method} solves for node by node, which a body that carries "
+                    'nodes by [[attach]] does not allow: use method = "cvode", or leave them out'
+                )
         self._outs = outs = tuple(system.per_cell())
         self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
         self._events, self._least = event_rows(events), least_energy(net)
@@ -122,8 +128,9 @@ class CentralDifference(Integrator):
 
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m], at any time."""
-        x = np.zeros((self.system.rows, 3)) if x is None else x
-        return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, self._model)
+        rest = np.zeros((self.system.rows, 3))
+        x = rest if x is None else x
+        return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
 
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ...kernels import copy_rows, kernel
-from ...net.rotation import sizes
+from ...net.rotation import hand_on, sizes
 from ...results.probes import PLACE
 from .averages import average, look_for_means, write_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
@@ -37,11 +37,12 @@ from .step import (
     add_forces,
     give_impulse,
     give_reaction,
-    last_kick,
+    hand_over,
     move,
     move_supports,
     note_lengths,
     note_state,
+    plain_kick,
     rubbing_kick,
     set_lengths,
     set_reaction,
@@ -74,6 +75,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
+        hand_on(x, f, turns)
         set_reaction(held, f.reshape(-1), reaction)
         if model.outside.pushing.size:
             set_push(drifted, x, v, model.outside, families, extra, push)
@@ -169,8 +171,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, model.inertia.turns)
         if stages:
             book_potential(-1.0, now - kicks[stages + 1], x, families, work)
-        if moved:
-            move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
+        move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
             change_lengths(now, x, reels, was, data[0], length_force, work)
         follow_near(drifts[0], x, bits, before, driven, nearby, families)
@@ -178,12 +179,13 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])
         show_near(nearby, families)
+        hand_over(x, f, model.inertia.turns)
         if rubbing.size:
             touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
         elif viscous.size:
-            viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs)
+            viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs, model.inertia.turns)
         else:
-            last_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f)
+            plain_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f, x, v, model.inertia.turns)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
         book_motion(driven, mass, x, v, f, before, work)
@@ -232,7 +234,7 @@ def steps_until(end, changing, scheme, model, running):
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
     reach_all(2.0 * interval * fastest, running.x, model.nearby, model.families)
     return interval / (
-        scheme.safety * safe_step(time, end, changing, 2.0 * interval * fastest, fastest, running.x, model)
+        scheme.safety * safe_step(time, end, changing, 2.0 * interval * fastest, fastest, running.x, f, model)
     )
 
 
@@ -372,6 +374,7 @@ def begin(x, v, f, model, observed, extremes, work, total):
         set_lengths(0.0, model.reels, families.data[0])
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
+    hand_on(x, f, model.inertia.turns)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE
         extremes.values[i] = observed.probes[i](

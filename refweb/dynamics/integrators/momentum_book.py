@@ -135,7 +135,7 @@ class Outside(NamedTuple):
 
 def kept_axes(system):
     """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
-    if system.supported.any() or not all(family.internal or family.moment_free for family in system.families):
+    if system.held.any() or not all(family.internal or family.moment_free for family in system.families):
         return np.zeros((0, 3))
     normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)
     if not len(normals):

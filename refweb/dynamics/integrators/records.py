@@ -100,7 +100,7 @@ class Inertia(NamedTuple):
         net, free = system.net, ~system.supported
         inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
-        moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.supported)
+        moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
         return cls(net.mass, inverse, moving, held, driven, system.rows - net.spins, Turns.of(net))
 
 

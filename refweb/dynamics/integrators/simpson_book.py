@@ -169,7 +169,7 @@ class SimpsonBook:
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
         self._outside = Outside.of(system)
         self._pushing = [families[i] for i in self._outside.pushing]
-        self._held, self._fixed = system.supported, np.flatnonzero(system.supported)
+        self._held, self._fixed = system.supported, np.flatnonzero(system.held)
 
     def sample(self, t, x, v):
         """The `Sample` of a state."""

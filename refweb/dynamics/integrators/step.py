@@ -8,7 +8,7 @@ import numpy as np
 
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
-from ...net.rotation import note_turns, turn_on
+from ...net.rotation import carry, hand_on, note_turns, turn_on
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -50,6 +50,21 @@ def last_kick(kick, inverse, v, f):
 
 
 @kernel(forceinline=True)
+def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
+    """As `last_kick`, where bodies may carry nodes."""
+    last_kick(kick, inverse, flat_v, flat_f)
+    if turns.carried.shape[0]:
+        carry(x, v, turns)
+
+
+@kernel(forceinline=True)
+def hand_over(x, f, turns):
+    """Add forces on nodes that bodies carry to those on the bodies."""
+    if turns.carried.shape[0]:
+        hand_on(x, f, turns)
+
+
+@kernel(forceinline=True)
 def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
     """Add the force of the lines, and of all families that follow from displacement and time, to f."""
     first[0](t, x, v, f, first[1], first[2], lines)
@@ -83,7 +98,7 @@ def give_reaction(before, behind, held, f, reaction, impulse):
 
 
 @kernel(forceinline=True)
-def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs):
+def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs, turns):
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
 
     Forces that depend on velocity see that at the end of the step; the kick, thereby implicit, stays adjoint to the
@@ -96,8 +111,10 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
     share, before_that = 1.0, math.inf
     for _ in range(ROUNDS):
         extra[:] = 0.0
+        carry(x, v, turns)
         for i in viscous:
             forces[i](t, x, v, extra, cells[i], data[i], outs[i])
+        hand_on(x, extra, turns)
         change = fastest = 0.0
         for q in range(flat_v.size):
             speed = flat_half[q] + 0.5 * h * flat_inverse[q] * (flat_f[q] + flat_extra[q])
@@ -110,6 +127,7 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
         before_that = change
     for q in range(flat_v.size):
         flat_f[q] += flat_extra[q]
+    carry(x, v, turns)
 
 
 @kernel()
@@ -209,6 +227,7 @@ def turn_supports(t, model, running):
         f[:] = 0.0
         for i in range(len(forces)):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
+        hand_on(x, f, model.inertia.turns)
         for i in model.rubbed.families:
             running.power[i] = families.outs[i][:, 0].sum()
     return turned

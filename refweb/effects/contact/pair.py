@@ -19,7 +19,7 @@ from ...net.rotation import matrix_at, times
 RADIUS, PENALTY, AWAY = 0, 1, 2
 """Columns of data: radius of a sphere around the body [m], stiffness of the penalty, first of the vectors."""
 _EXPONENT, _DAMPING, _FRICTION, _SLIP, _GROWTH, _CORE, _ROUND, _ONCE, _PLANAR, _AXES = 0, 1, 2, 3, 4, 5, 8, 9, 10, 11
-_FINE, _THICK, _FIELD, _MOBILITY, _LEVER = 20, 21, 22, 23, 29
+_FINE, _THICK, _FIELD, _MOBILITY, _LEVER, _OFFSET = 20, 21, 22, 23, 29, 30
 """Columns behind the vectors."""
 
 
@@ -74,14 +74,14 @@ def pair_data(body, cells, points, law, tumbles=False):
     shape, (stiffness, *law) = body.shape, law
     radius, core, round_, *field = shape.grown()
     tail = [*law, radius, *core, round_, shape.once, shape.planar, *body.axes.ravel(), *field]
-    tail += [*body.mobility[np.triu_indices(3)], lever(body)] if tumbles else []
+    tail += [*body.mobility[np.triu_indices(3)], lever(body), *body.offset] if tumbles else []
     head, tail = (np.tile(part, (len(cells), 1)) for part in ([body.extent, stiffness], tail))
     return np.column_stack([head, away, tail])
 
 
 def lever(body):
     """√(I (y × g)·J⁻¹(y × g)) for any point y of a body and unit vector g, at most [m]: a lever for its moment I."""
-    reach = np.array(body.core) + body.radius
+    reach = np.array(body.core) + body.radius + np.abs(body.offset)
     across = np.sqrt((reach**2).sum() - reach**2)
     return float(np.sqrt(across @ np.abs(body.mobility) @ across))
 
@@ -90,6 +90,13 @@ def lever(body):
 def lever_of(data, c, nodes):
     """What `lever` says of the body of cell c."""
     return data[c, AWAY + 3 * nodes + _LEVER]
+
+
+@kernel(forceinline=True)
+def from_shape(p, data, c, nodes):
+    """What is at p from the row of the body of cell c, from the centre of its shape; along its axes."""
+    at = AWAY + 3 * nodes + _OFFSET
+    return p[0] - data[c, at], p[1] - data[c, at + 1], p[2] - data[c, at + 2]
 
 
 @functools.cache

@@ -19,11 +19,11 @@ from ...kernels import kernel
 from ...net.rotation import times
 from ..vectors import dot
 from .nearest_point import SAMPLES, far, point, share
-from .pair import Pair, pair_of, pairing
+from .pair import Pair, from_shape, pair_of, pairing
 
 
 class Spot(NamedTuple):
-    """A place of an element, as a body sees it: vectors are from its centre and along its axes.
+    """A place of an element, as a body sees it: vectors are from its row and along its axes.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ def places(depth, spins=0):
         pair = paired(x, cells, data, c, nodes)
         p, d, e = point(x, cells, data, c, nodes, functions, place)
         p, d, e = times(pair.axes, p), times(pair.axes, d), times(pair.axes, e)
-        deep, gradient, hessian = depth(p, pair.shape)
+        deep, gradient, hessian = depth(from_shape(p, data, c, nodes) if spins == 2 else p, pair.shape)
         return Spot(p, d, e, deep, gradient, hessian)
 
     @kernel()

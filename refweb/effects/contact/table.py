@@ -146,9 +146,9 @@ class Contact(Table):
         element = net.subdivide, net.order + 1, tuple(functions.ravel().tolist())
         pressed, losing = {}, {}
         for body in net.bodies:
-            linear, spins = body.shape.once and self._of(body, "exponent") == 1.0, rotations(body)
-            depth = None if linear else body.shape.depth()
-            pressed.setdefault((depth, 2 if spins == 2 and not body.shape.once else 0), []).append(body)
+            ball, spins = body.shape.once and not body.offset.any(), rotations(body)  # whose push is no moment
+            depth = None if ball and self._of(body, "exponent") == 1.0 else body.shape.depth()
+            pressed.setdefault((depth, 2 if spins == 2 and not ball else 0), []).append(body)
             if self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0:
                 losing.setdefault((body.shape.depth(), spins), []).append(body)
         families = [self._penalty(net, element, depth, spins, bodies) for (depth, spins), bodies in pressed.items()]

@@ -1,7 +1,7 @@
 """Reactions: the force of supports on nodes, of several nodes their sum, and the force of contact on a body.
 
 A kernel has the whole force f on each row. What supports add to a row is −f; what contact adds to a body is f less
-what acts on the body besides, which is linear in x and v: −(g + B x + C v − f).
+what acts on the body besides, which is linear in x and v: −(g + B x + C v − f), and less what nodes hand on to it.
 """
 
 from __future__ import annotations
@@ -36,6 +36,9 @@ class Reaction(Nodal):
             weight, besides = np.where(system.supported[rows], 1.0, 0.0), np.zeros((len(rows), 3))
         else:
             weight, besides = np.full((len(rows), 3), -1.0), besides_contact(system, rows)
+            nodes = [node for body in system.net.bodies if body.row in rows for node in body.carried]
+            rows, weight = np.append(rows, nodes).astype(int), np.vstack([weight, np.ones((len(nodes), 3))])
+            besides = np.vstack([besides, np.zeros((len(nodes), besides.shape[1]))])
         return Probe(reaction, self.numbers(rows), np.hstack([weight, besides]))
 
 

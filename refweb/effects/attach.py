@@ -1,0 +1,143 @@
+"""Nodes of the web that are tied to a point of a body.
+
+A node that a free body carries is no unknown: it is where the body takes it, at the arm a from the centre of mass, and
+has the velocity v + ω × a. What acts on it acts on the body, as a force f and the moment a × f. Its mass m is the
+body's: the centre of mass of both moves by s, and the tensor of inertia about it is
+
+    J + M (|s|² 1 − s⊗s) + Σ m (|a|² 1 − a⊗a),
+
+M being the mass of the body alone; the row of the body is that of this centre. Nothing else changes in the equations,
+which have no multipliers. On a fixed body a node is a support.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels import FORCE, kernel
+from ..messages import nearest, shown
+from ..tables import Several, Table, nodes, table, text, vector
+from .base import Drive, column
+
+
+@kernel(FORCE)
+def hold(t, x, v, f, cells, data, out):
+    for c in range(cells.shape[0]):
+        for i in range(3):
+            x[cells[c, 0], i], v[cells[c, 0], i] = data[c, i], 0.0
+
+
+@table
+class Attach(Table):
+    """Nodes of the web tied to a body, which pull at it and go with it, and are free to turn there.
+
+    Their mass is the body's, whose row is the centre of mass of all: position and velocity that are observed are those
+    of this. A sphere turns in space where it has nodes. Nodes on a fixed body are supports. The point may lie inside of
+    the body or outside; contact with the body is that of any line. Drag of the body acts at the centre of mass.
+
+    Parameters
+    ----------
+    body : str
+        Name of the body.
+    node : int, str or list
+        Nodes, by number or name.
+    point : sequence of 3 float, optional
+        Where on the body they are, along its axes from its position [m]; by default where each stands in the web's
+        position. Lines keep the natural length that the web's position gives them.
+
+    Raises
+    ------
+    InputError
+        From ``extend``, for a node or a body that there is not, a ring that is free, which keeps its plane, and a node
+        that a body has already; in a scene, for a node that is supported, moved or linked as well, a free body with
+        nodes and a consistent mass, and for losses of contact or drag with such a body by "central-difference".
+
+    Examples
+    --------
+        [[attach]]
+        body = "hub"
+        node = [0, 5]
+
+        [[attach]]
+        body = "box"
+        node = 7
+        point = [0.5, 0.5, 0.2]
+    """
+
+    several = True
+
+    body: str = text(most=80)
+    node: Several = nodes()
+    point: Several = vector(default=None, unit="m")
+
+    def extend(self, net):
+        """The net with the nodes on the body."""
+        names = [body.name for body in net.bodies]
+        if self.body not in names:
+            raise InputError(f"body = {shown(self.body)} is not a [[body]], {nearest(self.body, names)}")
+        number = names.index(self.body)
+        body = net.bodies[number]
+        if body.shape.planar and not body.fixed:
+            raise InputError(
+                f"body = {shown(self.body)} is a {type(body.shape).__name__.lower()}, which keeps its plane: give it "
+                "another shape, such as a cylinder, or fixed = true"
+            )
+        found = np.unique(net.web.find(self.node))
+        for other in net.bodies:
+            for node in np.intersect1d(found, other.carried):
+                raise InputError(f'node = {node} is on body "{other.name}" already')
+        points = (net.points[found] - net.points[body.row]) @ body.axes.T
+        if self.point is not None:
+            points[:] = self.point + body.offset
+        carried, points = (*body.carried, *found.tolist()), np.vstack([body.points, points])
+        bodies, mass, places = list(net.bodies), net.mass.copy(), net.points.copy()
+        bodies[number] = replace(body, carried=carried, points=points)
+        if not body.fixed:
+            shift, bodies[number] = _joined(bodies[number], mass[body.row], mass[found])
+            mass[body.row] += mass[found].sum()
+            mass[found] = 0.0
+            places[body.row] += shift
+        return replace(net, mass=mass, points=places, bodies=tuple(bodies))
+
+    def on(self, net):
+        """The nodes on a fixed body as supports; of a free one there is nothing to add."""
+        body = next(body for body in net.bodies if body.name == self.body)
+        own = np.isin(body.carried, net.web.find(self.node))
+        if not body.fixed:
+            return []
+        rows = np.array(body.carried)[own]
+        data = body.points[own] @ body.axes - (net.points[rows] - net.points[body.row])
+        data[np.abs(data) <= 1e-13 * np.abs(body.points).max()] = 0.0  # of rounding
+        there = np.zeros_like(net.points)
+        there[rows] = data
+        return held(rows, there)
+
+
+def held(rows, x):
+    """The `refweb.effects.base.Drive` that keeps some rows where displacements x of all rows have them."""
+    return Drive(cells=column(rows), data=np.ascontiguousarray(x[rows]), kernel=hold)
+
+
+def _joined(body, mass, added):
+    """(by how much the centre of mass moves, the body with masses at the last of its points)."""
+    last = body.points[len(body.points) - len(added) :]
+    shift = added @ last / (mass + added.sum())
+    inertia = body.inertia + mass * _about(shift) + sum(m * _about(p - shift) for m, p in zip(added, last, strict=True))
+    moved = shift @ body.axes
+    velocity = np.add(body.velocity, np.cross(body.angular_velocity, moved))
+    return moved, replace(
+        body,
+        inertia=inertia,
+        velocity=tuple(velocity.tolist()),
+        turns=True,
+        points=body.points - shift,
+        offset=body.offset - shift,
+    )
+
+
+def _about(p):
+    """|p|² 1 − p⊗p."""
+    return p @ p * np.eye(3) - np.outer(p, p)
