@@ -111,14 +111,7 @@ class Attach(Table):
         rows = np.array(body.carried)[own]
         data = body.points[own] @ body.axes - (net.points[rows] - net.points[body.row])
         data[np.abs(data) <= 1e-13 * np.abs(body.points).max()] = 0.0  # of rounding
-        there = np.zeros_like(net.points)
-        there[rows] = data
-        return held(rows, there)
-
-
-def held(rows, x):
-    """The `refweb.effects.base.Drive` that keeps some rows where displacements x of all rows have them."""
-    return Drive(cells=column(rows), data=np.ascontiguousarray(x[rows]), kernel=hold)
+        return Drive(cells=column(rows), data=np.ascontiguousarray(data), kernel=hold)
 
 
 def _joined(body, mass, added):

@@ -21,12 +21,7 @@ def at_rest(system):
     rest.supported[waiting] = True
     rest.supported[system.rows - system.net.spins :] = True
     if system.carriers:
-        from ..effects.attach import held
-
-        there = np.zeros((system.rows, 3))
-        system.carriers.carry(there, there.copy())
-        rest.drives = [*system.drives, held(np.flatnonzero(system.carried), there)]
-        rest.carried = np.zeros_like(system.carried)
+        rest.carriers, rest.carried = system.carriers.waiting(system.net), np.zeros_like(system.carried)
     rest.families = []
     for family in system.families:
         if not family.at_rest:

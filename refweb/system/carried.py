@@ -74,6 +74,11 @@ class Carried:
             for at in np.flatnonzero(np.isin(family.cells, nodes).any(axis=1))
         ]
 
+    @staticmethod
+    def waiting(net):
+        """Those of bodies that are held and feel nothing."""
+        return Waiting(net, [])
+
     @property
     def cells(self):
         """Rows that are coupled, each of shape (1, rows)."""
@@ -157,6 +162,19 @@ class Carried:
         for cell, entries in zip(self._cells, self._entries, strict=True):
             _, fast, _, L = self._matrices(cell, state)
             _add(values, entries, _beside(L @ blocks[cell.family][cell.at] @ fast, blocks, cell))
+
+
+class Waiting(Carried):
+    """Nodes of bodies that are held and feel nothing."""
+
+    def hand_on(self, x, f):
+        """Nothing is felt."""
+
+    def add_stiffness(self, values, system, t, x, v, blocks):
+        """Nothing is to be added."""
+
+    def add_damping(self, values, system, x, v, blocks):
+        """Nothing is to be added."""
 
 
 def _entries(rows, size, number, keys):
