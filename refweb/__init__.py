@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .effects.contact.table import Contact as Contact
     from .effects.damping import Damping as Damping
     from .effects.drag.table import Drag as Drag
+    from .effects.fold import Fold as Fold
     from .effects.frame import Frame as Frame
     from .effects.gravity import Gravity as Gravity
     from .effects.link import Link as Link
@@ -40,6 +41,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .net.web import Web as Web
     from .pictures.pictures import picture as picture
     from .results.observables.observe import Observe as Observe
+    from .results.throw import Throw as Throw
     from .runner import resume as resume
     from .runner import run as run
     from .scene import Scene as Scene

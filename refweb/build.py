@@ -71,6 +71,8 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
         _check_links(solve)
     _check_start(solve, accuracy)
     system.initial_velocity()
+    if system.laid is not None and solve.start != "web":
+        raise InputError(f'[solve] start = {shown(solve.start)} must be "web" with [fold], which is a start of its own')
     _check_observables(observables, system, solve)
     for i, event in enumerate(events):
         with refused_at(f"[[event]] {i + 1}"):

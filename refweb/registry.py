@@ -39,6 +39,7 @@ EFFECTS = {
     "reel": "refweb.effects.reel:Reel",
     "temperature": "refweb.effects.temperature:Temperature",
     "rupture": "refweb.effects.rupture:Rupture",
+    "fold": "refweb.effects.fold:Fold",
 }
 """Effects by the name of their table."""
 FACTORIZATIONS = ("qdldl", "rslab")
@@ -50,6 +51,7 @@ PARTS = {
     "supports": "refweb.settings:Supports",
     "output": "refweb.settings:Output",
     "accuracy": "refweb.settings:Accuracy",
+    "throw": "refweb.results.throw:Throw",
 }
 """Tables of a scene besides webs, effects and ``[solve]`` that stand once."""
 LISTS = {
@@ -183,6 +185,7 @@ EXPORTS = (
     "refweb.settings:Output",
     "refweb.settings:Accuracy",
     "refweb.settings:Event",
+    "refweb.results.throw:Throw",
     "refweb.results.observables.observe:Observe",
     "refweb.solution:Solution",
     "refweb.net.cable:Cable",
@@ -213,7 +216,7 @@ def name_of(table, value):
     return next((name for name, reference in table.items() if reference == own), None)
 
 
-FILES = {"web": ("path", "lines"), "body": ("file",)}
+FILES = {"web": ("path", "lines"), "body": ("file",), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 

@@ -22,6 +22,7 @@ from .tables import Several, Table, table
 if TYPE_CHECKING:
     from .net.cable import Cable
     from .net.web import Web
+    from .results.throw import Throw
 
 CLASSES_OF_PARTS = {
     "cable": ("Cable",),
@@ -30,6 +31,7 @@ CLASSES_OF_PARTS = {
     "solve": ("Static", "Dynamic"),
     "output": ("Output",),
     "accuracy": ("Accuracy", "NoneType"),
+    "throw": ("Throw", "NoneType"),
     "observe": ("Observe",),
     "event": ("Event",),
 }
@@ -62,6 +64,8 @@ class Scene:
         What a result folder holds.
     accuracy : Accuracy, optional
         How errors are found.
+    throw : refweb.Throw, optional
+        Numbers that a throw is judged by.
     observe : sequence of refweb.Observe
         Numbers to follow; `refweb.results.observables.observe.default` without any.
     event : sequence of Event
@@ -87,6 +91,7 @@ class Scene:
     solve: Static | Dynamic = field(default_factory=Static)
     output: Output = field(default_factory=Output)
     accuracy: Accuracy = field(default_factory=Accuracy)
+    throw: Throw | None = None
     observe: Several = ()
     event: Several = ()
     title: str = "scene"
@@ -182,8 +187,8 @@ class Scene:
 
         ``file`` is the name that begins the messages of `build`.
         """
-        if folder is not None and "body" in given:
-            given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body"])
+        if folder is not None:
+            given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold"])
         known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]
         for key in given:
             if key not in known:
@@ -235,6 +240,8 @@ class Scene:
         given["output"] = self.output.to_dict()
         if self.accuracy is not None:
             given["accuracy"] = self.accuracy.to_dict()
+        if self.throw is not None:
+            given["throw"] = self.throw.to_dict()
         given["observe"] = [o.to_dict() for o in self.observables]
         if self.event:
             given["event"] = [event.to_dict() for event in self.event]
@@ -307,7 +314,7 @@ class Scene:
         if (settled := self.settled()) is not self:
             return settled.build()
         with in_file(self.file):
-            return build(
+            system = build(
                 web=self.web,
                 cable=self.cable,
                 effects=self.effects,
@@ -320,6 +327,10 @@ class Scene:
                 events=self.event,
                 folder=self.folder,
             )
+            if self.throw is not None:
+                with refused_at("[throw]"):
+                    self.throw.on(self.observables, system, self.solve)
+            return system
 
 
 def file_of(source):

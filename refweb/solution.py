@@ -295,7 +295,7 @@ def load(folder) -> Solution:
         for key in ("status", "message", "web", "events", "solver", "cost", "versions", "warnings"):
             setattr(found, key, summary[key])
         found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
-        found.breaks = summary.get("breaks")
+        found.breaks, found.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             found.utilisation = used["value"], used["line"]
         found.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]

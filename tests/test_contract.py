@@ -82,6 +82,7 @@ EXAMPLES = {
         dict(expansion=1e-4, change=30.0, groups=dict(tie=dict(change=[(0.0, 0.0), (2.0, 200.0)]))),
     ],
     "Rupture": [dict(strength=1e9)],
+    "Fold": [dict(ratio=0.5)],
 }
 ROLES = ("on", "extend", "start")
 

@@ -142,6 +142,7 @@ EFFECTS = {
     "drag": table(density=ANY, optional={"wind": VECTOR, "normal": ANY}),
     "orbit": table(mean_motion=ANY),
     "rupture": table(strength=ANY),
+    "fold": table(ratio=ANY, optional={"turns": SIGNED, "gap": ANY}),
     "pressure": st.lists(table(lines=LINES, normal=VECTOR, value=SIGNED), min_size=1, max_size=1),
     "thrust": st.lists(
         table(node=NUMBER, line=NUMBER, force=SIGNED, optional={"factor": TABLE}),

@@ -53,6 +53,7 @@ EVERY |= {
     "system",
     "system.system",
     "system.forces",
+    "system.start",
 }
 EVERY |= {
     f"results.{name}"
@@ -243,6 +244,7 @@ TABLES = {
     "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
     "temperature": {"expansion": 1e-5, "change": 10.0},
     "rupture": {"strength": 1e9},
+    "fold": {"ratio": 0.5, "gap": 0.0},
 }
 SOLVED = ("what touches", "forces before", "sweep", "power")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
@@ -258,7 +260,7 @@ KERNELS["orbit"] = KERNELS["frame"]
 KERNELS["rupture"] = FAMILY
 KERNELS["drag"] = {**FAMILY, **dict.fromkeys(SOLVED, 1)}
 KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
-KERNELS |= {name: {} for name in ("point_mass", "velocity", "body")}
+KERNELS |= {name: {} for name in ("point_mass", "velocity", "body", "fold")}
 """Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
 
 
@@ -270,6 +272,8 @@ def scene_of(*effects):
         given["body"] = [BALL]
     if "attach" in effects:
         given["body"] = [*given.get("body", []), WALL]
+    if "fold" in effects:
+        given["supports"] = {"nodes": []}
     if "link" in effects:
         given["solve"] = {**given["solve"], "method": "ida"}
     return refweb.Scene.from_dict(given)

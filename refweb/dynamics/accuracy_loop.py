@@ -109,6 +109,20 @@ def run_within_drift(simulation, folder, tell):
             folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:
         solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
+    if scene.throw is not None:
+        solution.throw = _throw(simulation, run, ended, simulation.compared(folder))
+
+
+def _throw(simulation, run, ended, rows):
+    """What came of a throw, with ± where a twin has ended."""
+    scene, watch = simulation.scene, simulation.watch
+    state, twin, factor = watch.state(run.course), None, 0.0
+    if ended is not None:
+        from .twin_error import SPREAD
+
+        twin = ended.rows, watch.state(ended.course)
+        factor = SPREAD / (1.0 - simulation.integrator.error_share(run.course, ended.course))
+    return scene.throw.found(scene.observables, rows, state, twin, factor)
 
 
 def _twin_of(simulation):

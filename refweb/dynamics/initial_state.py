@@ -49,7 +49,7 @@ def start_of(scene, system):
     """The `Start` of a scene."""
     if scene.start_folder is not None:
         return stored(system, scene.start_folder)[0]
-    return Start(equilibrium(system).x) if scene.solve.start == "equilibrium" else Start()
+    return Start(equilibrium(system).x) if scene.solve.start == "equilibrium" else Start(system.laid)
 
 
 def remarks_on(start, system):

@@ -72,7 +72,7 @@ class Simulation:
 
             self._ways = Ways(scene, system, kept)
             scene = self._ways.scene
-        self.begin, self.begin_of_twin = Start(), None
+        self.begin, self.begin_of_twin = Start(system.laid), None
         if kept is not None:
             self.begin = Start(*(kept.get(f"begin_{name}") for name in Start._fields))
             if "twin_begin_x" in kept:

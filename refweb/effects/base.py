@@ -10,7 +10,9 @@ matrix and knows no other effect.
     The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
     has no ``on`` first.
 ``start(net, supported, v)``
-    Writes initial velocities.
+    Writes initial velocities; the points of this net are where the start has them.
+``lay(net, supported)``
+    The displacement of all rows that a run starts from.
 """
 
 from __future__ import annotations

@@ -32,6 +32,12 @@ def web_of(points, lines):
     return Web(places, pairs, length, rim=rim, kind="file", names=names, groups=ends.columns.get("group"))
 
 
+def places_of(path):
+    """Positions [m] in the columns x, y and z of a file, shape (rows, 3)."""
+    found = _table(path, dict.fromkeys("xyz", True))
+    return np.column_stack([found.numbers(key) for key in "xyz"])
+
+
 class _Columns:
     """Columns of a CSV file as texts, by name."""
 

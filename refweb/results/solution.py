@@ -115,6 +115,8 @@ class SolutionData:
         for.
     events : list of dict
         Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
+    throw : dict
+        What came of a throw, see `refweb.Throw`; empty where that was not asked for.
     breaks : list of dict, optional
         Of each element that has broken, in the order in which they did, its ``line``, ``element``, ``time`` [s] and the
         ``error`` of that, the ``place`` of its middle [m] and the ``energy`` [J] that it held; None where nothing may.
@@ -137,6 +139,7 @@ class SolutionData:
     message: str = ""
     warnings: list = field(default_factory=list)
     events: list = field(default_factory=list)
+    throw: dict = field(default_factory=dict)
     breaks: list | None = None
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
@@ -184,6 +187,7 @@ class SolutionData:
             "warnings": self.warnings,
             **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
+            **({"throw": self.throw} if self.throw else {}),
             **({"horizon": self.horizon} if self.horizon else {}),
         }
 

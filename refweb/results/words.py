@@ -92,6 +92,8 @@ def on_run(summary):
         for name, r in horizon.get("ensemble", {}).items():
             text = readable(r["mean"], r["deviation"], summary["results"][name]["unit"])
             yield "", f"{name} {text} over the ensemble, standard deviation"
+    for n, (name, one) in enumerate(summary.get("throw", {}).items()):
+        yield "throw" * (n == 0), f"{name.replace('_', ' ')} {_of_throw(one)}"
     for name, body in summary.get("bodies", {}).items():
         text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
         text += f" at line {body['line']}" if body["line"] is not None else ""
@@ -153,6 +155,13 @@ def _breaks(breaks):
         yield "breaks" * (n == 0), f"line {one['line']} at t = {when}, which held {readable(one['energy'], None, 'J')}"
     if len(breaks) > FEW_BREAKS:
         yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
+
+
+def _of_throw(one):
+    """A number of a throw, or whether something is so, in words."""
+    if "unit" not in one:
+        return {True: "yes", False: "no", None: "not known"}[one["value"]]
+    return "at least " * one.get("at_least", False) + readable(one["value"], one["error"], one["unit"])
 
 
 def _horizon(horizon):

@@ -21,6 +21,7 @@ from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
 from .forces import Forces, PerCell
+from .start import initial_velocity, laid
 
 
 class System:
@@ -117,17 +118,14 @@ class System:
         """What a reader of results has to know of their factorizations, each a text."""
         return self.library.remarks if "library" in self.__dict__ else []
 
+    @cached_property
+    def laid(self):
+        """Displacement at the start [m], shape (rows, 3); None where the web starts as it is."""
+        return laid(self)
+
     def initial_velocity(self):
         """Velocities at the start [m/s], shape (rows, 3): those of the effects and bodies."""
-        v = np.zeros((self.rows, 3))
-        for effect in self.effects:
-            if hasattr(effect, "start"):
-                effect.start(self.net, self.supported, v)
-        for body in self.net.bodies:
-            v[body.row] = body.velocity
-            if body.spin is not None:
-                v[body.spin] = body.start_spin
-        return v
+        return initial_velocity(self)
 
     @property
     def lines(self):

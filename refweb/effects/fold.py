@@ -1,0 +1,123 @@
+"""A start in which the web is folded: slack, and its lines apart from each other."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+
+import numpy as np
+
+from ..errors import InputError
+from ..net.folding import refuse_unfit, turns_of, wound
+from ..tables import Several, Table, choice, nodes, real, table, text, vector
+
+
+@table
+class Fold(Table):
+    """Where the nodes of the web are at the start of a run: drawn in to a hub and wound about it, or as a file has it.
+
+    Natural lengths, and the places that displacements are counted from, stay those of ``[web]``; nodes that order and
+    subdivision add lie straight between the ends of their line. Velocities that spin are those of the folded web. All
+    lines are slack, and two that share no node are further apart than ``gap``: what is not so is refused. What is held
+    keeps its place; a web to be thrown has ``[supports] nodes = []``.
+
+    A ``"star"`` draws each node in to ``ratio`` times its distance from the hub, and winds arms, rings and what is
+    between about the axis, in proportion to that distance: the outermost node by ``turns``. Nothing is pleated.
+
+    Parameters
+    ----------
+    kind : {"star", "positions"}
+        How it is folded.
+    ratio : float
+        Of a star: distance from the hub over that in the web, 0 < ratio < 1.
+    turns : float, optional
+        Of a star: turns of the outermost node [1]; by default as many as leave the ends of every line within 0.9 of its
+        natural length.
+    hub : int or str
+        Of a star: one node, by number or name.
+    axis : sequence of 3 float
+        Of a star: its axis, of any length.
+    file : str, optional
+        Of positions: CSV file with the columns x, y and z [m], a row for each node of the web in its order, relative to
+        the scene's folder.
+    gap : float, optional
+        Distance that lines without a common node keep [m]; by default the diameter of a round line of the largest area.
+
+    Raises
+    ------
+    InputError
+        For numbers out of bounds, a key of the other kind, and an axis that is zero; from ``lay``, in statics, for a
+        hub that is not one node, a file that cannot be read or has other nodes, a supported node that would move, a
+        line that would be taut, and lines nearer than the gap.
+
+    Notes
+    -----
+    The winding is refweb's own, in `refweb.net.folding`; webs that are flown have their arms pleated and wound as well:
+    M. Gärdsback, G. Tibert, "Deployment control of spinning space webs", J. Guid. Control Dyn. 32 (2009) 40–50.
+
+    Examples
+    --------
+        [fold]
+        kind = "star"
+        ratio = 0.3
+    """
+
+    kind: str = choice("star", "positions", default="star")
+    ratio: float | None = real(default=None, above=0, unit="1")
+    turns: float | None = real(default=None, unit="1")
+    hub: Several = nodes(default=None)
+    axis: Several = vector(default=None)
+    file: str | None = text(default=None)
+    gap: float | None = real(default=None, at_least=0, unit="m")
+
+    def check(self):
+        """Refuse keys that have no meaning, and what draws nothing in."""
+        keys = ("ratio", "turns", "hub", "axis") if self.kind == "positions" else ("file",)
+        for key in keys:
+            if getattr(self, key) is not None:
+                raise InputError(f'{key} has no meaning with kind = "{self.kind}": leave it out')
+        needed = "file" if self.kind == "positions" else "ratio"
+        if getattr(self, needed) is None:
+            raise InputError(f'{needed} is missing: kind = "{self.kind}" needs it')
+        if self.ratio is not None and not self.ratio < 1.0:
+            raise InputError(f"ratio = {self.ratio:g} must be < 1: the web is drawn in")
+        if self.axis is not None and not any(self.axis):
+            raise InputError("axis = [0, 0, 0] must have a direction")
+
+    def lay(self, net, supported):
+        """Displacement of all rows at the start [m], shape (rows, 3)."""
+        if net.quasi_static:
+            raise InputError("a start that is folded cannot be used in statics: leave it out")
+        web = net.web
+        length = np.bincount(net.line, net.natural_length)
+        places = self._star(web, length) if self.kind == "star" else self._from_file(web)
+        moved = np.abs(places - web.points) > 1e-12 * np.ptp(web.points, axis=0).max()
+        for node in np.flatnonzero((moved & supported[: len(moved)]).any(axis=1))[:1]:
+            raise InputError(f"node {node} would move, and is supported: free it, such as by [supports] nodes = []")
+        gap = math.sqrt(4.0 * float(net.area.max()) / math.pi) if self.gap is None else self.gap
+        refuse_unfit(places, web.lines, length, gap)
+        x = np.zeros((len(net.points), 3))
+        start, end = (places[web.lines[net.line, side]] for side in (0, 1))
+        piece = np.arange(len(net.cells)) % net.subdivide
+        along = (piece[:, None] + net.places) / net.subdivide
+        x[net.cells] = start[:, None] + along[:, :, None] * (end - start)[:, None] - net.points[net.cells]
+        x[: len(places)] = places - web.points
+        return x
+
+    def _star(self, web, length):
+        """Places of the nodes of a star, lines having these natural lengths [m]."""
+        found = web.find("centre" if self.hub is None else self.hub, "hub")
+        if len(found) != 1:
+            raise InputError(f"hub is {len(found)} nodes, must be one")
+        size = np.linalg.norm(web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]], axis=1)
+        turns = turns_of(self.ratio, float((length / size).min())) if self.turns is None else self.turns
+        return wound(web.points, web.points[found[0]], self.axis or (0.0, 0.0, 1.0), self.ratio, turns)
+
+    def _from_file(self, web):
+        """Places of the nodes in the file."""
+        from ..net.csv_files import places_of
+
+        places = places_of(pathlib.Path(str(self.file)))
+        if len(places) != len(web.points):
+            raise InputError(f"{self.file} has {len(places)} rows, must have one for each of {len(web.points)} nodes")
+        return places

@@ -1,0 +1,209 @@
+"""Numbers of a throw: how long and how far on the mouth of a net is open, and what it covers of a target at the end."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import InputError
+from ..messages import nearest, shown
+from ..tables import Table, real, table, text
+
+UNITS = {"largest_area": "m²", "deployment_time": "s", "travelled": "m", "effective_period": "s", "covered": "1"}
+
+
+@table
+class Throw(Table):
+    """Numbers that a throw is judged by, in ``run.json`` and `Solution.throw`, each with its ±.
+
+    The definitions are refweb's own. Of the area of the mouth over time, as rows have it, with a parabola through the
+    three rows around the largest: ``largest_area``; ``deployment_time``, when that is; ``travelled``, by how much
+    another observable has changed until then; ``effective_period``, how long the area is at least ``share`` of the
+    largest around that time. What is not over at the end of the run, or was so at its start, is a lower bound, and says
+    so.
+
+    Of a ``target`` at the end of the run: ``inside``, whether its centre is in the convex hull of the web's nodes;
+    ``closed``, whether the area of the mouth is at most ``closed`` of the largest; ``covered``, the share of directions
+    from its centre that the net covers. With Ω the solid angle of the mouth, as a fan from the mean of its nodes, that
+    is 1 − Ω/4π where the centre lies on the side of the mouth that the mean of all nodes is on, and inside the hull,
+    and else Ω/4π: the net seen through its outline.
+
+    ± holds what differs in the twin run and what a history of half the rows would make of the same motion; where run
+    and twin disagree on what is inside or closed it is not known.
+
+    Parameters
+    ----------
+    area : str
+        Name of an observable of ``mouth_area``.
+    travel : str, optional
+        Name of an observable of a length, whose change is the distance travelled.
+    share : float
+        Of the largest area, from which on the net is effective, 0 < share < 1.
+    target : str, optional
+        Name of a body.
+    closed : float
+        Share of the largest area up to which the mouth is closed, 0 ≤ closed < 1.
+
+    Raises
+    ------
+    InputError
+        For numbers out of bounds; from `Scene.build`, in statics, for an observable or a body that the scene does not
+        have, and an observable of another quantity or unit.
+
+    Examples
+    --------
+        [throw]
+        area = "mouth"
+        travel = "height"
+    """
+
+    area: str = text()
+    travel: str | None = text(default=None)
+    share: float = real(default=0.8, above=0, at_most=1)
+    target: str | None = text(default=None)
+    closed: float = real(default=0.05, at_least=0, at_most=1)
+
+    def on(self, observables, system, solve):
+        """Refuse what the scene does not have."""
+        if solve.kind != "dynamic":
+            raise InputError("a throw has no meaning in statics: leave it out")
+        names = [o.name for o in observables]
+        for key in ("area", "travel"):
+            name = getattr(self, key)
+            if name is not None and name not in names:
+                raise InputError(f"{key} = {shown(name)} is not an observable, {nearest(name, names)}")
+        mouth = observables[names.index(self.area)]
+        if mouth.quantity != "mouth_area" or mouth.component is not None or mouth.average is not None:
+            raise InputError(
+                f'area = {shown(self.area)} must be an observable of quantity = "mouth_area", without component and '
+                "average"
+            )
+        if self.travel is not None and (unit := observables[names.index(self.travel)].unit) != "m":
+            raise InputError(f"travel = {shown(self.travel)} must be an observable in m, not {unit}")
+        bodies = [body.name for body in system.net.bodies]
+        if self.target is not None and self.target not in bodies:
+            hint = nearest(self.target, bodies) if bodies else "the scene has no [[body]]"
+            raise InputError(f"target = {shown(self.target)} is not a body, {hint}")
+
+    def found(self, observables, rows, state, twin=None, factor=0.0):
+        """What came of a throw, a dict of dicts for ``run.json``.
+
+        Parameters
+        ----------
+        observables : sequence of refweb.Observe
+            Those of the scene.
+        rows : ndarray, shape (rows, columns)
+            Times and, in their order, observables.
+        state : refweb.results.state.State
+            At the end.
+        twin : (ndarray, refweb.results.state.State), optional
+            The same of the twin.
+        factor : float
+            ± over what differs in the twin.
+        """
+        names = [o.name for o in observables]
+        own = self._of(rows, names)
+        half, other = self._of(rows[::2], names), None if twin is None else self._of(twin[0], names)
+        mouth = observables[names.index(self.area)].node
+        if self.target is not None:
+            own |= self._capture(state, mouth, own["largest_area"])
+            if other is not None:
+                other |= self._capture(twin[1], mouth, other["largest_area"])
+        return {name: _told(name, value, half, other, factor, own) for name, value in own.items() if name != "bounds"}
+
+    def _of(self, rows, names):
+        """Values by name; ``bounds`` are names of those that are lower bounds."""
+        times, area = rows[:, 0], rows[:, 1 + names.index(self.area)]
+        top = int(area.argmax())
+        near = slice(top - 1, top + 2) if 0 < top < len(area) - 1 else slice(top, top + 1)
+        when, largest = _vertex(times[near], area[near])
+        bounds = ["largest_area", "deployment_time", "travelled"] if top == len(area) - 1 else []
+        found = {"largest_area": largest, "deployment_time": when}
+        if self.travel is not None:
+            way = rows[:, 1 + names.index(self.travel)]
+            found["travelled"] = abs(_parabola(times[near], way[near], when) - way[0])
+        level, ends = self.share * largest, []
+        for step, edge in ((-1, 0), (1, len(area) - 1)):
+            n = top
+            while n != edge and area[n + step] >= level:
+                n += step
+            if n == edge:
+                ends.append(times[edge])
+                bounds += ["effective_period"]
+            else:
+                m = n + step
+                ends.append(times[n] + (times[m] - times[n]) * (area[n] - level) / (area[n] - area[m]))
+        return {**found, "effective_period": float(ends[1] - ends[0]), "bounds": bounds}
+
+    def _capture(self, state, mouth, largest):
+        """What the net has of the target in a state."""
+        net = state.system.net
+        (centre,) = (state.position[body.row] for body in net.bodies if body.name == self.target)
+        around, nodes = state.position[net.web.find(mouth)], state.position[: len(net.web.points)]
+        size = 0.5 * np.linalg.norm(np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0))
+        inside = in_hull(nodes, centre)
+        return {
+            "inside": inside,
+            "closed": bool(size <= self.closed * largest),
+            "covered": covered(around, nodes, centre, inside),
+        }
+
+
+def _told(name, value, half, other, factor, own):
+    """A number with its ±, or whether something is so, for ``run.json``."""
+    if isinstance(value, bool):
+        return {"value": value if other is None or other[name] == value else None}
+    error = None
+    if other is not None:
+        error = factor * abs(value - other[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value)
+    bound = {"at_least": True} if name in own["bounds"] else {}
+    return {"value": float(value), "error": None if bound else error, "unit": UNITS[name], **bound}
+
+
+def _parabola(times, values, when):
+    """Value at a time of the parabola through three values, or the only value."""
+    if len(times) == 1:
+        return float(values[0])
+    return float(np.polyval(np.polyfit(times - times[1], values, 2), when - times[1]))
+
+
+def _vertex(times, values):
+    """(Time, value) of the top of the parabola through three values, or of the only value."""
+    if len(times) == 1:
+        return float(times[0]), float(values[0])
+    a, b, c = np.polyfit(times - times[1], values, 2)
+    if not a < 0.0:
+        return float(times[1]), float(values[1])
+    return float(times[1] - 0.5 * b / a), float(c - 0.25 * b * b / a)
+
+
+def in_hull(points, place):
+    """Whether a place is in the convex hull of points; that of points in a plane has no inside."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return False
+    return bool((hull.equations[:, :3] @ place + hull.equations[:, 3] < 0.0).all())
+
+
+def solid_angle(around, centre):
+    """Size of the solid angle [sr] of a closed polygon seen from a place, as a fan from the mean of its corners.
+
+    Of each triangle after A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng.
+    30 (1983) 125–126.
+    """
+    a, b = around - centre, np.roll(around, -1, axis=0) - centre
+    c = np.broadcast_to(around.mean(axis=0) - centre, a.shape)
+    la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
+    return float(abs(2.0 * np.arctan2(volume, below).sum()))
+
+
+def covered(around, nodes, centre, inside):
+    """Share of directions from a centre that a net covers, see `Throw`."""
+    normal, middle = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0), around.mean(axis=0)
+    share = solid_angle(around, centre) / (4.0 * np.pi)
+    within = inside and ((centre - middle) @ normal) * ((nodes.mean(axis=0) - middle) @ normal) > 0.0
+    return 1.0 - share if within else share

@@ -1,0 +1,26 @@
+"""Where a system starts, as its effects and bodies have it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+
+def laid(system):
+    """Displacement at the start [m], shape (rows, 3); None where the web starts as it is."""
+    return next((e.lay(system.net, system.supported) for e in system.effects if hasattr(e, "lay")), None)
+
+
+def initial_velocity(system):
+    """Velocities at the start [m/s], shape (rows, 3): those of the effects, where the web is laid, and of bodies."""
+    v, net = np.zeros((system.rows, 3)), system.net
+    net = net if system.laid is None else replace(net, points=net.points + system.laid)
+    for effect in system.effects:
+        if hasattr(effect, "start"):
+            effect.start(net, system.supported, v)
+    for body in system.net.bodies:
+        v[body.row] = body.velocity
+        if body.spin is not None:
+            v[body.spin] = body.start_spin
+    return v
