@@ -26,7 +26,7 @@ def add_errors_of_breaks(solution, own, other, share):
             break
         off = abs(found["time"] - float(other.times[n]))
         widths = float(own.widths[n] + other.widths[n])
-        found["error"] = share * off + widths + 4.0 * np.finfo(float).eps * found["time"]
+        found["error"] = float(share * off + widths + 4.0 * np.finfo(float).eps * found["time"])
     else:
         n = len(solution.breaks)
         if len(other.elements) == n:

@@ -106,7 +106,7 @@ class Throw(Table):
         mouth = observables[names.index(self.area)].node
         if self.target is not None:
             own |= self._capture(state, mouth, own["largest_area"])
-            if other is not None:
+            if twin is not None and other is not None:
                 other |= self._capture(twin[1], mouth, other["largest_area"])
         return {name: _told(name, value, half, other, factor, own) for name, value in own.items() if name != "bounds"}
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import refweb
+import validation.dynamics.rupture as three
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.rupture import with_breaks
 from refweb.dynamics.integrators.splitting import Splitting
@@ -99,56 +100,18 @@ def test_order_across_a_break(order, counts):
         assert abs(slope - order) < 0.35  # of few steps, of which the last before the break is of any length
 
 
-SPARE = 0.02
-"""Length by which the second and third line are longer than the one before them [m]."""
-STRENGTHS = (2e7, 3e7, 4e7)
-
-
-def cascade():
-    """(Times of the breaks, last velocity) of three lines side by side, one after another taut: stretch y and speed w.
-
-    Between events the mass swings about the stretch at which the taut lines would be slack together.
-    """
-    naturals = 1.0 + SPARE * np.arange(3)
-    stiffness = STIFF / naturals
-    limits = naturals * (1.0 + np.array(STRENGTHS) / E) - 1.0  # place below −1 m at which each breaks
-    y, w, t, times = 0.0, SPEED, 0.0, [None] * 3
-    marks = sorted([(naturals[i] - 1.0, i, "taut") for i in range(3)] + [(limits[i], i, "breaks") for i in range(3)])
-    taut = set()
-    for place, i, what in marks:
-        k = sum(stiffness[j] for j in taut)
-        if k == 0.0:
-            t += (place - y) / w
-        else:
-            middle, rate = sum(stiffness[j] * (naturals[j] - 1.0) for j in taut) / k, np.sqrt(k / MASS)
-            size = np.hypot(y - middle, w / rate)
-            phase = np.arctan2(w / rate, y - middle)
-            later = np.arccos((place - middle) / size)
-            t += (phase - later) / rate
-            w = rate * size * np.sin(later)
-        y = place
-        if what == "taut":
-            taut.add(i)
-        else:
-            taut.remove(i)
-            times[i] = t
-    return times, w
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_cascade_of_three_lines(method):
     """Lines side by side of other lengths and strengths: one after another is taut and breaks; in closed form."""
-    groups = {f"line {i}": GroupRupture(strength=strength) for i, strength in enumerate(STRENGTHS)}
-    lengths = (1.0 + SPARE * np.arange(3)).tolist()
-    solution = refweb.run(thrown(lengths, [Rupture(groups=groups)], method=method))
-    times, speed = cascade()
+    solution = refweb.run(three.thrown(three.LENGTHS, three.STRENGTHS, method))
+    times, speed = three.cascade()
     assert [one["line"] for one in solution.breaks] == [0, 1, 2]
     for one, moment in zip(solution.breaks, times, strict=True):
         assert abs(one["time"] - moment) < one["error"]
     assert abs(solution.results["speed"].value + speed) < solution.results["speed"].error
-    held = sum(0.5 * s**2 / E * AREA * length for s, length in zip(STRENGTHS, lengths, strict=True))
+    held = sum(map(three.held, three.LENGTHS, three.STRENGTHS))
     np.testing.assert_allclose(0.5 * MASS * (SPEED**2 - speed**2), held, rtol=1e-12)  # the closed form by energies
-    np.testing.assert_allclose(solution.results["held"].value, held, rtol=1e-9)
+    np.testing.assert_allclose(solution.results["held"].value, held, rtol=1e-8)
     close_books(solution)
 
 

@@ -40,6 +40,13 @@ AROUND = {
     "temperature.groups": {"temperature": {"expansion": 1e-6, "change": 0.0}},
     "link": {"solve": {**SCENE["solve"], "method": "ida"}},
     "bending": {"cable": {**SCENE["cable"], "subdivide": 2}},
+    "fold": {"supports": {"nodes": []}},
+    "throw": {
+        "observe": [
+            {"name": "mouth", "quantity": "mouth_area", "node": [0, 1, 2]},
+            {"name": "height", "quantity": "position", "node": 0, "component": "z"},
+        ]
+    },
 }
 """What examples need besides the net."""
 

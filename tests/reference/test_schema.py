@@ -45,7 +45,23 @@ NUMBERS = [
     1001,
 ]
 NUMBERS += [1e100, 2e100, -2e100, 10_000, 10_001, 2**63 - 1, True, False]
-TEXTS = ["", " ", "x", "w", "web", "smooth", "newton", "cvode", "auto", "sphere", "distance", "stress", "max", "a" * 81]
+TEXTS = [
+    "star",
+    "",
+    " ",
+    "x",
+    "w",
+    "web",
+    "smooth",
+    "newton",
+    "cvode",
+    "auto",
+    "sphere",
+    "distance",
+    "stress",
+    "max",
+    "a" * 81,
+]
 TEXTS += ["a" * 201, "a" * 4097, "contact", "twin", "lumped", "bdf", "dynamic", "static", "square", *WEBS]
 LISTS_OF = [
     [],

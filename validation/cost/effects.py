@@ -54,6 +54,7 @@ EFFECTS = {
     "frame": {"frame": {"angular_velocity": [0.0, 0.0, 1.0]}},
     "drag": {"drag": {"density": 1.2}},
     "orbit": {"orbit": {"mean_motion": 1.1e-3}},
+    "rupture": {"rupture": {"strength": 1e12}},
     "pressure": {"pressure": [{"lines": "all", "normal": [0.0, 0.0, 1.0], "value": 0.1}]},
     "thrust": {"thrust": [{"node": 0, "line": 0, "force": 1.0}]},
     "damping, time": {"damping": {"time": 1e-5}},

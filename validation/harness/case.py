@@ -68,6 +68,7 @@ CASES = {
         "falling_chain",
         "spinning_arm",
         "orbit",
+        "rupture",
         "frequencies",
         "free_net",
         "tumbling",

@@ -6,8 +6,8 @@ with every observable, from a second run of its own at a neighbouring accuracy; 
 of theirs. The errors of peaks of stress are large because a peak is the highest of many waves that meet, and which one
 that is changes with every digit.
 
-Effects that no impact has stand in a small thrown net, an orbit much faster than any among them, so that it shows; its
-three methods have to agree as well.
+Effects that no impact has stand in a small thrown net, an orbit much faster than any among them, so that it shows, and
+lines so weak that some break; its three methods have to agree as well, on which lines these are, and when.
 
 Where nothing is hit there are digits to compare: 1 kg thrown at 1 m/s from the centre of a square web (smooth law,
 η = 1e-4). Central differences of two step sizes, extrapolated by their order 2, CVODE at rtol = 1e-10 and the explicit
@@ -51,7 +51,11 @@ SMALL = {
         {"name": "height", "quantity": "displacement", "node": "centre", "component": "z"},
     ],
 }
-EFFECTS = {"orbit": {"mean_motion": 2.0}, "drag": {"density": 100.0, "wind": [0.5, 0.0, 0.0]}}
+EFFECTS = {
+    "orbit": {"mean_motion": 2.0},
+    "drag": {"density": 100.0, "wind": [0.5, 0.0, 0.0]},
+    "rupture": {"strength": 2.3e4},
+}
 """The small net, and what it has one at a time."""
 END = 0.03
 """Duration of the quick impact [s]: the ball has hit, and the centre follows it."""
@@ -87,6 +91,26 @@ def compared(name, found):
                 f"± {one.error:.2g} and ± {other.error:.2g}, added",
                 one.unit,
                 one.error,
+            )
+
+
+def broken(name, found):
+    """Rows for the breaks of each pair of methods: which lines they are, in their order, and when."""
+    for first, second in itertools.combinations(found, 2):
+        one, other = (found[method].breaks for method in (first, second))
+        same = [b["line"] for b in one] == [b["line"] for b in other]
+        row = f"{name}, lines that break as by the other, by {first}"
+        yield Row(row, len(one) if same else -1, len(other), second, 0.0, "the same lines in the same order")
+        for n, (a, b) in enumerate(zip(one, other, strict=False) if same else (), 1):
+            yield Row(
+                f"{name}, break {n} by {first}",
+                a["time"],
+                b["time"],
+                second,
+                (a["error"] + b["error"]) / b["time"],
+                f"± {a['error']:.2g} and ± {b['error']:.2g}, added",
+                "s",
+                a["error"],
             )
 
 
@@ -163,7 +187,10 @@ def drawing(name, found):
 def case(quick):
     rows, figures = list(digits(quick)), []
     for name in EFFECTS:
-        rows += compared(f"net with [{name}]", with_effect(name, quick))
+        found = with_effect(name, quick)
+        rows += compared(f"net with [{name}]", found)
+        if name == "rupture":
+            rows += broken(f"net with [{name}]", found)
     for name in IMPACTS[:1] if quick else IMPACTS:
         found = solutions(name, quick)
         rows += compared(name, found)
