@@ -94,7 +94,7 @@ def test_stopping_distance():
         np.testing.assert_allclose(results["height"].value - 5.0, length * np.log(2.0), rtol=1e-4)
 
 
-@pytest.mark.parametrize("keys", [{"safety": 0.1}, {"method": "cvode"}, {"method": "ida"}])
+@pytest.mark.parametrize("keys", [{"step_size": 3e-4}, {"method": "cvode"}, {"method": "ida"}])
 def test_wind_does_work(keys):
     """A ball at rest is carried along: ½ m v², v = u² t/(l + u t), is booked as work, and nothing as dissipated."""
     wind, end = 4.0, 0.3
@@ -102,9 +102,9 @@ def test_wind_does_work(keys):
     length = MASS / OWN
     speed = wind**2 * end / (length + wind * end)
     work, kinetic = solution.history["work"][-1], solution.history["kinetic_energy"][-1]
-    np.testing.assert_allclose(solution.results["speed"].value, speed, rtol=2e-3)  # of steps of the line's bound
-    np.testing.assert_allclose(work, kinetic, rtol=2e-3)
-    assert "dissipated_energy" not in solution.history and solution.solver["energy_drift"] < 2e-3
+    np.testing.assert_allclose(solution.results["speed"].value, speed, rtol=1e-3)  # of order 2: 1000 steps
+    np.testing.assert_allclose(work, kinetic, rtol=1e-3)
+    assert "dissipated_energy" not in solution.history and solution.solver["energy_drift"] < 1e-3
 
 
 def test_steps_are_not_limited_by_drag():
