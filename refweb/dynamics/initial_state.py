@@ -8,7 +8,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..messages import short
-from ..net.rigid_body import row_names
+from ..net.rigid_body import matrix_of, row_names
+from ..net.rotation import quaternion_of
 
 OFF = 1e-9
 """Distance from its place at which a support is told of, over the size of the web."""
@@ -112,7 +113,8 @@ _STATE = ("positions", "displacements", "velocities", "bodies")
 def stored(system, folder):
     """The `Start` that the checkpoint in a result folder holds, and that of its twin, None where there was none.
 
-    Nodes are matched by number, bodies by name; a body that the folder does not have stays as its table says.
+    Nodes are matched by number, bodies by name; a body that the folder does not have stays as its table says. Bodies
+    stand and turn as they did there, whatever axes their tables give them to begin with.
 
     Raises
     ------
@@ -140,15 +142,56 @@ def stored(system, folder):
     broken = given.get("broken", np.zeros(0, dtype=np.int64))
     if len(broken) and system.weakness is None:
         raise InputError(f"{name} line {net.line[broken[0]]} is broken there: this scene needs a [rupture]")
-    start = _start_at(system, positions, displacements, velocities, bodies)
+    bearings = _bearings(system, given, bodies, name)
+    start = _start_at(system, positions, displacements, velocities, bodies, bearings)
     start = start._replace(broken=broken if len(broken) else None)
     x, v = (given.get(f"twin_{one}") for one in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
-    return start, _start_at(system, positions - displacements + x, x, v, bodies)
+    return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings)
 
 
-def _start_at(system, positions, displacements, velocities, bodies):
+def _bearings(system, given, bodies, name):
+    """(axes, inertia, offset) that bodies which turn in space, here or there, began with in a checkpoint, by name."""
+    known, found = [str(body) for body in bodies], {}
+    for body in system.net.bodies:
+        spins = body.spin is not None and f"{body.name}.spin" in known
+        if not spins or body.turn is None and f"{body.name}.turn" not in known:
+            continue
+        try:
+            own = (given[f"body_{key}"][known.index(body.name)] for key in ("axes", "inertia", "offset"))
+            found[body.name] = tuple(own)
+        except (KeyError, IndexError):
+            raise InputError(
+                f'{name} checkpoint.npz does not say which axes body "{body.name}" began with: run that again'
+            ) from None
+    return found
+
+
+def _turn(body, bearing, there, x, v):
+    """Write how a body stands and turns: its axes, the centre of its shape and their motion are those of another start.
+
+    ``there`` has (displacement, velocity) of that one's rows of rotation; x and v of its own rows are those of its row.
+    """
+    axes, inertia, offset = bearing
+    (vector, spin), *last = there
+    if last:
+        now = axes @ matrix_of((1.0 + last[0][0][0], *vector)).T
+        omega = now.T @ np.linalg.solve(inertia, now @ spin) * np.linalg.eigvalsh(inertia)[-1]
+    else:
+        now, omega = axes, spin
+    if body.turn is None:  # a sphere looks the same
+        x[body.spin], v[body.spin] = 0.0, omega
+    else:
+        quaternion = quaternion_of(now.T @ body.axes)
+        x[body.turn, 0], x[body.spin] = quaternion[0] - 1.0, quaternion[1:]
+        v[body.turn], v[body.spin] = 0.0, now.T @ (body.inertia @ (now @ omega)) / body.moment
+    shift = (offset - body.offset) @ now
+    x[body.row] += shift
+    v[body.row] += np.cross(omega, shift)
+
+
+def _start_at(system, positions, displacements, velocities, bodies, bearings):
     """The `Start` of a system at what a checkpoint has of nodes and, behind them, of bodies with their names."""
     net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
@@ -164,4 +207,12 @@ def _start_at(system, positions, displacements, velocities, bodies):
     v[here] = velocities[there]
     told = own_velocity.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
     v[told] = own_velocity[told]
+    for body in net.bodies:
+        if body.name not in bearings:
+            continue
+        own, rows = (body.axes, body.inertia, body.offset), (f"{body.name}.spin", f"{body.name}.turn")
+        there = [(displacements[row[name]], velocities[row[name]]) for name in rows if name in row]
+        alike = (np.array_equal(one, other) for one, other in zip(bearings[body.name], own, strict=True))
+        if (len(there) == 2) != (body.turn is not None) or not all(alike):
+            _turn(body, bearings[body.name], there, x, v)
     return Start(x, v)

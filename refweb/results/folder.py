@@ -294,6 +294,8 @@ class Folder:
             arrays = {"time": state.time, "positions": state.position, "displacements": state.x, "velocities": state.v}
             arrays |= {"supported": state.system.held, "bodies": np.array(row_names(net.bodies), dtype=str)}
             arrays |= {"lines": net.web.lines, "scene": self._scene}
+            for key in ("axes", "inertia", "offset") if net.bodies else ():
+                arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
             if state.system.weakness is not None:
                 arrays |= {
                     "broken": net.broken,

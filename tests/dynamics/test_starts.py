@@ -9,6 +9,7 @@ import tomli_w
 
 import refweb
 from refweb.__main__ import main
+from refweb.dynamics.initial_state import stored
 
 GRAVITY = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
 PULL = (0.3, 0.0, -2.0)
@@ -415,3 +416,65 @@ def test_errors_are_three_times_what_is_off():
     end = 30.0 * 2.0 * np.pi / np.sqrt(8e4 / 2.0)
     value, error = refweb.run(swing(end, safety=0.1)).results["x"][:2]
     assert 2.8 < error / abs(value) < 3.2
+
+
+def tumbler(start="web", nodes=(), **changes):
+    """A box that tumbles, or a ball, alone but for nodes that it carries, beside a web that is held."""
+    given = dict(name="box", shape="box", size=(0.3, 0.2, 0.1), mass=1.0, position=(0.0, 0.0, 1.0))
+    given |= dict(velocity=(0.1, 0.2, 0.3), angular_velocity=(1.0, 5.0, -2.0), inertia=(0.01, 0.02, 0.025))
+    given |= changes
+    effects = [refweb.Body(**{key: value for key, value in given.items() if value is not None})]
+    effects += [refweb.Attach(body="box", node=node, point=(0.1 * node - 0.4, 0.1, 0.05)) for node in nodes]
+    points = [[0, 0, 0], [1, 0, 0], [5, 0, 1], [5, 1, 1]]
+    web = refweb.Inline(points=points, lines=[[0, 1], [2, 3]], supports=[0, 1])
+    law = refweb.Cable(law="tension-only", modulus=1e-9, area=1e-4, density=1000.0)  # next to no force
+    return scene(start, effects, 0.1, web=web, cable=law, supports=refweb.Supports(nodes=[0, 1]))
+
+
+def standing(solution):
+    """(axes, angular velocity, place and velocity of the centre of the shape) at the end."""
+    state, (body,) = solution.state, solution.state.system.net.bodies
+    R, omega = body.rotation(state.x), body.turning(state.x, state.v)
+    arm = R @ (body.offset @ body.axes)
+    place, speed = state.position[body.row] + arm, state.v[body.row] + np.cross(omega, arm)
+    return body.axes @ R.T, omega, place, speed
+
+
+def test_bodies_that_tumble_go_on_whatever_axes_their_tables_have(tmp_path):
+    """They stand and turn as they did there: by other axes to begin with, and by none given."""
+    refweb.run(tumbler(), out=tmp_path / "half")
+    turned = dict(orientation=(1.0, 2.0, -3.0, 0.5), angular_velocity=(9.0, 9.0, 9.0))
+    ends = [standing(refweb.run(tumbler(tmp_path / "half", **changes))) for changes in ({}, turned)]
+    whole = standing(refweb.run(tumbler().replace(solve=refweb.Dynamic(duration=0.2))))
+    for end in ends:
+        for one, other in zip(end, whole, strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-11)
+
+
+def test_bodies_go_on_where_they_lose_or_take_nodes(tmp_path):
+    """Centre, axes and their motion are those there, though the row is another centre of mass; of a ball as well."""
+    for own in ({}, dict(shape="sphere", size=None, radius=0.2, inertia=None)):
+        for before, after in (((2, 3), ()), ((), (2, 3)), ((2,), (2, 3))):
+            folder = tmp_path / f"{len(own)}-{len(before)}-{len(after)}"
+            was = standing(refweb.run(tumbler("web", before, **own), out=folder))
+            system = tumbler("web", after, **own).build()
+            start = stored(system, folder)[0]
+            (body,) = system.net.bodies
+            R, omega = body.rotation(start.x), body.turning(start.x, start.v)
+            arm = R @ (body.offset @ body.axes)
+            place = system.net.points[body.row] + start.x[body.row] + arm
+            np.testing.assert_allclose(place, was[2], rtol=0, atol=1e-13)
+            np.testing.assert_allclose(omega, was[1], rtol=0, atol=1e-12)
+            np.testing.assert_allclose(start.v[body.row] + np.cross(omega, arm), was[3], rtol=0, atol=1e-12)
+            if not own:
+                np.testing.assert_allclose(body.axes @ R.T, was[0], rtol=0, atol=1e-12)
+
+
+def test_a_folder_that_does_not_say_how_bodies_stood_is_refused(tmp_path):
+    refweb.run(tumbler(), out=tmp_path / "old")
+    path = tmp_path / "old" / "checkpoint.npz"
+    with np.load(path) as archive:
+        arrays = {key: archive[key] for key in archive if key != "body_axes"}
+    np.savez(path, **arrays)
+    with pytest.raises(refweb.InputError, match='does not say which axes body "box" began with: run that again'):
+        refweb.run(tumbler(tmp_path / "old"))
