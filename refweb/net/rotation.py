@@ -155,7 +155,7 @@ class Turns(NamedTuple):
             arms=arms,
             ahead=_exact(np.array(ahead).reshape(-1, 3), arms),
             scales=np.array(
-                [row for body in bodies for row in _scales(body, net.mass[body.row], net.mass[net.heavy])]
+                [row for body in bodies for row in _scales(body, net)]
             ).reshape(-1, 3),
         )
 
@@ -166,8 +166,8 @@ def _exact(a, b):
     return np.where(np.abs(total) > 1e-13 * np.abs(a).max(initial=0.0), total, 0.0)
 
 
-def _scales(body, own, mass):
-    """What makes rates of the nodes of a body its own, see `carry_rates`, by all masses [kg]; shape (carried, 3)."""
+def _scales(body, net):
+    """What makes rates of the nodes that a body of a net carries its own, see `carry_rates`; shape (carried, 3)."""
     if not body.carried:
         return np.zeros((0, 3))
     size, axes = np.linalg.eigh(body.mobility)
@@ -175,7 +175,7 @@ def _scales(body, own, mass):
     across = [np.cross(np.eye(3), point) @ root for point in body.points]
     pulls = [[root @ (p[k] * np.eye(3) - np.outer(p, np.eye(3)[k])) @ root for k in range(3)] for p in body.points]
     lever = np.linalg.norm(across, 2, axis=(1, 2))
-    light = mass.min()
+    light, own = net.mass[net.heavy].min(), net.mass[body.row]
     angle = min(0.5 / max(float(lever.max()), 1e-300), math.sqrt(light / body.moment))
     place = min(0.5, math.sqrt(light / own))
     pull = np.linalg.norm(np.linalg.norm(pulls, 2, axis=(2, 3)), axis=1)

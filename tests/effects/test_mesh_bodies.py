@@ -10,6 +10,7 @@ import pytest
 import solids
 
 import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.contact.several import share_out
 
 SIZE, ROUND = (0.3, 0.4, 0.24), 0.08
@@ -298,3 +299,50 @@ assert not found and "pyvista" not in sys.modules and "meshio" not in sys.module
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("name", ["ell", "torus"])
+@pytest.mark.parametrize("mass", [1e-2, 10.0])
+def test_bound_bounds(files, name, mass):
+    """2/ω of the tangent is never below the bound, wherever a line lies in a body that is not convex and turns."""
+    web = refweb.Inline(points=[[-0.5, 0, 0], [0.5, 0, 0]], lines=[[0, 1]], supports=[]).web()
+    body = refweb.Body(name="it", shape="mesh", file=files[name], position=(0.0, 0.0, 0.0), axes=AXES, mass=mass)
+    cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1e6)
+    system = nets.system(web, cable, [body, refweb.Contact(stiffness=1e3)], False)
+    (body,), free = system.net.bodies, system.free
+    method, touched = CentralDifference(system), 0
+    inverse, at = np.diag(1.0 / np.repeat(system.net.mass, 3)[free]), 3 * body.spin + np.arange(3)
+    inverse[np.ix_(at, at)] = body.axes.T @ np.linalg.inv(body.inertia) @ body.axes
+    for x in deep_states(system, 60):
+        K = system.pattern.matrix(system.stiffness(0.0, x)).toarray()
+        K[:, at] *= 0.5  # of angles: at the start a quaternion has half of them
+        largest = np.linalg.eigvals(inverse @ K).real.max()
+        if largest > 0.0:
+            touched += 1
+            assert method.bound(x, reach=0.0) <= 2.0 / np.sqrt(largest) * (1.0 + 1e-9)
+    assert touched > 20
+
+
+def test_implicit_methods_follow_a_free_mesh(files):
+    """CVODE and IDA find the motion of small explicit steps, of a body that is not convex and tumbles into a net."""
+
+    def end(**solve):
+        scene = caught(shape="mesh", file=files["ell"], position=[0.02, -0.03, 0.2])
+        solution = refweb.run(scene.replace(solve=refweb.Dynamic(duration=0.03, **solve)))
+        assert solution.results["push"].value > 10.0
+        return solution.state
+
+    one = end(step_size=5e-6)
+    for keys in (dict(method="cvode", rtol=1e-6), dict(method="ida", rtol=1e-6)):
+        other = end(**keys)
+        np.testing.assert_allclose(other.x, one.x, rtol=0, atol=1e-4, err_msg=str(keys))
+
+
+def test_a_resumed_run_of_a_free_mesh_is_the_same(files, tmp_path):
+    scene = caught(shape="mesh", file=files["ell"])
+    whole = refweb.run(scene, tmp_path / "whole")
+    nets.interrupt(scene, tmp_path / "part")
+    resumed = refweb.resume(tmp_path / "part")
+    assert whole.history["contact_energy"].max() > 0.0
+    np.testing.assert_array_equal(resumed.state.x, whole.state.x)
+    np.testing.assert_array_equal(resumed.state.v, whole.state.v)
