@@ -154,9 +154,7 @@ class Turns(NamedTuple):
             carried=np.array(carried, dtype=np.int64).reshape(-1, 2),
             arms=arms,
             ahead=_exact(np.array(ahead).reshape(-1, 3), arms),
-            scales=np.array(
-                [row for body in bodies for row in _scales(body, net)]
-            ).reshape(-1, 3),
+            scales=np.array([row for body in bodies for row in _scales(body, net)]).reshape(-1, 3),
         )
 
 

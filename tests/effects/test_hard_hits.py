@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
 
 SIDE, ROUND, SPEED, MASS = 0.2, 0.01, 2.0, 1.0
 ON_EDGE = [[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]]
@@ -109,9 +110,13 @@ def test_a_thin_plate_at_50_metres_a_second(name):
 
 
 @pytest.mark.slow
-def test_a_body_at_rest_on_a_net_stays_so(tmp_path):
-    """A box that damping has brought to rest, then 1e5 steps without: no energy creeps in, nor does it turn."""
-    box = dict(name="box", shape="box", size=[0.3, 0.25, 0.2], rounding=0.02, mass=1.0, position=[0.01, 0.02, 0.11])
+def test_no_energy_creeps_into_a_body_at_rest_on_a_net(tmp_path):
+    """A box that losses have brought to rest in a net, then 1e5 steps with friction, and without any losses.
+
+    Friction holds it. Without it a box in a bowl of lines is not stable: it begins to slide and tilt, and what it gains
+    of kinetic energy it loses of the others, within errors that fall with the square of the step and do not grow.
+    """
+    box = dict(name="box", shape="box", size=[0.3, 0.25, 0.2], rounding=0.02, mass=1.0, position=[0.0, 0.0, 0.09])
     tables = {
         "web": {"kind": "window", "mesh": "square", "rows": 5, "columns": 5, "side": 0.15},
         "cable": {"law": "linear", "modulus": 1e7, "area": 1e-5, "density": 1000.0},
@@ -120,21 +125,27 @@ def test_a_body_at_rest_on_a_net_stays_so(tmp_path):
         "contact": {"stiffness": 2e3},
         "accuracy": {"error": "none"},
     }
-    damped = {**tables, "damping": {"time": 2e-3, "rate": 5.0}, "contact": {"stiffness": 2e3, "damping": 2.0}}
-    damped |= {"solve": {"kind": "dynamic", "duration": 6.0}, "output": {"interval": 0.1, "frames": 1}}
-    refweb.run(refweb.Scene.from_dict(damped), tmp_path / "rest")
-    first = refweb.Scene.from_dict({**tables, "solve": {"kind": "dynamic", "duration": 1.0}})
-    from refweb.dynamics.integrators.central_difference import CentralDifference
-
-    step = 0.5 * CentralDifference(first.build()).bound()
-    solve = {"kind": "dynamic", "duration": 1e5 * step, "step_size": step, "start": str(tmp_path / "rest")}
-    output = {"interval": 1e3 * step, "frames": 1}
-    solution = refweb.run(refweb.Scene.from_dict({**tables, "solve": solve, "output": output}))
-    history = solution.history
-    energy = np.asarray(history["total_energy"])
-    kinetic = np.asarray(history["kinetic_energy"])
-    stored = np.abs(np.asarray(history["contact_energy"])).max()
-    assert solution.solver["nsteps"] >= 1e5 * (1.0 - 1e-9)
-    assert np.abs(energy - energy[0]).max() < 1e-4 * max(kinetic.max(), 1e-12 * stored) + 1e-13 * np.abs(energy).max()
-    half = len(kinetic) // 2
-    assert kinetic[half:].max() < 2.0 * kinetic[:half].max() + 1e-12 * stored
+    losses = {"damping": {"time": 2e-3, "rate": 30.0}, "contact": {"stiffness": 2e3, "damping": 5.0, "friction": 0.3}}
+    solve = {"kind": "dynamic", "duration": 6.0}
+    first = {**tables, **losses, "solve": solve, "output": {"interval": 0.1, "frames": 1}}
+    at_rest = refweb.run(refweb.Scene.from_dict(first), tmp_path / "rest")
+    assert at_rest.history["kinetic_energy"][-1] < 1e-8
+    bound = CentralDifference(refweb.Scene.from_dict({**tables, "solve": solve}).build()).bound()
+    worst = []
+    for share, contact in ((0.5, {}), (0.25, {}), (0.5, {"friction": 0.3})):
+        step, count = share * bound, round(0.5 / share * 1e5)
+        own = {"kind": "dynamic", "duration": count * step, "step_size": step, "start": str(tmp_path / "rest")}
+        given = {**tables, "contact": {"stiffness": 2e3, **contact}, "solve": own}
+        solution = refweb.run(refweb.Scene.from_dict({**given, "output": {"interval": 1e3 * step, "frames": 1}}))
+        assert solution.solver["nsteps"] >= 1e5 - 1
+        history = solution.history
+        off = np.abs(np.asarray(history["total_energy"]) - history["total_energy"][0])
+        kinetic = np.asarray(history["kinetic_energy"])
+        if contact:
+            assert kinetic.max() < 1e-8 and off.max() < 1e-8
+        else:
+            worst.append(off.max())
+            half = len(off) // 2
+            assert kinetic.max() > 1e-4 and off.max() < 1e-5 * kinetic.max()
+            assert off[half:].max() < 4.0 * off[:half].max() + 1e-9
+    assert worst[1] < 0.5 * worst[0]
