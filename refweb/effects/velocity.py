@@ -57,9 +57,11 @@ class Velocity(Table):
         """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""
         if net.quasi_static:
             raise InputError("a velocity cannot be used in statics: leave it out")
-        value, spin = np.array(self.value or (0.0, 0.0, 0.0)), self.spin or (0.0, 0.0, 0.0)
-        for node in net.find(self.node):
-            velocity = value + np.cross(spin, net.points[node] - self.about)
+        found = net.find(self.node)
+        velocities = np.tile(np.array(self.value or (0.0, 0.0, 0.0)), (len(found), 1))
+        if self.spin is not None:
+            velocities += np.cross(self.spin, net.points[found] - self.about)
+        for node, velocity in zip(found, velocities, strict=True):
             allowed = [axis for axis in range(3) if not supported[node, axis]]
             stopped = [axis for axis in range(3) if supported[node, axis] and velocity[axis] != 0.0]
             if stopped and self.node != "all":
