@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
-from refweb.effects.contact.rubbing import DAMPING, FRICTION, THETA, fitted
+from refweb.effects.contact.rubbing import CELL, DAMPING, FRICTION, ROWS, SHARES, THETA, fitted
 
 GRAVITY = 9.81
 SLIPS = (1e-9, 1e-4, 1e-2, 1.0)
@@ -80,12 +80,16 @@ class Kick:
 
     def by_law(self, column):
         """The forces of all contacts as the law has them at the velocities that each sees, with its own θ."""
-        total = np.zeros_like(self.f)
-        for touch in self.touches[: self.count]:
-            n, theta = int(touch[0]), touch[column]
-            seen = (1.0 - theta) * self.v + theta * self.after
-            one = self.family.cells[n : n + 1], self.family.data[n : n + 1], np.zeros((1, 1))
-            self.family.force(0.0, self.x, seen, total, *one)
+        total, touches = np.zeros_like(self.f), self.touches[: self.count]
+        for n, rows in enumerate(self.family.cells):
+            own = touches[:, CELL] == n
+            nodes = np.where(touches[:, SHARES] == 1.0, touches[:, ROWS], touches[:, ROWS + 1])
+            at_node = (touches[:, SHARES : SHARES + 2] == 1.0).any(axis=1) & np.isin(nodes, rows[:2])
+            for touch in touches[own if own.any() else at_node]:  # lines that end at a node touch there as one
+                theta = touch[column]
+                seen = (1.0 - theta) * self.v + theta * self.after
+                one = self.family.cells[n : n + 1], self.family.data[n : n + 1], np.zeros((1, 1))
+                self.family.force(0.0, self.x, seen, total, *one)
         return total
 
 

@@ -14,10 +14,12 @@ ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
 SWEEPS = 8
 """Largest number of sweeps over contacts in a step, which goes on where that before it came to. Where slip is resolved,
-the eighth changes velocities by 1e-10 of the fastest, and by 1e-6 in a first step. Of many contacts that stick to one
-body hundreds of sweeps do not settle which of them bears how much: what is left moves nothing but their creep below the
-slip velocity, and the book closes without. A web of 288 lines that comes to rest on a table takes 0.45 to 0.8 of the
-time of 32 sweeps, for slip velocities from 1e-9 to 1e-2 m/s."""
+the eighth changes velocities by 1e-10 of the fastest, and by 1e-6 in a first step."""
+STALLED, STILL = 0.5, 0.95
+"""Share of the change of the sweep before at which another is of no use; the same where forces that are iterated with
+them may settle as slowly, behind `SWEEPS` rounds. A line that sticks at its ends and in between has many ways to share
+what it bears, and hundreds of sweeps do not settle which: two in turn differ by a few hundredths. What is left moves
+nothing but its creep below the slip velocity, and the book closes without."""
 SETTLED = 1e-12
 """Change of velocities, over the fastest and over what other forces give, at which sweeps over contacts end."""
 
@@ -167,8 +169,11 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
             rubbed.memories[m][:] = 0.0
         rubbed.recalls[m](number, rubbed.memories[m], f, touches, begin, ends[m])
         begin = ends[m]
+    change, stalled, patience = math.inf, STALLED, 1 if number > 1 else SWEEPS
+    if viscous.size:
+        stalled, patience = STILL, SWEEPS
     for n in range(ROUNDS if viscous.size else SWEEPS if count else 0):
-        change = 0.0
+        before, change = change, 0.0
         if viscous.size:
             for q in range(flat_f.size):
                 flat_f[q] -= flat_extra[q]
@@ -185,7 +190,7 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
             for q in range(flat_v.size):
                 speed = flat_half[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
                 change, flat_v[q] = max(change, abs(speed - flat_v[q])), speed
-        if not change > SETTLED * fastest:
+        if not change > SETTLED * fastest or (n >= patience and change > stalled * before):
             break
     last_kick(0.5 * h, flat_inverse, flat_half, flat_f)
     copy_rows(half, v)

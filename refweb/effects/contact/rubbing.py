@@ -23,6 +23,9 @@ takes the slip away instead of turning it round: θ(z) = 1/(1 − e⁻ᶻ) − 1
 power at v = ½ (v⁻ + v⁺), and this power is what is booked: it closes the book whether sweeps have converged or not.
 Where it would be positive at a contact, whose slip turns round within the kick, θ is ½ there: F(u)·u is never positive.
 
+Lines that end at one node touch a body there at one point, with one normal and one slip. They are one contact of their
+pushes together: its forces are the sum of theirs, and sweeps need not settle which of them bears how much.
+
 References
 ----------
 .. [1] M. Jean, "The non-smooth contact dynamics method", Comput. Methods Appl. Mech. Engrg. 177 (1999) 235–257,
@@ -33,6 +36,7 @@ from __future__ import annotations
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,8 +59,8 @@ FORCE, THETA, SLOT, ARMS, WIDTH = 37, 40, 42, 43, 52
 each direction adds to the moment on the body; number of columns."""
 SLOTS, NOTED = 3, 4
 """Contacts that a cell has at most, and what is remembered of each: the number of the step, and F [N]."""
-SETTLING = 2
-"""Number of sweeps after which θ stays."""
+SETTLING = 1
+"""Number of sweeps after which θ stays: forces of the step before are known, and a second changes nothing."""
 
 
 @kernel()
@@ -116,7 +120,7 @@ def moved(touches, n, i, f, inverse):
     return total
 
 
-@kernel()
+@kernel(forceinline=True)
 def push_apart(touches, n, p, q, s, f):
     """Add a force along the three directions to the rows of a contact."""
     a, b, body, spin = rows_of(touches, n)
@@ -129,36 +133,29 @@ def push_apart(touches, n, p, q, s, f):
             f[spin, k] += p * touches[n, ARMS + k] + q * touches[n, ARMS + 3 + k] + s * touches[n, ARMS + 6 + k]
 
 
-@kernel()
-def weigh(touches, n, i, j, inverse):
-    """J M⁻¹ Jᵀ between two directions [1/kg]."""
-    a, b, body, spin = rows_of(touches, n)
-    total = 0.0
-    for k in range(3):
-        point = touches[n, SHARES] ** 2 * inverse[a, k] + touches[n, SHARES + 1] ** 2 * inverse[b, k] + inverse[body, k]
-        total += touches[n, AXES + 3 * i + k] * touches[n, AXES + 3 * j + k] * point
-        if spin >= 0:
-            total += touches[n, ARMS + 3 * i + k] * touches[n, LEVERS + 3 * j + k] * inverse[spin, k]
-    return total
+class Direction(NamedTuple):
+    """A direction of a contact.
+
+    Attributes
+    ----------
+    axis : tuple of 3 float
+        Unit vector.
+    lever : tuple of 3 float
+        What the velocity of the rotation adds to u along it.
+    arm : tuple of 3 float
+        What a force along it adds to the moment on the body.
+    """
+
+    axis: tuple
+    lever: tuple
+    arm: tuple
 
 
-@kernel()
-def turn_tangents(touches, n, inverse):
-    """Turn the tangents of a contact so that J M⁻¹ Jᵀ has no mixed term between them."""
-    first, last = weigh(touches, n, 1, 1, inverse), weigh(touches, n, 2, 2, inverse)
-    mixed = weigh(touches, n, 1, 2, inverse)
-    if abs(mixed) > 1e-15 * (first + last):
-        angle = 0.5 * math.atan2(2.0 * mixed, first - last)
-        c, s = math.cos(angle), math.sin(angle)
-        for at in (AXES, LEVERS, ARMS):
-            for k in range(3):
-                one, other = touches[n, at + 3 + k], touches[n, at + 6 + k]
-                touches[n, at + 3 + k], touches[n, at + 6 + k] = c * one + s * other, c * other - s * one
-
-
-@kernel()
-def set_axis(touches, n, i, axis, y, pair, spins):
-    """Write direction i of a contact at y from the centre, its arm and its lever: of a ring, about its normal alone."""
+@kernel(forceinline=True)
+def direction(axis, y, pair, spins):
+    """A `Direction` of a contact at y from the centre of its body; a ring turns about its normal alone."""
+    if not spins:
+        return Direction(axis, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     arm = cross(axis, y)
     if pair.planar:
         normal = pair.axes[2]
@@ -167,47 +164,85 @@ def set_axis(touches, n, i, axis, y, pair, spins):
     lever = arm
     if spins == 2:
         lever = times_transposed(pair.axes, hessian_times(pair.mobility, times(pair.axes, arm)))
+    return Direction(axis, lever, arm)
+
+
+@kernel(forceinline=True)
+def weigh(one, other, light, lighter):
+    """J M⁻¹ Jᵀ between two directions [1/kg], by that of the places and that of the rotation along the axes."""
+    p, q, r, s = one.axis, other.axis, one.arm, other.lever
+    places = p[0] * q[0] * light[0] + p[1] * q[1] * light[1] + p[2] * q[2] * light[2]
+    return places + r[0] * s[0] * lighter[0] + r[1] * s[1] * lighter[1] + r[2] * s[2] * lighter[2]
+
+
+@kernel(forceinline=True)
+def mixture(c, p, s, q):
+    """c p + s q of two directions."""
+    return Direction(
+        (c * p.axis[0] + s * q.axis[0], c * p.axis[1] + s * q.axis[1], c * p.axis[2] + s * q.axis[2]),
+        (c * p.lever[0] + s * q.lever[0], c * p.lever[1] + s * q.lever[1], c * p.lever[2] + s * q.lever[2]),
+        (c * p.arm[0] + s * q.arm[0], c * p.arm[1] + s * q.arm[1], c * p.arm[2] + s * q.arm[2]),
+    )
+
+
+@kernel(forceinline=True)
+def set_direction(touches, n, i, own):
+    """Write direction i of a contact."""
     for k in range(3):
-        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = axis[k], lever[k]
-        touches[n, ARMS + 3 * i + k] = arm[k]
+        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = own.axis[k], own.lever[k]
+        touches[n, ARMS + 3 * i + k] = own.arm[k]
 
 
-@kernel()
-def set_touch(touches, n, h, touch, cells, v, inverse, spins, functions):
-    """Write all that sweeps ask of a contact of an element with two nodes."""
+@kernel(forceinline=True)
+def set_touch(touches, n, touch, cells, v, inverse, spins, functions):
+    """Write all that sweeps ask of a contact of an element with two nodes, but θ of the normal.
+
+    The two tangents are those between which J M⁻¹ Jᵀ has no mixed term.
+    """
     c, pair = touch.c, touch.pair
-    touches[n, CELL] = c
-    for k in range(4 if spins else 3):
-        touches[n, ROWS + k] = cells[c, k]
-    if not spins:
-        touches[n, ROWS + 3] = -1.0
-    for a in range(2):
-        touches[n, SHARES + a] = share(a, 2, functions, touch.place)[0]
+    a, b, body, spin = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3] if spins else -1
+    touches[n, CELL], touches[n, ROWS], touches[n, ROWS + 1], touches[n, ROWS + 2] = c, a, b, body
+    touches[n, ROWS + 3] = spin
+    near, far = share(0, 2, functions, touch.place)[0], share(1, 2, functions, touch.place)[0]
+    touches[n, SHARES], touches[n, SHARES + 1] = near, far
     y, g = times_transposed(pair.axes, touch.spot.y), times_transposed(pair.axes, touch.spot.gradient)
     steep, g = facing(g)
     g = g if steep > 0.0 else (1.0, 0.0, 0.0)  # nothing pushes
-    least = (1.0, 0.0, 0.0) if abs(g[0]) < 0.6 else (0.0, 1.0, 0.0)
-    e = cross(g, least)
+    e = cross(g, (1.0, 0.0, 0.0) if abs(g[0]) < 0.6 else (0.0, 1.0, 0.0))
     size = math.sqrt(dot(e, e))
     e = e[0] / size, e[1] / size, e[2] / size
-    set_axis(touches, n, 0, g, y, pair, spins)
-    set_axis(touches, n, 1, e, y, pair, spins)
-    set_axis(touches, n, 2, cross(g, e), y, pair, spins)
-    turn_tangents(touches, n, inverse)
+    light = (
+        near * near * inverse[a, 0] + far * far * inverse[b, 0] + inverse[body, 0],
+        near * near * inverse[a, 1] + far * far * inverse[b, 1] + inverse[body, 1],
+        near * near * inverse[a, 2] + far * far * inverse[b, 2] + inverse[body, 2],
+    )
+    lighter = (inverse[spin, 0], inverse[spin, 1], inverse[spin, 2]) if spins else (0.0, 0.0, 0.0)
+    normal, one, other = (
+        direction(g, y, pair, spins), direction(e, y, pair, spins), direction(cross(g, e), y, pair, spins)
+    )  # fmt: skip
+    first, last = weigh(one, one, light, lighter), weigh(other, other, light, lighter)
+    mixed = weigh(one, other, light, lighter)
+    if abs(mixed) > 1e-15 * (first + last):
+        angle = 0.5 * math.atan2(2.0 * mixed, first - last)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        one, other = mixture(cosine, one, sine, other), mixture(cosine, other, -sine, one)
+        first, last = weigh(one, one, light, lighter), weigh(other, other, light, lighter)
+    set_direction(touches, n, 0, normal)
+    set_direction(touches, n, 1, one)
+    set_direction(touches, n, 2, other)
+    touches[n, OWN], touches[n, OWN + 1], touches[n, OWN + 2] = weigh(normal, normal, light, lighter), first, last
+    touches[n, MIXED] = weigh(normal, one, light, lighter)
+    touches[n, MIXED + 1] = weigh(normal, other, light, lighter)
     for i in range(3):
         touches[n, START + i] = along(touches, n, i, v)
-        touches[n, OWN + i] = weigh(touches, n, i, i, inverse)
         touches[n, FORCE + i] = 0.0
-    for i in range(2):
-        touches[n, MIXED + i] = weigh(touches, n, 0, 1 + i, inverse)
     touches[n, PUSH], touches[n, DAMPING] = rubbed_by(touch) * steep, pair.damping * steep
     touches[n, FRICTION], touches[n, SLIP] = pair.friction, pair.slip_velocity
-    touches[n, THETA] = fitted(h * touches[n, OWN] * touches[n, PUSH] * touches[n, DAMPING])
     touches[n, THETA + 1] = 1.0
     touches[n, SLOT] = 0.0 if touch.inner or pair.once else 1.0 if touch.place < 0.5 else 2.0
 
 
-@kernel()
+@kernel(forceinline=True)
 def solve_normal(touches, n, h, rate):
     """(force along the normal, N) where the others alone would speed the contact up by ``rate`` [m/s²]."""
     push, damping, own = touches[n, PUSH], touches[n, DAMPING], touches[n, OWN]
@@ -226,7 +261,7 @@ def solve_normal(touches, n, h, rate):
         touches[n, THETA] = 0.5
 
 
-@kernel()
+@kernel(forceinline=True)
 def solve_tangents(touches, n, h, drag, first, last, settling):
     """Friction along both tangents, of μ N = ``drag``, where the others alone would speed it up by first and last."""
     slip, one, other = touches[n, SLIP], h * touches[n, OWN + 1], h * touches[n, OWN + 2]
@@ -326,12 +361,22 @@ def kernels(depth, pieces, functions, spins):
     @kernel(MEET)
     def meet(h, x, v, inverse, cells, data, touches, begin):
         found, count = np.empty((most * pieces, columns)), begin
+        at_node = np.full(x.shape[0], -1)
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, 2, functions, found)):
                 if count < touches.shape[0]:
                     touch = touch_of(x, cells, data, 2, functions, found, n)
-                    set_touch(touches, count, h, touch, cells, v, inverse, spins, functions)
+                    if not touch.inner:
+                        node = cells[touch.c, 0 if touch.place < 0.5 else 1]
+                        other = at_node[node]
+                        if other >= 0 and int(touches[other, ROWS + 2]) == cells[touch.c, 2]:
+                            touches[other, PUSH] += rubbed_by(touch) * facing(touch.spot.gradient)[0]
+                            continue
+                        at_node[node] = count
+                    set_touch(touches, count, touch, cells, v, inverse, spins, functions)
                 count += 1
+        for n in range(begin, min(count, touches.shape[0])):
+            touches[n, THETA] = fitted(h * touches[n, OWN] * touches[n, PUSH] * touches[n, DAMPING])
         return count
 
     return Rubbing(meet, recall, sweep, give, WIDTH, SLOTS * NOTED)
