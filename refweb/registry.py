@@ -126,12 +126,12 @@ class Method(NamedTuple):
         """
         given = {key: value for key in self.keys if (value := getattr(solve, key)) is not None}
 
-        def make(system):
+        def make(system, *looked_at):
             return load(self.integrator)(system, *looked_at, **(given | keys))
 
         if system.weakness is None:
-            return make(system)
-        return load("refweb.dynamics.integrators.rupture:Rupturing")(make, system)
+            return make(system, *looked_at)
+        return load("refweb.dynamics.integrators.rupture:Rupturing")(make, system, *looked_at)
 
 
 _STEPS, _TOLERANCES = ("safety", "step_size"), ("rtol", "atol_position", "atol_velocity")

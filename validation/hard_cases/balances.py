@@ -38,6 +38,8 @@ def tensions(solution):
 
         force = stiffness * (ramp(strain - slackness) - ramp(-slackness))
         stored = stiffness * (integral(strain - slackness) - integral(-slackness) - ramp(-slackness) * strain)
+    broken = [one["element"] for one in solution.breaks or ()]
+    force[broken] = stored[broken] = 0.0
     return force, vector / np.where(length > 0, length, 1.0)[:, None], (stored * natural).sum()
 
 
@@ -87,7 +89,7 @@ def energy_left(solution):
     state, history = solution.state, solution.history
     kinetic = 0.5 * (state.system.net.mass[:, None] * state.v**2).sum()
     stored = tensions(solution)[2]
-    others = sum(history.get(name, [0.0])[-1] for name in ("contact_energy", "dissipated_energy"))
+    others = sum(history.get(name, [0.0])[-1] for name in ("contact_energy", "dissipated_energy", "rupture_energy"))
     for effect in solution.scene.effects:
         if isinstance(effect, refweb.Gravity):
             net = state.system.net

@@ -349,6 +349,15 @@ MOTIONS = {
         v: hit(ball(velocity=(0.0, 0.0, v), mass=1e-3), stiffness=max(1e4, 0.4 * v * v), duration=2.0 / max(v, 100.0))
         for v in (2.0, 100.0, 1000.0, 7000.0)
     },
+    "lines that break under a ball at v [m/s]": {
+        v: hit(
+            refweb.Rupture(strength=2e4 * v),
+            ball(velocity=(0.0, 0.0, v), mass=1e-2),
+            stiffness=max(1e4, 4.0 * v * v),
+            duration=0.3 / v,
+        )
+        for v in (10.0, 100.0, 1000.0)
+    },
     "contact stiffness [N/m]": {
         k: hit(stiffness=k, duration=0.02 if k < 1e8 else 2e-3) for k in (1e2, 1e4, 1e6, 1e8, 1e10)
     },

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...effects.base import STRAIN
 from ...errors import InputError
-from ...results.probes import Probe, line
+from ...results.probes import Probe, line, line_of, slack_fraction
 from ...system.torn import Breaks, tear, torn
 from .events import Event, ended_by
 from .extremes import begin_anew
@@ -29,10 +30,12 @@ class Rupturing:
     Parameters
     ----------
     make : callable
-        Makes the integrator of a system. The last of its events, where any tension breaks anything, is that the largest
-        tension over its limit passes 1; it ends the run.
+        Makes the integrator of a system, probes, sums and events.
     system : refweb.system.system.System
         With a `refweb.effects.base.Weakness`.
+    probes, sums, events : sequence
+        What to look at. The last of the events, where any tension breaks anything and there are any, is that the
+        largest tension over its limit passes 1; it ends the run.
 
     Attributes
     ----------
@@ -45,7 +48,8 @@ class Rupturing:
         For nodes without mass that are free to move.
     """
 
-    def __init__(self, make, system):
+    def __init__(self, make, system, probes=(), sums=(), events=()):
+        self._probes, self._rest = probes, (sums, events)
         self._make, self._whole, self._weakness = make, system, system.weakness
         self._breathe = None
         self.inner = self._of(system)
@@ -70,14 +74,15 @@ class Rupturing:
 
     def _of(self, system):
         """The integrator of a system."""
-        inner = self._make(system)
+        broken = system.net.broken
+        inner = self._make(system, [unstrained(probe, broken) for probe in self._probes], *self._rest)
         if self._breathe is not None:
             inner.breathe = self._breathe
         return inner
 
     def refined(self, by=None):
         """The same with a smaller error."""
-        return Rupturing(lambda system: self._make(system).refined(by), self._whole)
+        return Rupturing(lambda *parts: self._make(*parts).refined(by), self._whole, self._probes, *self._rest)
 
     def start(self, x=None, v=None):
         """The course at t = 0, where all breaks that is above its limit."""
@@ -218,7 +223,19 @@ def with_breaks(make, system, probes):
         share = Probe(line, [0, 0, len(weakness.limits)], 1.0 / weakness.limits[:, None], 1.0)
         events = [Event(len(probes), 1.0, True, stop=True)]
         probes = [*probes, share]
-    return Rupturing(lambda torn: make(torn, probes, (), events), system)
+    return Rupturing(make, system, probes, (), events)
+
+
+def unstrained(probe, broken):
+    """A probe to which broken elements have no strain, also between steps, where the law alone shows what they have."""
+    if not len(broken):
+        return probe
+    data = np.array(probe.data, dtype=float)
+    if probe.kernel in (line, line_of) and probe.rows[0] == STRAIN:
+        data[broken] = 0.0
+    elif probe.kernel is slack_fraction:
+        data[broken] = np.inf
+    return probe._replace(data=data)
 
 
 def _take(course, found):
