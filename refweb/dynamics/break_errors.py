@@ -9,7 +9,7 @@ def add_errors_of_breaks(solution, own, other, share):
     """Add ± to the times of breaks, as far as a run and its twin break the same lines in the same order.
 
     Behind the first break at which they differ nothing is known of either run by the other: what is found there has no
-    ±, and a warning says so.
+    ±, and a warning says so. Another tells of the first two breaks that are nearer to each other than their ±.
 
     Parameters
     ----------
@@ -29,9 +29,20 @@ def add_errors_of_breaks(solution, own, other, share):
         found["error"] = float(share * off + widths + 4.0 * np.finfo(float).eps * found["time"])
     else:
         n = len(solution.breaks)
-        if len(other.elements) == n:
+    _warn_of_near(solution, n)
+    if n < max(len(own.elements), len(other.elements)):
+        _end_of_knowledge(solution, own, other, n)
+
+
+def _warn_of_near(solution, count):
+    """Warn of the first of so many breaks that the next may come before."""
+    for one, later in zip(solution.breaks[:count], solution.breaks[1:count], strict=False):
+        if 0.0 < later["time"] - one["time"] < one["error"] + later["error"]:
+            solution.warnings.append(
+                f"lines {one['line']} and {later['line']} break within ± of each other at t = {later['time']:.6g} s: "
+                "run and twin have them in this order, which is not proven"
+            )
             return
-    _end_of_knowledge(solution, own, other, n)
 
 
 def _end_of_knowledge(solution, own, other, n):

@@ -245,7 +245,7 @@ def add_errors(simulation, run, twin, rows):
             found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
     if one.stopped and len(rows) > 1:
         _add_lateness(solution, rows[-2:])
-    if solution.breaks:
+    if solution.breaks is not None:
         from .break_errors import add_errors_of_breaks
 
         add_errors_of_breaks(solution, one.breaks, other.breaks, SPREAD * factor)

@@ -373,6 +373,12 @@ def test_order_beyond_the_horizon():
     assert solution.results["early"].error == 0.1 and solution.results["late"].error is None
     assert solution.events[0]["error"] is None
     assert "beyond the horizon from t = 0.019 s on: break 2 is of line 1 at t = 0.02 s" in solution.warnings[-1]
+    solution.breaks, solution.reduced["early"] = [], Result(1.0, 0.1, "m", 0.015, None)
+    add_errors_of_breaks(solution, breaks([], []), breaks([1], [0.01]), 2.0)
+    assert "break 1 is none" in solution.warnings[-1] and solution.results["early"].error is None
+    solution.breaks = [{"line": n, "time": t, "error": None} for n, t in enumerate((0.01, 0.0102))]
+    add_errors_of_breaks(solution, breaks([0, 1], [0.01, 0.0102]), breaks([0, 1], [0.0101, 0.0103]), 2.0)
+    assert "lines 0 and 1 break within ± of each other" in solution.warnings[-1]
 
 
 @pytest.mark.parametrize(
