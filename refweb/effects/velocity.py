@@ -28,8 +28,8 @@ class Velocity(Table):
     ------
     InputError
         For vectors that are not three finite numbers, and where neither ``value`` nor ``spin`` is given; from
-        ``start``, in statics, for a node that the web does not have, and for one that is named and supported along a
-        component that is not 0.
+        ``start``, in statics, for a node that the web does not have, and for one that is named and on a body, or
+        supported along a component that is not 0.
 
     Examples
     --------
@@ -64,6 +64,11 @@ class Velocity(Table):
         for node, velocity in zip(found, velocities, strict=True):
             allowed = [axis for axis in range(3) if not supported[node, axis]]
             stopped = [axis for axis in range(3) if supported[node, axis] and velocity[axis] != 0.0]
+            for body in net.bodies if self.node != "all" else ():
+                if node in body.carried:
+                    raise InputError(
+                        f'node = {node} is on body "{body.name}" by [[attach]] and has the velocity of that'
+                    )
             if stopped and self.node != "all":
                 axis = "xyz"[stopped[0]]
                 raise InputError(f"node = {node} is supported along {axis}: it cannot have a velocity there")

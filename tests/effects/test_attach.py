@@ -447,6 +447,10 @@ REFUSED = [
         r'mass = "consistent" must be "lumped" with \[\[attach\]\]',
     ),
     (
+        dict(velocity=[{"node": 0, "value": [1.0, 0.0, 0.0]}]),
+        r'\[\[velocity\]\] 1 node = 0 is on body "satellite" by \[\[attach\]\] and has the velocity of that',
+    ),
+    (
         dict(event=[{"name": "hit", "kind": "contact"}]),
         r'\[\[event\]\] 1 kind = "contact" does not tell .* quantity = "overlap"',
     ),

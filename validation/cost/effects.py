@@ -23,6 +23,8 @@ import sys
 import tempfile
 import time
 
+import numpy as np
+
 import refweb
 from refweb.dynamics.simulation import Simulation
 from refweb.scene import Scene
@@ -40,6 +42,7 @@ PLAIN = {
 BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, 0.11], "velocity": [0.0, 0.0, -1.0]}
 BOX = BALL | {"shape": "box", "size": [0.2, 0.15, 0.1], "angular_velocity": [5.0, 3.0, 1.0]}
 BOX.pop("radius")
+SOLID = {key: value for key, value in BOX.items() if key != "size"} | {"shape": "mesh"}
 RUBBING = {"stiffness": 1e5, "friction": 0.3}
 EFFECTS = {
     "gravity": {"gravity": {"acceleration": [0.0, 0.0, -9.81]}},
@@ -93,9 +96,31 @@ void stop(void) { CALLGRIND_STOP_INSTRUMENTATION; }
 """
 
 
-def scenes():
-    """The plain scene, and it with each effect."""
-    return {"plain": Scene.from_dict(PLAIN)} | {name: Scene.from_dict(PLAIN | more) for name, more in EFFECTS.items()}
+def torus(path, ring=0.07, tube=0.03, parts=50):
+    """Write a torus of 2 parts² triangles as an STL file."""
+    around, across = (2.0 * np.pi * np.arange(n) / n for n in (2 * parts, parts))
+    points = np.stack(
+        [
+            np.outer(np.cos(around), ring + tube * np.cos(across)),
+            np.outer(np.sin(around), ring + tube * np.cos(across)),
+            np.tile(tube * np.sin(across), (2 * parts, 1)),
+        ],
+        axis=-1,
+    )
+    on, up = np.roll(points, -1, axis=0), np.roll(points, -1, axis=1)
+    both = np.roll(on, -1, axis=1)
+    faces = np.concatenate([np.stack([points, on, both], axis=2), np.stack([points, both, up], axis=2)]).reshape(-1, 9)
+    vertex = "vertex {} {} {}\n"
+    text = "facet normal 0 0 0\nouter loop\n" + 3 * vertex + "endloop\nendfacet\n"
+    path.write_text("solid torus\n" + "".join(text.format(*face) for face in faces) + "endsolid torus\n")
+    return str(path)
+
+
+def scenes(folder):
+    """The plain scene, and it with each effect; files of bodies are written to a folder."""
+    solid = {"body": [SOLID | {"file": torus(pathlib.Path(folder) / "torus.stl")}], "contact": {"stiffness": 1e5}}
+    effects = EFFECTS | {"contact, a torus of 5000 faces": solid}
+    return {"plain": Scene.from_dict(PLAIN)} | {name: Scene.from_dict(PLAIN | more) for name, more in effects.items()}
 
 
 def timed(scene, system):
@@ -111,7 +136,8 @@ def timed(scene, system):
 
 def measure(repeats=7):
     """Rows of (name, ns per element-step, ratio to the plain web, steps)."""
-    made = {name: (scene, scene.build()) for name, scene in scenes().items()}
+    with tempfile.TemporaryDirectory() as folder:
+        made = {name: (scene, scene.build()) for name, scene in scenes(folder).items()}
     found, steps = {name: [] for name in made}, {}
     for _ in range(1 + repeats):
         for name, one in made.items():
