@@ -33,6 +33,10 @@ SCENE = {
 }
 BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0, 0, -0.2]}
 AROUND = {
+    "attach": {
+        "supports": {"nodes": []},
+        "body": [BALL | {"name": "hub"}, BALL | {"name": "box", "position": [0, 0, 1]}],
+    },
     "contact": {"body": [BALL]},
     "contact.bodies": {"body": [BALL]},
     "drag.bodies": {"body": [BALL | {"name": "hub"}], "drag": {"density": 1.2}},
