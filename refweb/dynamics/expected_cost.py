@@ -48,7 +48,8 @@ def ruling(integrator, system, reach, speed):
     if damped:
         by = f"damping at {system.row_name(row)}"
     elif family.lines:
-        at = np.flatnonzero((family.cells == row).any(axis=1))
+        of_it = [row, *(node for body in net.bodies if row in (body.row, body.spin) for node in body.carried)]
+        at = np.flatnonzero(np.isin(family.cells, of_it).any(axis=1))
         data = net.line_data[at]
         by = f"elasticity of line {net.line[at[(data[:, AXIAL_STIFFNESS] / data[:, LENGTH]).argmax()]]}"
     else:
