@@ -10,6 +10,8 @@ from __future__ import annotations
 import importlib
 from typing import Any, NamedTuple
 
+from .errors import InputError
+
 WEBS = {
     "paper": "refweb.net.lattices:Paper",
     "window": "refweb.net.lattices:Window",
@@ -228,13 +230,26 @@ def with_files(given, place, tables=tuple(FILES)):
             return table
         return {k: place(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
 
-    changed = {}
+    given, changed = with_fold(given), {}
     for name in tables:
         if isinstance(own := given.get(name), list):
             changed[name] = [placed(one, FILES[name]) for one in own]
         elif isinstance(own, dict):
             changed[name] = placed(own, FILES[name])
     return {**given, **changed}
+
+
+def with_fold(given):
+    """The dict of a scene in which what ``[web]`` says of a fold, ``fold`` or ``positions``, is the table of a fold."""
+    web = given.get("web")
+    said = [key for key in ("fold", "positions") if isinstance(web, dict) and key in web]
+    if not said:
+        return given
+    if "fold" in given or len(said) > 1:
+        raise InputError(f"[web] {said[0]}: the web is folded twice, leave one out")
+    own = {"kind": "positions", "file": web["positions"]} if said == ["positions"] else web["fold"]
+    rest = {key: value for key, value in web.items() if key not in said}
+    return {**given, "web": rest, "fold": own if isinstance(own, dict) else {"kind": own}}
 
 
 def paths_of(given):

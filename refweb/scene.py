@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, in_file, refused_at
 from .messages import nearest, short, shown
-from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of, with_files
+from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of, with_files, with_fold
 from .settings import START_STATES, Accuracy, Dynamic, Head, Output, Static, Supports
 from .tables import Several, Table, table
 
@@ -187,6 +187,7 @@ class Scene:
 
         ``file`` is the name that begins the messages of `build`.
         """
+        given = with_fold(given)
         if folder is not None:
             given = with_files(given, lambda path: str(pathlib.Path(folder, path)), ["body", "fold"])
         known = [*(f.name for f in fields(Head)), "web", "solve", *PARTS, *LISTS, *EFFECTS]

@@ -21,6 +21,8 @@ class Fold(Table):
     lines are slack, and two that share no node are further apart than ``gap``: what is not so is refused. What is held
     keeps its place; a web to be thrown has ``[supports] nodes = []``.
 
+    ``[web]`` may say it as well: ``fold = "star"``, ``[web.fold]`` with these keys, or ``positions = FILE``.
+
     A ``"star"`` draws each node in to ``ratio`` times its distance from the hub, and winds arms, rings and what is
     between about the axis, in proportion to that distance: the outermost node by ``turns``. Nothing is pleated.
 
@@ -29,7 +31,7 @@ class Fold(Table):
     kind : {"star", "positions"}
         How it is folded.
     ratio : float
-        Of a star: distance from the hub over that in the web, 0 < ratio < 1.
+        Of a star: distance from the hub over that in the web, 0 < ratio < 1; 0.5 where it is left out.
     turns : float, optional
         Of a star: turns of the outermost node [1]; by default as many as leave the ends of every line within 0.9 of its
         natural length.
@@ -76,9 +78,8 @@ class Fold(Table):
         for key in keys:
             if getattr(self, key) is not None:
                 raise InputError(f'{key} has no meaning with kind = "{self.kind}": leave it out')
-        needed = "file" if self.kind == "positions" else "ratio"
-        if getattr(self, needed) is None:
-            raise InputError(f'{needed} is missing: kind = "{self.kind}" needs it')
+        if self.kind == "positions" and self.file is None:
+            raise InputError('file is missing: kind = "positions" needs it')
         if self.ratio is not None and not self.ratio < 1.0:
             raise InputError(f"ratio = {self.ratio:g} must be < 1: the web is drawn in")
         if self.axis is not None and not any(self.axis):
@@ -110,8 +111,9 @@ class Fold(Table):
         if len(found) != 1:
             raise InputError(f"hub is {len(found)} nodes, must be one")
         size = np.linalg.norm(web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]], axis=1)
-        turns = turns_of(self.ratio, float((length / size).min())) if self.turns is None else self.turns
-        return wound(web.points, web.points[found[0]], self.axis or (0.0, 0.0, 1.0), self.ratio, turns)
+        ratio = 0.5 if self.ratio is None else self.ratio
+        turns = turns_of(ratio, float((length / size).min())) if self.turns is None else self.turns
+        return wound(web.points, web.points[found[0]], self.axis or (0.0, 0.0, 1.0), ratio, turns)
 
     def _from_file(self, web):
         """Places of the nodes in the file."""

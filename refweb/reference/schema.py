@@ -99,7 +99,14 @@ def _list(table):
 
 
 def _webs():
-    return {"oneOf": [_table(load(reference), fixed={"kind": kind}) for kind, reference in WEBS.items()]}
+    """Webs by kind, each with what may be said of its fold."""
+    forms, fold = [], load(EFFECTS["fold"])
+    folded = {"fold": {"anyOf": [{"enum": ["star"]}, _table(fold)], "description": summary(fold)}}
+    folded["positions"] = {"type": "string", "description": 'File of a fold with kind = "positions".'}
+    for kind, reference in WEBS.items():
+        form = _table(load(reference), fixed={"kind": kind})
+        forms.append(form | {"properties": form["properties"] | folded})
+    return {"oneOf": forms}
 
 
 def _solves():

@@ -4,10 +4,12 @@ import nets
 import numpy as np
 import pytest
 import scipy.optimize
+from jsonschema import Draft4Validator
 
 import refweb
 from refweb.net.folding import distances, nearest_lines
 from refweb.net.web import Web
+from refweb.reference.schema import schema
 
 GAP = 2e-3
 METHODS = ["central-difference", "cvode", "ida"]
@@ -147,7 +149,6 @@ def test_positions_of_a_file(tmp_path):
         (dict(ratio=0.3, turns=3.0), r"line \d+ would be taut: its ends are .* m apart"),
         (dict(ratio=0.02, turns=0.0, gap=0.01), "m apart, must be ≥ gap = 0.01"),
         (dict(ratio=1.2), "ratio = 1.2 must be < 1"),
-        (dict(), "ratio is missing"),
         (dict(kind="positions"), "file is missing"),
         (dict(kind="positions", file="a.csv", turns=1.0), "turns has no meaning"),
         (dict(kind="positions", file="/nowhere/a.csv"), "there is no file"),
@@ -157,7 +158,32 @@ def test_positions_of_a_file(tmp_path):
 )
 def test_what_cannot_be_folded(fold, words):
     with pytest.raises(refweb.InputError, match=words):
-        net(fold=fold or dict(kind="star")).build()
+        net(fold=fold).build()
+
+
+def test_the_web_may_say_how_it_is_folded(tmp_path):
+    """As `[fold]` does: the same scene."""
+    plain, given = net(), net().to_dict()
+    del given["fold"]
+    web, table = given.pop("web"), plain.to_dict()["fold"]
+    for said in ({"fold": table}, {"fold": "star"}, {"positions": "a.csv"}):
+        scene = refweb.Scene.from_dict({**given, "web": web | said}, tmp_path)
+        own = said["fold"] if "fold" in said else {"kind": "positions", "file": str(tmp_path / "a.csv")}
+        fold = own if isinstance(own, dict) else {"kind": own}
+        assert scene.to_dict() == refweb.Scene.from_dict({**given, "web": web, "fold": fold}, tmp_path).to_dict()
+        assert list(Draft4Validator(schema()).iter_errors({**given, "web": web | said})) == []
+    with pytest.raises(refweb.InputError, match="folded twice"):
+        refweb.Scene.from_dict({**given, "web": web | {"fold": "star"}, "fold": {"ratio": 0.3}})
+    with pytest.raises(refweb.InputError, match='kind = "sta" .*did you mean "star"'):
+        refweb.Scene.from_dict({**given, "web": web | {"fold": "sta"}})
+
+
+def test_a_star_by_itself():
+    """What is left out has values that fold webs of the paper."""
+    for mesh in ("square", "triangle", "hexagon"):
+        system = net(refweb.Window(mesh=mesh, rows=8, columns=8, side=0.25), fold=dict(kind="star", gap=GAP)).build()
+        reach = np.linalg.norm((system.net.points + system.laid)[: system.net.nodes, :2], axis=1).max()
+        assert 0.4 < reach / np.linalg.norm(system.net.points[: system.net.nodes, :2], axis=1).max() < 0.6
 
 
 def test_other_refusals():
