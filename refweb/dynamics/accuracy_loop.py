@@ -100,21 +100,21 @@ def run_within_drift(simulation, folder, tell):
             tell("finding errors by a twin run", 1.0)
             ended = twin.ended() if twin else None
         break
-    solution.reduced, standing.repeated, standing.drift = run.results, 0, np.inf
+    solution.reduced, standing.repeated, standing.drift, known = run.results, 0, np.inf, np.inf
     if ended is not None:
         from .twin_error import add_errors
 
-        add_errors(simulation, run, ended, simulation.compared(folder))
+        known = add_errors(simulation, run, ended, simulation.compared(folder))
         if folder is not None:
             folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:
         solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
     if scene.throw is not None:
-        solution.throw = _throw(simulation, run, ended, simulation.compared(folder))
+        solution.throw = _throw(simulation, run, ended, simulation.compared(folder), known)
 
 
-def _throw(simulation, run, ended, rows):
-    """What came of a throw, with ± where a twin has ended."""
+def _throw(simulation, run, ended, rows, known):
+    """What came of a throw, with ± where a twin has ended, of what is settled before a ``known`` time."""
     scene, watch = simulation.scene, simulation.watch
     state, twin, factor = watch.state(run.course), None, 0.0
     if ended is not None:
@@ -122,7 +122,7 @@ def _throw(simulation, run, ended, rows):
 
         twin = ended.rows, watch.state(ended.course)
         factor = SPREAD / (1.0 - simulation.integrator.error_share(run.course, ended.course))
-    return scene.throw.found(scene.observables, rows, state, twin, factor)
+    return scene.throw.found(scene.observables, rows, state, twin, factor, known)
 
 
 def _twin_of(simulation):

@@ -19,6 +19,11 @@ def add_errors_of_breaks(solution, own, other, share):
         Of the run and of its twin.
     share : float
         ± over the difference of the two.
+
+    Returns
+    -------
+    float
+        Time from which on nothing is known [s].
     """
     for n, found in enumerate(solution.breaks):
         alike = n < len(other.elements) and own.elements[n] == other.elements[n]
@@ -31,7 +36,8 @@ def add_errors_of_breaks(solution, own, other, share):
         n = len(solution.breaks)
     _warn_of_near(solution, n)
     if n < max(len(own.elements), len(other.elements)):
-        _end_of_knowledge(solution, own, other, n)
+        return _end_of_knowledge(solution, own, other, n)
+    return np.inf
 
 
 def _warn_of_near(solution, count):
@@ -46,7 +52,7 @@ def _warn_of_near(solution, count):
 
 
 def _end_of_knowledge(solution, own, other, n):
-    """Take back the ± of what comes from break ``n`` on, and say so."""
+    """Take back the ± of what comes from break ``n`` on, and say so; the time of that [s]."""
     times = [breaks.times[n] for breaks in (own, other) if n < len(breaks.times)]
     since = float(min(times))
     net = solution.state.system.net
@@ -66,3 +72,4 @@ def _end_of_knowledge(solution, own, other, n):
     for event in solution.events:
         if event["time"] is not None and event["time"] >= since:
             event["error"] = None
+    return since

@@ -227,13 +227,18 @@ def add_errors(simulation, run, twin, rows):
         What came of its twin.
     rows : ndarray, shape (rows, columns)
         Rows of its history, see `refweb.dynamics.history.Watch.compared`.
+
+    Returns
+    -------
+    float
+        Time from which on the twin tells nothing of the run [s].
     """
     solution = simulation.solution
     one, other = run.course, twin.course
     if one.stopped != other.stopped:
         which = ["the run", "its twin, the second run of a smaller error"][:: 1 if one.stopped else -1]
         solution.warnings.append("no errors are known: an event ends {}, but not {}".format(*which))
-        return
+        return 0.0
     factor = 1.0 / (1.0 - simulation.integrator.error_share(one, other))
     drifts = simulation.watch.drifts(one, other, np.diff(rows[-2:, 0]).sum())
     compared = run.results, run.corrections, twin.results, rows, twin.rows
@@ -248,7 +253,8 @@ def add_errors(simulation, run, twin, rows):
     if solution.breaks is not None:
         from .break_errors import add_errors_of_breaks
 
-        add_errors_of_breaks(solution, one.breaks, other.breaks, SPREAD * factor)
+        return add_errors_of_breaks(solution, one.breaks, other.breaks, SPREAD * factor)
+    return np.inf
 
 
 def _add_lateness(solution, rows):

@@ -28,7 +28,8 @@ class Throw(Table):
     and else Ω/4π: the net seen through its outline.
 
     ± holds what differs in the twin run and what a history of half the rows would make of the same motion; where run
-    and twin disagree on what is inside or closed it is not known.
+    and twin disagree on what is inside or closed it is not known. Behind the time at which lines break in another order
+    in the twin, or an event ends only one of them, nothing is.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ class Throw(Table):
             hint = nearest(self.target, bodies) if bodies else "the scene has no [[body]]"
             raise InputError(f"target = {shown(self.target)} is not a body, {hint}")
 
-    def found(self, observables, rows, state, twin=None, factor=0.0):
+    def found(self, observables, rows, state, twin=None, factor=0.0, known=np.inf):
         """What came of a throw, a dict of dicts for ``run.json``.
 
         Parameters
@@ -99,6 +100,8 @@ class Throw(Table):
             The same of the twin.
         factor : float
             ± over what differs in the twin.
+        known : float
+            Time from which on the twin tells nothing of the run [s].
         """
         names = [o.name for o in observables]
         own = self._of(rows, names)
@@ -108,10 +111,15 @@ class Throw(Table):
             own |= self._capture(state, mouth, own["largest_area"])
             if twin is not None and other is not None:
                 other |= self._capture(twin[1], mouth, other["largest_area"])
-        return {name: _told(name, value, half, other, factor, own) for name, value in own.items() if name != "bounds"}
+        settled, end, told = own.pop("settled"), rows[-1, 0], {}
+        for name, value in own.items():
+            if name != "bounds":
+                compared = other if settled.get(name, end) < known else None
+                told[name] = _told(name, value, half, compared, factor, own, known)
+        return told
 
     def _of(self, rows, names):
-        """Values by name; ``bounds`` are names of those that are lower bounds."""
+        """Values by name; ``bounds`` are names of those that are lower bounds, ``settled`` is when values are [s]."""
         times, area = rows[:, 0], rows[:, 1 + names.index(self.area)]
         top = int(area.argmax())
         near = slice(top - 1, top + 2) if 0 < top < len(area) - 1 else slice(top, top + 1)
@@ -132,7 +140,8 @@ class Throw(Table):
             else:
                 m = n + step
                 ends.append(times[n] + (times[m] - times[n]) * (area[n] - level) / (area[n] - area[m]))
-        return {**found, "effective_period": float(ends[1] - ends[0]), "bounds": bounds}
+        settled = dict.fromkeys(found, times[near][-1]) | {"effective_period": ends[1]}
+        return {**found, "effective_period": float(ends[1] - ends[0]), "bounds": bounds, "settled": settled}
 
     def _capture(self, state, mouth, largest):
         """What the net has of the target in a state."""
@@ -148,10 +157,11 @@ class Throw(Table):
         }
 
 
-def _told(name, value, half, other, factor, own):
+def _told(name, value, half, other, factor, own, known):
     """A number with its ±, or whether something is so, for ``run.json``."""
     if isinstance(value, bool):
-        return {"value": value if other is None or other[name] == value else None}
+        same = known == np.inf if other is None else other[name] == value
+        return {"value": value if same else None}
     error = None
     if other is not None:
         error = factor * abs(value - other[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value)

@@ -136,7 +136,11 @@ def test_what_run_and_twin_disagree_on_is_not_known():
     observables = [refweb.Observe(name="mouth", quantity="mouth_area", node=[0, 1, 2])]
     throw = Twin(area="mouth", target="one")
     assert throw.found(observables, rows, True, (rows, False), 3.0)["inside"] == {"value": None}
+    assert throw.found(observables, rows, True, (rows, True), 3.0, rows[-1, 0])["inside"] == {"value": None}
     assert throw.found(observables, rows, True, (rows, True), 3.0)["inside"] == {"value": True}
+    for known, told in ((0.7, True), (0.5, False)):  # the largest area is at t = π/6, between rows at 0.4 and 0.6
+        found = throw.found(observables, rows, True, (rows, True), 3.0, known)
+        assert (found["deployment_time"]["error"] is not None) == told == (found["largest_area"]["error"] is not None)
 
 
 def test_it_is_written_and_read(tmp_path):
