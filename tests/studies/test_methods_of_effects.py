@@ -7,7 +7,7 @@ import refweb
 from refweb.scene import Scene
 from validation.methods.cross_validation import EFFECTS, SMALL
 
-SCENES = {name: SMALL | {name: EFFECTS[name]} for name in ("orbit", "drag")}
+SCENES = {name: SMALL | EFFECTS[name] for name in ("[orbit]", "[drag]")}
 SCENES["fold"] = SMALL | {"fold": {"ratio": 0.5, "gap": 1e-4}, "supports": {"nodes": []}}
 
 

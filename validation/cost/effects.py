@@ -2,9 +2,10 @@
 
     python -m validation.cost.effects
 
-The table is of the paper's square web, thrown, alone and with one effect more: nanoseconds per element and step of a
-whole run with its history rows and peaks, without files and without a twin. CPU time, minimum of several warm runs that
-alternate, in this process, one thread. Steps are as each scene has them.
+The tables are of the paper's square web, thrown, alone and with one effect more, and of a web on a table, without
+friction and with it: nanoseconds per element and step of a whole run with its history rows and peaks, without files and
+without a twin. CPU time, minimum of several warm runs that alternate, in this process, one thread. Steps are as each
+scene has them.
 
 What is never executed costs nothing: valgrind counts the instructions of the plain web's steps and rows, once with the
 package as it is and once with a copy of it in which every module that this run has not loaded is deleted, all effects
@@ -44,6 +45,20 @@ BOX = BALL | {"shape": "box", "size": [0.2, 0.15, 0.1], "angular_velocity": [5.0
 BOX.pop("radius")
 SOLID = {key: value for key, value in BOX.items() if key != "size"} | {"shape": "mesh"}
 RUBBING = {"stiffness": 1e5, "friction": 0.3}
+TABLE = {
+    "title": "web on a table",
+    "web": {"kind": "window", "mesh": "square", "rows": 11, "columns": 11, "side": 0.1},
+    "cable": {"law": "tension-only", "modulus": 7e7, "area": 1e-6, "density": 1000.0},
+    "supports": {"nodes": []},
+    "gravity": {"acceleration": [0.0, 0.0, -9.81]},
+    "velocity": [{"node": "all", "value": [1.0, 0.3, 0.0]}],
+    "body": [
+        {"name": "table", "shape": "box", "fixed": True, "size": [20.0, 20.0, 1.0], "position": [0.0, 0.0, -0.5]},
+    ],
+    "solve": {"kind": "dynamic", "duration": 0.4},
+    "output": {"interval": 1e-2, "frames": 1},
+    "accuracy": {"error": "none"},
+}
 EFFECTS = {
     "gravity": {"gravity": {"acceleration": [0.0, 0.0, -9.81]}},
     "load": {"load": [{"node": "centre", "force": [0.0, 0.0, 1.0]}]},
@@ -123,6 +138,15 @@ def scenes(folder):
     return {"plain": Scene.from_dict(PLAIN)} | {name: Scene.from_dict(PLAIN | more) for name, more in effects.items()}
 
 
+def on_a_table():
+    """A web of which all lines lie on a table: they slide, and by friction they come to rest after 0.27 s."""
+    rubbing = [{"friction": 0.4, "slip_velocity": slip} for slip in (1e-2, 1e-6)]
+    contacts = [{}, *rubbing, {**rubbing[0], "damping": 0.1}]
+    names = "no friction", "friction", "friction at 1e-6 m/s", "friction, damping"
+    scene = {name: TABLE | {"contact": {"stiffness": 1e3, **one}} for name, one in zip(names, contacts, strict=True)}
+    return {name: Scene.from_dict(one) for name, one in scene.items()}
+
+
 def timed(scene, system):
     """CPU time of a run and its follower per element and step [ns]."""
     simulation = Simulation(scene, system, Solution(scene))
@@ -134,17 +158,17 @@ def timed(scene, system):
     ]
 
 
-def measure(repeats=7):
-    """Rows of (name, ns per element-step, ratio to the plain web, steps)."""
-    with tempfile.TemporaryDirectory() as folder:
-        made = {name: (scene, scene.build()) for name, scene in scenes(folder).items()}
+def measure(scenes, repeats=7):
+    """Rows of (name, ns per element-step, ratio to the first, steps) of scenes by name."""
+    made = {name: (scene, scene.build()) for name, scene in scenes.items()}
     found, steps = {name: [] for name in made}, {}
     for _ in range(1 + repeats):
         for name, one in made.items():
             cost, steps[name] = timed(*one)
             found[name].append(cost)
     best = {name: min(costs[1:]) for name, costs in found.items()}
-    return [(name, cost, cost / best["plain"], steps[name]) for name, cost in best.items()]
+    first = next(iter(best.values()))
+    return [(name, cost, cost / first, steps[name]) for name, cost in best.items()]
 
 
 def ran(package, cache, *toggle):
@@ -193,9 +217,11 @@ def counts():
 
 def main():
     """Print the table and the counts; the status says whether these agree."""
-    print(f"{'square web, thrown':24}{'per element-step':>18}{'ratio':>8}{'steps':>8}")
-    for name, cost, ratio, steps in measure():
-        print(f"{name:24}{cost:15.2f} ns{ratio:8.2f}{steps:8d}")
+    with tempfile.TemporaryDirectory() as folder:
+        for title, some in {"square web, thrown": scenes(folder), "web on a table": on_a_table()}.items():
+            print(f"{title:32}{'per element-step':>18}{'ratio':>8}{'steps':>8}")
+            for name, cost, ratio, steps in measure(some):
+                print(f"{name:32}{cost:15.2f} ns{ratio:8.2f}{steps:8d}")
     found = counts()
     if isinstance(found, str):
         print(found)
