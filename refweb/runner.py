@@ -220,7 +220,7 @@ def notices(scene, system):
         yield from remarks(system.net.web)
     for body in system.net.bodies:
         yield from (f'body "{body.name}": {text}' for text in body.shape.remarks())
-    if system.net.bodies and not system.contact:
+    if not system.contact and any(not body.carried for body in system.net.bodies):
         yield "the scene has a [[body]] but no [contact]: the web does not feel it"
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))
     if scene.solve.kind == "static" and (parts := system.unsupported_parts):

@@ -65,6 +65,9 @@ def decided(scene, system):
     if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
         return Choice(given_to(scene, "cvode", family=family), f"{what} is not for explicit steps")
+    if losing := _losing(system):
+        why = f"[{losing[0].name}] has losses, and bodies carry nodes, which explicit steps do not take together"
+        return Choice(given_to(scene, "cvode", family=family), why)
     bound = _bound(system)
     corners = np.searchsorted(system.corners, scene.solve.duration)
     steps = max(scene.solve.duration / (0.5 * bound), float(corners))
@@ -103,7 +106,8 @@ def step_price(system):
     """
     others = sum(len(family.cells) for family in system.families if not family.lines)
     price = PER_STEP + PER_ELEMENT * len(system.net.cells) + PER_CELL * others
-    if any(family.damping is not None and family.rubbing is None for family in system.families):
+    damped = any(family.damping is not None and family.rubbing is None for family in system.families)
+    if damped and not _losing(system):
         price *= 1.0 + min(_damped(system, _bound(system)), 7.0)
     return price
 
@@ -123,6 +127,11 @@ def given_to(scene, method, **keys):
 
 def _digits(scene):
     return scene.accuracy.digits or USUAL_DIGITS
+
+
+def _losing(system):
+    """Families whose losses explicit steps would solve for node by node, where bodies carry nodes."""
+    return [family for family in system.families if family.rubbing is not None and system.carried.any()]
 
 
 def _bound(system):

@@ -36,7 +36,8 @@ class Attach(Table):
 
     Their mass is the body's, whose row is the centre of mass of all: position and velocity that are observed are those
     of this. A sphere turns in space where it has nodes. Nodes on a fixed body are supports. The point may lie inside of
-    the body or outside; contact with the body is that of any line. Drag of the body acts at the centre of mass.
+    the body or outside; contact with the body is that of any line, and where there is any a line may not begin in the
+    core of the body. Drag of the body acts at the centre of mass.
 
     Parameters
     ----------

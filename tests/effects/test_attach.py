@@ -11,8 +11,10 @@ import refweb
 from refweb.dynamics.initial_state import equilibrium
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.rotations import Rotations
+from refweb.dynamics.method_choice import decided
 from refweb.effects.elasticity import Elasticity
 from refweb.net.rotation import quaternion_rate
+from refweb.runner import notices
 from refweb.system.at_rest import at_rest
 from refweb.system.system import System
 
@@ -391,6 +393,17 @@ def test_losses_of_contact_by_implicit_methods():
         refweb.run(bridled(contact=rubbed))
     solution = refweb.run(bridled(contact=rubbed, solve={"kind": "dynamic", "duration": 0.1, "method": "cvode"}))
     assert solution.solver["energy_drift"] < 1e-2
+    auto = bridled(contact=rubbed, solve={"kind": "dynamic", "duration": 0.1, "method": "auto"})
+    choice = decided(auto, auto.build())
+    assert choice.solve.method == "cvode" and "[contact] has losses, and bodies carry nodes" in choice.reason
+
+
+def test_who_is_not_felt_is_told():
+    """A body that a web is tied to is felt; one beside it, without contact, is not."""
+    tied = bridled().replace(effects=[e for e in bridled().effects if not isinstance(e, refweb.Contact)])
+    beside = tied.replace(effects=[*tied.effects, refweb.Body(name="aside", radius=0.1, mass=1.0, position=(9, 9, 9))])
+    for scene, told in ((tied, False), (beside, True)):
+        assert any("the web does not feel it" in text for text in notices(scene, scene.build())) == told
 
 
 def test_a_node_on_a_fixed_body_is_a_support():

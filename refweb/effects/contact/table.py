@@ -65,13 +65,17 @@ def rotations(body):
 class Contact(Table):
     """Contact of the web with all bodies.
 
+    A sphere touches a line once. Other shapes touch each of its elements at both ends, and once in between, at ξ of its
+    length with the energy W k δ^(p + 1)/(p + 1), W = 4 ξ (1 − ξ), so that nothing jumps as a line slides on. What fades
+    pushes along the line as well, by some δ over the length of the element times the push, to which ± is blind: where
+    bodies are much smaller than elements, have lines in pieces, ``subdivide``, or a larger stiffness.
+
     Parameters
     ----------
     stiffness : float, optional
-        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent. A sphere touches a line once, other shapes
-        each of its elements up to three times. Where it is left out, here and for a body, refweb chooses it from what
-        moves and pushes, and chooses it anew where lines get deeper into the body than a tenth of its size, see
-        `refweb.effects.contact.overlap`.
+        Penalty k of each contact [N/m], or [N/m^1.5] with that exponent. Where it is left out, here and for a body,
+        refweb chooses it from what moves and pushes, and chooses it anew where lines get deeper into the body than a
+        tenth of its size, see `refweb.effects.contact.overlap`.
     exponent : {1, 1.5}
         p of the push k δ^p at the depth δ.
     damping : float
