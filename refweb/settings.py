@@ -204,7 +204,7 @@ class Event(Table):
         Its name.
     kind : {"contact", "taut", "threshold"}
         A body first touches the web; a line that is slack snaps taut, of several slack ones the first; an observable
-        passes a value, either way.
+        passes a value, either way: one that comes back within the same step may not be seen.
     body : str, optional
         Body of a contact, by default any.
     line : int, str or list, optional

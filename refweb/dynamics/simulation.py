@@ -294,6 +294,19 @@ class Simulation:
         for name in self._unfilled:
             end = self._tables[-1][-1, 0]
             yield f"{name} is the mean of the whole run: it ended at t = {end:.6g} s, before a window was full"
+        yield from self._unseen()
+
+    def _unseen(self):
+        """Remarks on thresholds that no step ends behind, though the extreme of their observable lies there."""
+        names = [o.name for o in self.scene.observables]
+        for event, found in zip(self.scene.event, self.solution.events, strict=True):
+            if found["time"] is None and (result := self.solution.reduced.get(event.observe)) is not None:
+                start = self._tables[0][0, 1 + names.index(event.observe)]
+                if (start - event.value) * (result.value - event.value) < 0.0:
+                    yield (
+                        f'event "{event.name}" is not seen: {event.observe} passes {event.value:g} and comes back '
+                        f"within a step, about t = {result.time:.6g} s: lower [output] interval"
+                    )
 
 
 def _overlaps_of(scene, system):

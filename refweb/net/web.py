@@ -177,6 +177,16 @@ class Web:
             found = [self._find_one(name, selection)]
         return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
 
+    def find_around(self, selection):
+        """As `find`, of nodes that go round: those of one name as they lie around their middle, counterclockwise."""
+        found = self.find(selection)
+        if not isinstance(selection, str) or len(found) < 3:
+            return found
+        away = self.points[found] - self.points[found].mean(axis=0)
+        one, other, normal = np.linalg.svd(away)[2]
+        turn = np.copysign(1.0, normal[np.abs(normal).argmax()] * np.linalg.det([one, other, normal]))
+        return found[np.argsort(turn * np.arctan2(away @ other, away @ one), kind="stable")]
+
     def find_lines(self, selection, name="lines"):
         """Line numbers of a selection.
 

@@ -147,13 +147,13 @@ class Throw(Table):
         """What the net has of the target in a state."""
         net = state.system.net
         (centre,) = (state.position[body.row] for body in net.bodies if body.name == self.target)
-        around, nodes = state.position[net.web.find(mouth)], state.position[: len(net.web.points)]
-        size = 0.5 * np.linalg.norm(np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0))
+        outline, nodes = state.position[net.web.find_around(mouth)], state.position[: len(net.web.points)]
+        size = 0.5 * np.linalg.norm(np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0))
         inside = in_hull(nodes, centre)
         return {
             "inside": inside,
             "closed": bool(size <= self.closed * largest),
-            "covered": covered(around, nodes, centre, inside),
+            "covered": covered(outline, nodes, centre, inside),
         }
 
 
@@ -197,23 +197,23 @@ def in_hull(points, place):
     return bool((hull.equations[:, :3] @ place + hull.equations[:, 3] < 0.0).all())
 
 
-def solid_angle(around, centre):
+def solid_angle(outline, centre):
     """Size of the solid angle [sr] of a closed polygon seen from a place, as a fan from the mean of its corners.
 
     Of each triangle after A. van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng.
     30 (1983) 125–126.
     """
-    a, b = around - centre, np.roll(around, -1, axis=0) - centre
-    c = np.broadcast_to(around.mean(axis=0) - centre, a.shape)
+    a, b = outline - centre, np.roll(outline, -1, axis=0) - centre
+    c = np.broadcast_to(outline.mean(axis=0) - centre, a.shape)
     la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
     below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
     return float(abs(2.0 * np.arctan2(volume, below).sum()))
 
 
-def covered(around, nodes, centre, inside):
+def covered(outline, nodes, centre, inside):
     """Share of directions from a centre that a net covers, see `Throw`."""
-    normal, middle = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0), around.mean(axis=0)
-    share = solid_angle(around, centre) / (4.0 * np.pi)
+    normal, middle = np.cross(outline, np.roll(outline, -1, axis=0)).sum(axis=0), outline.mean(axis=0)
+    share = solid_angle(outline, centre) / (4.0 * np.pi)
     within = inside and ((centre - middle) @ normal) * ((nodes.mean(axis=0) - middle) @ normal) > 0.0
     return 1.0 - share if within else share

@@ -336,6 +336,29 @@ def test_an_event_that_ends_one_of_two_runs():
 
 
 @pytest.mark.parametrize("solve", METHODS, ids=NAMES)
+@pytest.mark.parametrize("interval", [0.05, 1e-3])
+def test_a_value_that_is_passed_and_passed_back_within_a_step_is_told(solve, interval):
+    """A mass flies by on a slack line, at 3 mm: nearer than 20 mm from t = (1 − √(0.02² − 0.003²))/3 on, for 13 ms."""
+    near = refweb.Event(name="near", kind="threshold", observe="d", value=0.02)
+    flying = scene(
+        [near], solve, 0.5, [refweb.Observe(name="d", quantity="distance", node=[0, 1], reduce="min")], interval,
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0.003, 0]], lines=[[0, 1]], natural_length=10.0),
+        cable=cable(density=1000.0),
+        supports=refweb.Supports(nodes=[0]),
+        effects=[refweb.Velocity(node=1, value=(-3.0, 0.0, 0.0))],
+    )  # fmt: skip
+    solution = refweb.run(flying)
+    (event,) = solution.events
+    told = any('event "near" is not seen' in text for text in solution.warnings)
+    assert solution.results["d"].value == pytest.approx(0.003, abs=1e-5)
+    assert told == (event["time"] is None)
+    if not told:
+        agrees(solution, "near", (1.0 - np.sqrt(0.02**2 - 0.003**2)) / 3.0, 1e-6)
+    if interval == 1e-3:
+        assert not told
+
+
+@pytest.mark.parametrize("solve", METHODS, ids=NAMES)
 def test_an_event_at_the_end_of_a_row(solve):
     """Masses that tauten their line at 0.1 s, a row of the history: one row there, or one and the last right behind."""
     fields = dict(

@@ -40,6 +40,20 @@ def test_rectangle():
     assert found["up"] == 2.0 and found["down"] == -2.0 and found["aside"] == 0.0
 
 
+@pytest.mark.parametrize("node", ["corners", "rim"])
+def test_nodes_of_a_name_go_round(node):
+    """A window of 2 m without its corners, whose nodes have numbers row by row; counterclockwise seen from +z."""
+    whole = square(
+        [
+            dict(quantity="mouth_area", node=node),
+            dict(quantity="mouth_perimeter", node=node),
+            dict(name="up", quantity="mouth_area", node=node, component="z"),
+        ]
+    ).replace(web=refweb.Window(mesh="square", rows=4, columns=4, side=0.5))
+    found = {name: result.value for name, result in refweb.run(whole).results.items()}
+    np.testing.assert_allclose([*found.values()], [3.5, 4.0 + 2.0 * np.sqrt(2.0), 3.5], rtol=1e-14)
+
+
 def test_mouth_that_is_not_plane():
     """Opposite corners lifted by h: the area vector keeps its length along z, and each side grows to √(s² + h²)."""
     points = [(0, 0, 0.5), (2, 0, 0), (2, 1, 0.5), (0, 1, 0)]

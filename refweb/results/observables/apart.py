@@ -67,13 +67,13 @@ class Distance(Between):
 
 
 class Mouth(Between):
-    """What nodes go round, named in their order around; the last is followed by the first."""
+    """What nodes go round, see `Web.find_around`; the last is followed by the first."""
 
     keys = ("node",)
 
     def rows(self, system):
         """The nodes."""
-        found = np.zeros(0) if self.observe.node is None else system.net.find(self.observe.node)
+        found = np.zeros(0) if self.observe.node is None else system.net.web.find_around(self.observe.node)
         if len(found) < 3:
             raise InputError(
                 f'quantity = "{self.observe.quantity}" is of {len(found)} nodes, must be at least 3: name those of the '
@@ -94,6 +94,7 @@ class MouthPerimeter(Mouth):
 class MouthArea(Mouth):
     """Size of the area vector ½ Σ pᵢ × pᵢ₊₁ of the closed polygon, or a component of it.
 
+    Nodes are listed in their order around; those of one name are taken as they lie around their middle in the web.
     Of a mouth in a plane it is the area; of another one the largest that it has as seen from any side. A component is
     that as seen along an axis, positive where the nodes go round counterclockwise.
     """
