@@ -407,3 +407,25 @@ def test_a_satellite_librates():
     assert body.turning(state.x, state.v)[2] == pytest.approx(-angle * rate, rel=1e-5)
     along = (body.axes @ body.rotation(state.x).T)[0]
     assert abs(along[1]) < 1e-5 * angle
+
+
+def test_a_capsule_moves_as_a_cylinder_with_caps():
+    """In a net that it falls into: the same body, described twice."""
+    ends = []
+    for shape in (dict(shape="capsule", length=0.2), dict(shape="cylinder", length=0.36, rounding=0.08)):
+        pill = refweb.Body(
+            name="pill", radius=0.08, mass=0.3, position=(0.03, 0.02, -0.14), velocity=(0.0, 0.0, 2.0),
+            angular_velocity=(3.0, 5.0, 1.0), axis=(1.0, 0.3, 0.2), **shape,
+        )  # fmt: skip
+        scene = refweb.Scene(
+            web=refweb.Window(mesh="square", rows=4, columns=4, side=0.25),
+            cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-6, density=1000.0),
+            effects=[pill, refweb.Contact(stiffness=2e3)],
+            solve=refweb.Dynamic(duration=0.15),
+            accuracy=refweb.Accuracy(error="none"),
+        )
+        solution = refweb.run(scene)
+        ends.append(solution.state)
+        assert solution.bodies["pill"]["overlap"] > 1e-3  # it is caught
+    np.testing.assert_allclose(ends[1].x, ends[0].x, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(ends[1].v, ends[0].v, rtol=0, atol=1e-7)
