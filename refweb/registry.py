@@ -10,8 +10,6 @@ from __future__ import annotations
 import importlib
 from typing import Any, NamedTuple
 
-from .errors import InputError
-
 WEBS = {
     "paper": "refweb.net.lattices:Paper",
     "window": "refweb.net.lattices:Window",
@@ -246,6 +244,8 @@ def with_fold(given):
     if not said:
         return given
     if "fold" in given or len(said) > 1:
+        from .errors import InputError
+
         raise InputError(f"[web] {said[0]}: the web is folded twice, leave one out")
     own = {"kind": "positions", "file": web["positions"]} if said == ["positions"] else web["fold"]
     rest = {key: value for key, value in web.items() if key not in said}
