@@ -76,6 +76,13 @@ def interrupt(scene, folder):
         refweb.run(scene, out=folder, progress=stop)
 
 
+def whole_and_resumed(scene, folder):
+    """Solutions of a scene without a stop, and of one that is interrupted and resumed; in folders of a folder."""
+    whole = refweb.run(scene, folder / "whole")
+    interrupt(scene, folder / "part")
+    return whole, refweb.resume(folder / "part")
+
+
 def hit_web(title):
     """A small web that a ball hits: eleven frames, some lines slack."""
     return refweb.Scene(

@@ -101,16 +101,17 @@ def run_within_drift(simulation, folder, tell):
             ended = twin.ended() if twin else None
         break
     solution.reduced, standing.repeated, standing.drift, known = run.results, 0, np.inf, np.inf
+    rows = simulation.compared(folder) if ended is not None or scene.throw is not None else None
     if ended is not None:
         from .twin_error import add_errors
 
-        known = add_errors(simulation, run, ended, simulation.compared(folder))
+        known = add_errors(simulation, run, ended, rows)
         if folder is not None:
             folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:
         solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
     if scene.throw is not None:
-        solution.throw = _throw(simulation, run, ended, simulation.compared(folder), known)
+        solution.throw = _throw(simulation, run, ended, rows, known)
 
 
 def _throw(simulation, run, ended, rows, known):

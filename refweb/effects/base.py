@@ -149,6 +149,15 @@ class Family:
         return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
 
 
+def without(columns):
+    """A `Family.sever` that leaves nothing in some columns, a number or a slice."""
+
+    def sever(numbers):
+        numbers[:, columns] = 0.0
+
+    return sever
+
+
 @dataclass(frozen=True, eq=False)
 class Drive:
     """Rows whose motion is prescribed; ``kernel`` (signature `FORCE`) writes their x and v at time t.

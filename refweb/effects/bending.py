@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, real, table
-from .base import Family
+from .base import Family, without
 from .vectors import cross, dot
 
 LARGEST = math.radians(30.0)
@@ -214,10 +214,5 @@ class Bending(Table):
             book="bending_energy",
             internal=True,
             elements=elements,
-            sever=_sever,
+            sever=without(0),
         )
-
-
-def _sever(numbers):
-    """Leave nothing of springs at broken elements."""
-    numbers[:, 0] = 0.0

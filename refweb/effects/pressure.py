@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table, vector
+from .base import without
 from .outer_load import factor_at, outer_load
 
 # Columns of data: p n; dX/dξ; the factor.
@@ -149,7 +150,14 @@ class Pressure(Table):
         pushed = self.value * sides[net.line[at], None] * normal
         data = np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3]])
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
-        own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False, elements=at, sever=_sever)
+        own = dict(
+            force=force,
+            stiffness=stiffness,
+            bound=bound,
+            symmetric=False,
+            elements=at,
+            sever=without(slice(NORMAL, NORMAL + 3)),
+        )
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
 
     def _sides(self, web, lines, normal):
@@ -160,11 +168,6 @@ class Pressure(Table):
         for line in lines[side[lines] == 0.0][:1]:
             raise InputError(f"away_from = {list(self.away_from)} is on neither side of line {line}")
         return np.sign(side)
-
-
-def _sever(numbers):
-    """Leave nothing of the pressure on broken elements."""
-    numbers[:, NORMAL : NORMAL + 3] = 0.0
 
 
 def _integrals(places):

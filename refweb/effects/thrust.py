@@ -19,6 +19,7 @@ from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import shown
 from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table
+from .base import without
 from .line_kernels import direction
 from .outer_load import factor_at, outer_load
 
@@ -66,11 +67,6 @@ def kernels(nodes):
                 rates[cells[c, 0]] += turn * abs(data[c, SLOPES + b])
 
     return force, stiffness, bound
-
-
-def _sever(numbers):
-    """Leave nothing of a force along a broken element, which has no direction."""
-    numbers[:, 0] = 0.0
 
 
 @table
@@ -127,7 +123,7 @@ class Thrust(Table):
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
         own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
-        own |= dict(elements=np.array([cell]), sever=_sever)
+        own |= dict(elements=np.array([cell]), sever=without(0))
         return outer_load(net, "thrust", cells, data, self.factor, **own)
 
     def _line(self, web, node):

@@ -379,9 +379,7 @@ def test_methods_agree_on_a_bridle():
 
 
 def test_a_resumed_run_is_the_same(tmp_path):
-    whole = refweb.run(bridled(), tmp_path / "whole")
-    nets.interrupt(bridled(), tmp_path / "part")
-    resumed = refweb.resume(tmp_path / "part")
+    whole, resumed = nets.whole_and_resumed(bridled(), tmp_path)
     np.testing.assert_array_equal(resumed.state.x, whole.state.x)
     np.testing.assert_array_equal(resumed.state.v, whole.state.v)
 

@@ -340,9 +340,7 @@ def test_implicit_methods_follow_a_free_mesh(files):
 
 def test_a_resumed_run_of_a_free_mesh_is_the_same(files, tmp_path):
     scene = caught(shape="mesh", file=files["ell"])
-    whole = refweb.run(scene, tmp_path / "whole")
-    nets.interrupt(scene, tmp_path / "part")
-    resumed = refweb.resume(tmp_path / "part")
+    whole, resumed = nets.whole_and_resumed(scene, tmp_path)
     assert whole.history["contact_energy"].max() > 0.0
     np.testing.assert_array_equal(resumed.state.x, whole.state.x)
     np.testing.assert_array_equal(resumed.state.v, whole.state.v)

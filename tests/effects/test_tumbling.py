@@ -295,9 +295,7 @@ def test_books_of_a_capture_close(friction, tmp_path):
 
 
 def test_a_resumed_capture_is_the_same(tmp_path):
-    whole = refweb.run(caught(), tmp_path / "whole")
-    nets.interrupt(caught(), tmp_path / "part")
-    resumed = refweb.resume(tmp_path / "part")
+    whole, resumed = nets.whole_and_resumed(caught(), tmp_path)
     np.testing.assert_array_equal(resumed.state.x, whole.state.x)
     np.testing.assert_array_equal(resumed.state.v, whole.state.v)
 

@@ -24,6 +24,7 @@ import sys
 import tempfile
 import time
 
+import meshio
 import numpy as np
 
 import refweb
@@ -122,12 +123,13 @@ def torus(path, ring=0.07, tube=0.03, parts=50):
         ],
         axis=-1,
     )
-    on, up = np.roll(points, -1, axis=0), np.roll(points, -1, axis=1)
+    here = np.arange(2 * parts * parts).reshape(2 * parts, parts)
+    on, up = np.roll(here, -1, axis=0), np.roll(here, -1, axis=1)
     both = np.roll(on, -1, axis=1)
-    faces = np.concatenate([np.stack([points, on, both], axis=2), np.stack([points, both, up], axis=2)]).reshape(-1, 9)
-    vertex = "vertex {} {} {}\n"
-    text = "facet normal 0 0 0\nouter loop\n" + 3 * vertex + "endloop\nendfacet\n"
-    path.write_text("solid torus\n" + "".join(text.format(*face) for face in faces) + "endsolid torus\n")
+    faces = np.concatenate(
+        [np.stack(corners, axis=-1).reshape(-1, 3) for corners in ((here, on, both), (here, both, up))]
+    )
+    meshio.write(path, meshio.Mesh(points.reshape(-1, 3), [("triangle", faces)]))
     return str(path)
 
 

@@ -159,44 +159,43 @@ class Contact(Table):
         lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
         return families + lost
 
-    def _numbers(self, net, bodies, spins=0):
-        """Cells and data of every element with each of some bodies, with ``spins`` rows of their rotations."""
+    def _pairs(self, net, bodies, spins=0):
+        """What a `Family` has of every element with each of some bodies, with ``spins`` rows of their rotations."""
         along = net.cells[:, net.along]
         keys = ("stiffness", "exponent", "damping", "friction", "slip_velocity")
         rows = [[body.row, body.spin, body.turn][: 1 + spins] for body in bodies]
         cells = [np.hstack([along, np.tile(row, (len(along), 1))]) for row in rows]
         laws = [tuple(self._of(body, key) for key in keys) for body in bodies]
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
-        return np.ascontiguousarray(np.vstack(cells), dtype=np.int32), np.ascontiguousarray(np.vstack(data))
-
-    @staticmethod
-    def _sever(nodes):
-        """What moves the elements of cells of so many nodes out of reach of every body."""
+        nodes = along.shape[1]
 
         def sever(numbers):
             numbers[:, AWAY : AWAY + 3 * nodes] += np.tile(OUT_OF_REACH, nodes)
 
-        return sever
+        return dict(
+            name="contact",
+            contact=True,
+            internal=True,
+            cells=np.ascontiguousarray(np.vstack(cells), dtype=np.int32),
+            data=np.ascontiguousarray(np.vstack(data)),
+            elements=np.tile(np.arange(len(along)), len(bodies)),
+            sever=sever,
+        )
 
     def _penalty(self, net, element, depth, spins, bodies):
         """The family of bodies of one depth, or without one of spheres alone; with ``spins`` of 2 they turn."""
-        cells, data = self._numbers(net, bodies, spins)
+        pairs = self._pairs(net, bodies, spins)
         if depth is None:
             from .sphere import kernels
 
-            data = np.ascontiguousarray(data[:, : AWAY + 3 * element[1]])
+            pairs["data"] = np.ascontiguousarray(pairs["data"][:, : AWAY + 3 * element[1]])
             force, energy, stiffness, bound = kernels(*element)
         else:
             from .penalty import kernels
 
             force, energy, stiffness, bound = kernels(depth, *element, spins)
         return Family(
-            name="contact",
-            contact=True,
-            cells=cells,
-            data=data,
-            elements=np.tile(np.arange(len(net.cells)), len(bodies)),
-            sever=self._sever(element[1]),
+            **pairs,
             force=force,
             energy=energy,
             stiffness=stiffness,
@@ -204,7 +203,6 @@ class Contact(Table):
             near=near(*element) if net.order == 1 else None,  # explicit steps take no other elements
             book="contact_energy",
             observed=1,
-            internal=True,
             symmetric=spins == 0,  # moments, and quaternions
         )
 
@@ -212,19 +210,13 @@ class Contact(Table):
         from .friction import kernels
 
         force, stiffness, bound, damping = kernels(depth, *element, spins)
-        cells, data = self._numbers(net, bodies, spins)
         rubbing = None
         if net.order == 1:  # explicit steps take no other elements
             from . import rubbing as kicks
 
             rubbing = kicks.kernels(depth, net.subdivide, element[2], spins)
         return Family(
-            name="contact",
-            contact=True,
-            cells=cells,
-            data=data,
-            elements=np.tile(np.arange(len(net.cells)), len(bodies)),
-            sever=self._sever(element[1]),
+            **self._pairs(net, bodies, spins),
             force=force,
             energy=None,
             stiffness=stiffness,
@@ -234,7 +226,6 @@ class Contact(Table):
             power=0,
             damping=damping,
             rubbing=rubbing,
-            internal=True,
             symmetric=False,
             at_rest=False,
         )

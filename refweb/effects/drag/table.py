@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...messages import nearest
 from ...net.net import REFERENCE
 from ...tables import Several, Table, field, real, table, vector
-from ..base import Family
+from ..base import Family, without
 from .force import kernels
 from .kick import rubbing
 
@@ -173,10 +173,5 @@ class Drag(Table):
             symmetric=False,
             at_rest=blows,
             elements=elements,
-            sever=_sever,
+            sever=without(slice(2)),
         )
-
-
-def _sever(numbers):
-    """Leave nothing of the drag of broken elements."""
-    numbers[:, :2] = 0.0
