@@ -302,6 +302,8 @@ MUTANTS = [
     Mutant("dynamics/integrators/averages", "11.0 / 24.0 * d4", "11.0 / 12.0 * d4"),
     Mutant("dynamics/integrators/averages", "averages.integral[n] -= integral", "pass"),
     Mutant("dynamics/integrators/averages", "if passed >= CELLS:", "if passed > 0:"),
+    Mutant("dynamics/integrators/averages", "third * min(third", "0.0 * min(third"),
+    Mutant("dynamics/integrators/averages", "averages.open[n] += h", "averages.open[n] += 0.0"),
     Mutant("dynamics/integrators/tolerances", "near = 1e-3 * length.min()", "near = 1e-1 * length.min()"),
     Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),

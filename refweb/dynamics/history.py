@@ -229,9 +229,10 @@ class Watch:
     def corrections(self, course, relative=0.0, absolute=None):
         """What ± of results is no less than, by name of the observable.
 
-        That is what extremes exceed the values at steps by. A method that keeps a ``relative`` tolerance may find an
-        extreme of an instant no better than that, and one with ``absolute`` tolerances, by unit, a displacement or a
-        velocity: run and twin that agree more closely do so by chance. What a web at rest moves by is such a result.
+        That is what extremes exceed the values at steps by, and what the integral of a mean leaves open. A method that
+        keeps a ``relative`` tolerance may find an extreme of an instant no better than that, and one with ``absolute``
+        tolerances, by unit, a displacement or a velocity: run and twin that agree more closely do so by chance. What a
+        web at rest moves by is such a result.
         """
         extremes, absolute = course.extremes, absolute or {}
         found = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
@@ -240,6 +241,8 @@ class Watch:
                 at = self._slot(o)
                 peak = max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
                 found[o.name] = max(found[o.name], peak)
+            elif o.average is not None:
+                found[o.name] = max(found[o.name], float(extremes.corrections[self._slot(o)]))
         return found
 
     def drifts(self, course, twin, time):

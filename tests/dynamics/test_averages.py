@@ -4,6 +4,7 @@ A mass on a line that is linear and without mass is an oscillator, v sin(ωt)/ω
 that ends at t is v sin(ω(t − ½w)) sin(½ωw)/(½ω²w).
 """
 
+import itertools
 from dataclasses import replace
 
 import nets
@@ -11,12 +12,23 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb.dynamics.integrators.averages import (
+    PARTS,
+    Windows,
+    begin_averages,
+    coefficients,
+    open_share,
+    slide,
+    write_means,
+)
+from refweb.dynamics.integrators.extremes import Extremes
 from refweb.errors import InputError
 
 STIFFNESS, MASS, SPEED, DURATION = 7e3, 1.0, 1.0, 0.1
 WINDOWS = {"short": 1e-4, "rows": 3.7e-3, "long": 2e-2, "whole": DURATION}
 """Shorter than a step, longer than several rows of 1e-3 s and no multiple of them, of many rows, and all of the run."""
 REDUCE = ("max", "min", "final")
+EXPLICIT = "central-difference", "order 4", "order 6"
 METHODS = nets.METHODS | {"ida": dict(method="ida", rtol=1e-5)}
 
 
@@ -125,6 +137,61 @@ def test_mean_of_a_contact_force_is_momentum_over_time(width):
     rows = refweb.run(flight((0, 0, 1.0), 0.02, width, observe, [refweb.Contact(stiffness=1e5)])).history
     assert rows["time"][1] == width and abs(rows["push"][1]) > 1.0
     np.testing.assert_allclose(rows["push"][1] * width, 2.0 * np.diff(rows["speed"])[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", [*METHODS])
+@pytest.mark.parametrize("interval", [0.05, 0.5])
+def test_mean_of_what_dips_within_a_step(method, interval):
+    """A node flies by another at 3 m/s, 3 mm beside it: ∫ √(c² + u²) du in closed form; nothing limits steps."""
+    speed, aside, start, window = 3.0, 3e-3, -0.7, 0.4
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [start, aside, 0]], lines=[[0, 1]], supports=[0], natural_length=10.0),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1e3),
+        effects=[refweb.Velocity(node=1, value=(speed, 0, 0))],
+        solve=refweb.Dynamic(duration=0.5, **METHODS[method]),
+        output=refweb.Output(interval=interval),
+        observe=[refweb.Observe(name=r, quantity="distance", node=[0, 1], average=window, reduce=r) for r in REDUCE],
+    )
+
+    def truth(end):
+        u = start + speed * (end - np.array([window, 0.0]))
+        return np.diff(0.5 * (u * np.hypot(aside, u) + aside**2 * np.arcsinh(u / aside)))[0] / (speed * window)
+
+    results = refweb.run(scene).results
+    turn = 2.0 * -start / speed  # window of equal distances at both ends
+    for name, value in {"max": truth(0.5), "min": truth(0.5 * (turn + window)), "final": truth(0.5)}.items():
+        assert abs(results[name].value - value) <= results[name].error < 1e-2 * value, (name, results[name], value)
+    assert method in EXPLICIT or abs(results["final"].value - truth(0.5)) < 1e-9
+
+
+def test_what_an_integral_leaves_open_holds_a_kink():
+    """|s − a| through five values: the polynomial's mean is off by no more than what is left open, wherever a is."""
+    at = np.linspace(0.0, 1.0, PARTS + 1)
+    for kink in np.linspace(0.0, 1.0, 1201):  # thirds among them, where the fourth difference vanishes
+        values = np.abs(at - kink)
+        c = coefficients(values, True)
+        mean, truth = sum(one / (k + 1) for k, one in enumerate(c)), 0.5 * (kink**2 + (1.0 - kink) ** 2)
+        assert abs(mean - truth) <= open_share(values) + 1e-15  # rounding
+
+
+@pytest.mark.parametrize("width", [0.3, 0.7, 1.0])
+def test_means_leave_open_what_kinks_within_their_window_do(width):
+    """The same over a window of six steps of random lengths, or less, from a start at t = 0 or not."""
+    rng = np.random.default_rng(22)
+    for _ in range(50):
+        kink, times = rng.uniform(0.0, 1.0), np.array([0.0, *np.sort(rng.uniform(0.1, 0.9, 5)), 1.0])
+        windows = Windows(np.zeros(1, dtype=np.int64), np.array([width]), np.zeros(1))
+        extremes = Extremes.at_start(np.array([kink]), np.zeros(1, dtype=np.int64))
+        averages, row = begin_averages(windows, extremes), np.zeros(2)
+        for begin, end in itertools.pairwise(times):
+            averages.within[0] = np.abs(np.linspace(begin, end, PARTS + 1) - kink)
+            slide(0, end, True, windows, averages, extremes)
+            averages.looked[0] = end
+        write_means(row, windows, averages, extremes)
+        start, end = 1.0 - width - kink, 1.0 - kink
+        truth = 0.5 * (end * abs(end) - start * abs(start)) / width
+        assert abs(row[1] - truth) <= extremes.corrections[0] + 1e-14  # rounding
+        assert extremes.corrections[0] <= np.diff(times).max() ** 2 / 6.0 / width + 1e-14  # a kink in its middle
 
 
 def test_a_long_run_keeps_its_digits():

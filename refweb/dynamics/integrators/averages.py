@@ -3,7 +3,9 @@
 The mean of a value q over the window of length w that ends at t is (I(t) − I(t − w))/w, with I the integral of q. I and
 q are kept at `CELLS` times of a window, spaced evenly from t = 0 on, whatever the steps are; at any other time the
 cubic through I and its rate q at the ends of a cell tells I. In a step q is a polynomial: linear where the motion is of
-order 2, else of degree 4 through its values at `PARTS` equal parts. No value is looked at more than once for it.
+order 2, else of degree 4 through its values at `PARTS` equal parts. What that leaves open, see `open_share`, is summed
+beside the integral: ± is no less than that of the window. A method that tells the motion at any time halves steps that
+leave open more than `SETTLED`.
 
 Before t = w the mean is that of what has passed, I(t)/t, and the value itself at t = 0. Largest and smallest means are
 those of full windows alone. They are looked for at the ends of cells, at rows and, where the rate of the mean,
@@ -24,6 +26,10 @@ CELLS = 1024
 """Number of cells of a window. The mean of a sine over a whole period is off its largest value by 4e-12 of that."""
 PARTS = 4
 """Number of equal parts of a step of higher order at whose ends a value is looked at."""
+SETTLED, HALVINGS = 1e-8, 10
+"""Share of the values of a step that its integral may leave open before it is halved, and how often it may be."""
+PAYS = 0.75
+"""Share of what is left open that half a step may leave for another halving: at a kink it is ½, of rounding all."""
 NEAR = 1e-12
 """Share of a time within which a step that ends before the end of a cell is taken to meet it."""
 
@@ -65,6 +71,10 @@ class Averages(NamedTuple):
         Number of the last cell that is passed.
     integral : ndarray, shape (averaged,)
         Integral at the last look, but for the same constant.
+    opens : ndarray, shape (averaged, CELLS + 1)
+        What the integrals of all steps so far leave open, at the ends of the last cells.
+    open : ndarray, shape (averaged,)
+        The same at the last look.
     within : ndarray, shape (averaged, PARTS + 1)
         Value at the last look, then at the ends of equal parts of the step behind it.
     latest : ndarray, shape (averaged, 2)
@@ -77,6 +87,8 @@ class Averages(NamedTuple):
     values: np.ndarray
     passed: np.ndarray
     integral: np.ndarray
+    opens: np.ndarray
+    open: np.ndarray
     within: np.ndarray
     latest: np.ndarray
     looked: np.ndarray
@@ -88,7 +100,8 @@ class Averages(NamedTuple):
         kept, within = np.zeros((count, CELLS + 1)), np.zeros((count, PARTS + 1))
         kept[:, 0] = within[:, 0] = values
         passed, none = np.zeros(count, dtype=np.int64), np.zeros((count, 2))
-        return cls(np.zeros_like(kept), kept, passed, np.zeros(count), within, none, np.zeros(1))
+        opens = np.zeros_like(kept), np.zeros(count)
+        return cls(np.zeros_like(kept), kept, passed, np.zeros(count), *opens, within, none, np.zeros(1))
 
 
 def begin_averages(windows, extremes):
@@ -111,6 +124,33 @@ def coefficients(values, smooth):
 
 
 @kernel()
+def open_share(values):
+    """What the integral over a step leaves open, over the length of the step, by values at the ends of its parts.
+
+    The fourth difference is what halving the step changes in Simpson's rule. Of a smooth value Boole's rule is better
+    by the square of the step, which is what differences fall with from the second to the fourth; at a kink, where they
+    do not fall, it is no better. A kink at a third of the step has no fourth difference, but a third one, as has a
+    value that turns from one side to the other: there this is too large until steps are halved.
+    """
+    first, middle = values[0] - 2.0 * values[1] + values[2], values[1] - 2.0 * values[2] + values[3]
+    last = values[2] - 2.0 * values[3] + values[4]
+    second, third = max(abs(first), abs(middle), abs(last)), max(abs(middle - first), abs(last - middle))
+    fourth = abs(first - 2.0 * middle + last)
+    if not second > 0.0:
+        return 0.0
+    return max(fourth * min(fourth / second, 1.0), third * min(third / second, 1.0) ** 3) / 6.0
+
+
+@kernel()
+def open_mean(n, windows, averages):
+    """What the mean at the last look leaves open."""
+    t, passed, width = averages.looked[0], averages.passed[n], windows.widths[n]
+    if passed < CELLS:
+        return averages.open[n] / t if t > 0.0 else 0.0
+    return (averages.open[n] - averages.opens[n, (passed + 1) % (CELLS + 1)]) / width
+
+
+@kernel()
 def compare(n, begin, end, mean, rate, windows, averages, extremes):
     """Take over a mean at the time ``end``, or one since that of the latest, ``begin``, that exceeds the extreme."""
     slot, sign, span = windows.slots[n], windows.signs[n], end - begin
@@ -125,7 +165,8 @@ def compare(n, begin, end, mean, rate, windows, averages, extremes):
             top, when = averages.latest[n, 0] + sign * height, begin + share * span
             correction = abs(height - 0.5 * first * first / (first - last))
     if sign * top > sign * extremes.values[slot]:
-        extremes.values[slot], extremes.times[slot], extremes.corrections[slot] = top, when, correction
+        extremes.values[slot], extremes.times[slot] = top, when
+        extremes.corrections[slot] = correction + open_mean(n, windows, averages)
 
 
 @kernel()
@@ -142,7 +183,7 @@ def end_cell(n, integral, value, windows, averages, extremes):
             compare(n, since, passed * cell, mean, rate, windows, averages, extremes)
         averages.latest[n, 0], averages.latest[n, 1] = mean, rate
     at = passed % (CELLS + 1)
-    averages.integrals[n, at], averages.values[n, at] = integral, value
+    averages.integrals[n, at], averages.values[n, at], averages.opens[n, at] = integral, value, averages.open[n]
     if passed % CELLS == 0:  # integrals begin anew: of a long run they would lose digits
         averages.integral[n] -= integral
         for k in range(CELLS + 1):
@@ -154,6 +195,8 @@ def slide(n, now, smooth, windows, averages, extremes):
     """Slide a window to the end of a step, whose values ``within`` holds."""
     begin, cell, values = averages.looked[0], windows.widths[n] / CELLS, averages.within[n]
     h, (c0, c1, c2, c3, c4) = now - begin, coefficients(values, smooth)
+    if smooth:
+        averages.open[n] += h * open_share(values)
     at = (averages.passed[n] + 1) * cell
     while at <= now * (1.0 + NEAR):
         s = (at - begin) / h
@@ -187,6 +230,8 @@ def write_means(row, windows, averages, extremes):
     for n in range(windows.slots.size):
         mean, rate = mean_now(n, windows, averages)
         row[1 + windows.slots[n]] = mean
+        if windows.signs[n] == 0.0:
+            extremes.corrections[windows.slots[n]] = open_mean(n, windows, averages)
         if windows.signs[n] != 0.0 and averages.passed[n] >= CELLS:
             begin = averages.passed[n] * windows.widths[n] / CELLS
             compare(n, begin, averages.looked[0], mean, rate, windows, averages, extremes)

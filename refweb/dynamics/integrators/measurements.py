@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...results.probes import PLACE
-from .averages import PARTS, Windows, begin_averages, slide, write_means
+from .averages import HALVINGS, PARTS, PAYS, SETTLED, Windows, begin_averages, open_share, slide, write_means
 from .extremes import EDGE, Extremes, note_time, turns_back
 
 ROUNDS = 6
@@ -125,12 +125,25 @@ class Measurements:
         averages, slots = course.averages, self._windows.slots
         if not len(slots):
             return
-        inside = (piece.begin + (end.time - piece.begin) * part / PARTS for part in range(1, PARTS))
-        for part, sample in enumerate((*map(sample_at, inside), end), 1):
-            averages.within[:, part] = [self.probe(i, sample) for i in slots]
-        for n in range(len(slots)):
-            slide(n, piece.end.time, True, self._windows, averages, course.extremes)
-        averages.looked[0] = piece.end.time
+        todo = [(piece.begin, end.time, end, HALVINGS, np.inf)]
+        while todo:
+            begin, until, last, halvings, before = todo.pop()
+            inside = [sample_at(begin + (until - begin) * part / PARTS) for part in range(1, PARTS)]
+            for part, sample in enumerate((*inside, last), 1):
+                averages.within[:, part] = [self.probe(i, sample) for i in slots]
+            left = np.array([open_share(w) for w in averages.within])
+            pays = (left > SETTLED * np.abs(averages.within).max(axis=1)) & (left < PAYS * before)
+            if halvings and pays.any():
+                middle = inside[PARTS // 2 - 1]
+                todo += [
+                    (middle.time, until, last, halvings - 1, left),
+                    (begin, middle.time, middle, halvings - 1, left),
+                ]
+                continue
+            now = piece.end.time if last is end else until
+            for n in range(len(slots)):
+                slide(n, now, True, self._windows, averages, course.extremes)
+            averages.looked[0] = now
         if piece.jump:
             averages.within[:, 0] = [self.probe(i, piece.end) for i in slots]
 

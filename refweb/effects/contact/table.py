@@ -159,7 +159,7 @@ class Contact(Table):
         lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
         return families + lost
 
-    def _pairs(self, net, bodies, spins=0):
+    def _pairs(self, net, bodies, spins=0) -> dict:
         """What a `Family` has of every element with each of some bodies, with ``spins`` rows of their rotations."""
         along = net.cells[:, net.along]
         keys = ("stiffness", "exponent", "damping", "friction", "slip_velocity")
