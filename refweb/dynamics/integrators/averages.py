@@ -72,9 +72,9 @@ class Averages(NamedTuple):
     integral : ndarray, shape (averaged,)
         Integral at the last look, but for the same constant.
     opens : ndarray, shape (averaged, CELLS + 1)
-        What the integrals of all steps so far leave open, at the ends of the last cells.
+        What the integrals of all steps before those at the ends of the last cells leave open.
     open : ndarray, shape (averaged,)
-        The same at the last look.
+        The same of all steps.
     within : ndarray, shape (averaged, PARTS + 1)
         Value at the last look, then at the ends of equal parts of the step behind it.
     latest : ndarray, shape (averaged, 2)
@@ -170,8 +170,8 @@ def compare(n, begin, end, mean, rate, windows, averages, extremes):
 
 
 @kernel()
-def end_cell(n, integral, value, windows, averages, extremes):
-    """Pass the end of a cell, at which the integral is that from the last look on."""
+def end_cell(n, integral, value, left, windows, averages, extremes):
+    """Pass the end of a cell, at which the integral is that since the last look; ``left`` is open before the step."""
     averages.passed[n] += 1
     passed, width, cell = averages.passed[n], windows.widths[n], windows.widths[n] / CELLS
     integral += averages.integral[n]
@@ -183,7 +183,7 @@ def end_cell(n, integral, value, windows, averages, extremes):
             compare(n, since, passed * cell, mean, rate, windows, averages, extremes)
         averages.latest[n, 0], averages.latest[n, 1] = mean, rate
     at = passed % (CELLS + 1)
-    averages.integrals[n, at], averages.values[n, at], averages.opens[n, at] = integral, value, averages.open[n]
+    averages.integrals[n, at], averages.values[n, at], averages.opens[n, at] = integral, value, left
     if passed % CELLS == 0:  # integrals begin anew: of a long run they would lose digits
         averages.integral[n] -= integral
         for k in range(CELLS + 1):
@@ -195,6 +195,7 @@ def slide(n, now, smooth, windows, averages, extremes):
     """Slide a window to the end of a step, whose values ``within`` holds."""
     begin, cell, values = averages.looked[0], windows.widths[n] / CELLS, averages.within[n]
     h, (c0, c1, c2, c3, c4) = now - begin, coefficients(values, smooth)
+    left = averages.open[n]
     if smooth:
         averages.open[n] += h * open_share(values)
     at = (averages.passed[n] + 1) * cell
@@ -202,7 +203,7 @@ def slide(n, now, smooth, windows, averages, extremes):
         s = (at - begin) / h
         integral = h * s * (c0 + s * (c1 / 2.0 + s * (c2 / 3.0 + s * (c3 / 4.0 + s * c4 / 5.0))))
         value = c0 + s * (c1 + s * (c2 + s * (c3 + s * c4)))
-        end_cell(n, integral, value, windows, averages, extremes)
+        end_cell(n, integral, value, left, windows, averages, extremes)
         at = (averages.passed[n] + 1) * cell
     averages.integral[n] += h * (c0 + c1 / 2.0 + c2 / 3.0 + c3 / 4.0 + c4 / 5.0)
     values[0] = values[PARTS]
