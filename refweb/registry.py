@@ -81,6 +81,7 @@ OBSERVABLES = {
     "strain_energy": "refweb.results.observables.book:StrainEnergy",
     "potential_energy": "refweb.results.observables.book:PotentialEnergy",
     "contact_energy": "refweb.results.observables.book:ContactEnergy",
+    "body_contact_energy": "refweb.results.observables.book:BodyContactEnergy",
     "bending_energy": "refweb.results.observables.book:BendingEnergy",
     "frame_energy": "refweb.results.observables.book:FrameEnergy",
     "orbit_energy": "refweb.results.observables.book:OrbitEnergy",

@@ -151,6 +151,14 @@ class Shape(Table):
 
         return depth
 
+    def skeleton(self):
+        """Parts by which it touches other bodies, as `refweb.net.skeleton` makes them; None: it touches none."""
+        return None
+
+    def touched(self, thickness):
+        """The `Grown` that parts of other bodies feel which are so thick at most [m]."""
+        return self.grown()
+
     def farthest(self, normals):
         """Points of the core (n, 3) [m] that are farthest along unit vectors (n, 3)."""
         return np.sign(normals) * self.grown().core

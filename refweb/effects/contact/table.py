@@ -15,11 +15,13 @@ import numpy as np
 from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest, shown
-from ...tables import Table, field, real, table
+from ...tables import Table, boolean, field, real, table
 from ..base import Family
 from .nearest_point import near
 from .pair import AWAY, pair_data
 
+KEYS = "stiffness", "exponent", "damping", "friction", "slip_velocity"
+"""Keys of the law of a contact."""
 OUT_OF_REACH = 1e6, 7e5, 4e5
 """How far from every body broken elements are taken to be [m]."""
 
@@ -86,6 +88,9 @@ class Contact(Table):
     slip_velocity : float
         Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Explicit steps
         do not depend on it.
+    between_bodies : bool
+        Whether bodies touch each other as well, edges on edges too: all but pairs that are both fixed. Stiffness,
+        damping, friction and slip velocity of a pair are the larger of both bodies'.
     bodies : dict of str to BodyContact
         What differs for a body.
 
@@ -108,6 +113,7 @@ class Contact(Table):
     damping: float = real(default=0.0, at_least=0, unit="s/m")
     friction: float = real(default=0.0, at_least=0)
     slip_velocity: float = real(default=1e-2, above=0, unit="m/s")
+    between_bodies: bool = boolean(default=False)
     bodies: dict = field(_bodies, default_factory=dict)
 
     def _of(self, body, key):
@@ -157,15 +163,28 @@ class Contact(Table):
                 losing.setdefault((body.shape.depth(), spins), []).append(body)
         families = [self._penalty(net, element, depth, spins, bodies) for (depth, spins), bodies in pressed.items()]
         lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
+        if self.between_bodies:
+            from .bodies import families as between
+
+            return families + lost + between(net, self.law_between)
         return families + lost
+
+    def law_between(self, first, second):
+        """(stiffness, exponent, damping, friction, slip velocity) of two bodies."""
+        laws = [[self._of(body, key) for key in KEYS] for body in (first, second)]
+        if laws[0][1] != laws[1][1]:
+            raise InputError(
+                f'exponent = {laws[0][1]:g} of body "{first.name}" and {laws[1][1]:g} of "{second.name}" must be equal '
+                "where between_bodies = true"
+            )
+        return tuple(map(max, *laws))
 
     def _pairs(self, net, bodies, spins=0) -> dict:
         """What a `Family` has of every element with each of some bodies, with ``spins`` rows of their rotations."""
         along = net.cells[:, net.along]
-        keys = ("stiffness", "exponent", "damping", "friction", "slip_velocity")
         rows = [[body.row, body.spin, body.turn][: 1 + spins] for body in bodies]
         cells = [np.hstack([along, np.tile(row, (len(along), 1))]) for row in rows]
-        laws = [tuple(self._of(body, key) for key in keys) for body in bodies]
+        laws = [tuple(self._of(body, key) for key in KEYS) for body in bodies]
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         nodes = along.shape[1]
 

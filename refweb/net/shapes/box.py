@@ -49,6 +49,12 @@ class Box(Shape):
         edge = edge_radius(self.rounding, self.size)
         return Grown(edge, shrunk(self.size, edge))
 
+    def skeleton(self):
+        """The edges of its core."""
+        from ..skeleton import of_box
+
+        return of_box(self.grown())
+
     def frame(self):
         """Unit vectors of its edges."""
         return axes_of(self.axes)

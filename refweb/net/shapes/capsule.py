@@ -46,6 +46,12 @@ class Capsule(Shape):
         """Its axis, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, 0.5 * self.length))
 
+    def skeleton(self):
+        """Its axis."""
+        from ..skeleton import of_box
+
+        return of_box(self.grown())
+
     def frame(self):
         """Unit vectors of its axes, its own third."""
         return axes_about("axis", self.axis)

@@ -57,6 +57,12 @@ class Cylinder(Shape):
         edge = edge_radius(self.rounding, self._sizes())
         return Grown(edge, shrunk(self._sizes(), edge), round=True)
 
+    def skeleton(self):
+        """The rims of its core, and its axis."""
+        from ..skeleton import of_cylinder
+
+        return of_cylinder(self.grown())
+
     def frame(self):
         """Unit vectors of its axes, its own third."""
         return axes_about("axis", self.axis)

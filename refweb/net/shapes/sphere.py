@@ -36,6 +36,12 @@ class Sphere(Shape):
         """A point, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, 0.0))
 
+    def skeleton(self):
+        """Its centre."""
+        from ..skeleton import of_box
+
+        return of_box(self.grown())
+
     def inertia(self, mass):
         """Of a solid sphere, 2/5 m r²."""
         return 0.4 * mass * self.radius**2 * np.eye(3)

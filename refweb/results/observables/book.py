@@ -72,6 +72,12 @@ class ContactEnergy(Booked):
     needs = "[contact]"
 
 
+class BodyContactEnergy(Booked):
+    """Of contact between bodies."""
+
+    needs = "[contact] with between_bodies = true"
+
+
 class BendingEnergy(Booked):
     """Of bent lines."""
 

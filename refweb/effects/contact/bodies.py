@@ -1,0 +1,124 @@
+"""Pairs of bodies that may touch each other, as families of cells.
+
+A cell is two bodies: the rows of both, and two rows of rotation of each; where a body has fewer, its own row stands in
+their place and is not read. A skeleton that is one point with all of the thickness, a sphere's, says all there is to
+say of its contact with another body, whose own skeleton is then left out.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...net.skeleton import COLUMNS, THICKNESS
+from ..base import Family
+from .pair import AWAY, lever
+from .pressing import BEGIN, PARTS, SIDE, SIDES
+
+PER_PART, MORE = 3, 1024
+"""Contacts that a part of a skeleton has at most on a convex body; room for more where one is not convex."""
+
+
+def pairs_of(net):
+    """All pairs of bodies of a net that may touch: not two that are fixed."""
+    return [(a, b) for a, b in itertools.combinations(net.bodies, 2) if not (a.fixed and b.fixed)]
+
+
+def skeleton_of(body):
+    """The skeleton of the shape of a body, or a refusal by name."""
+    parts = body.shape.skeleton()
+    if parts is None:
+        raise InputError(
+            f'between_bodies = true: body "{body.name}" has a shape that says nothing of its edges and does not touch '
+            "other bodies; leave between_bodies out, or give it another shape"
+        )
+    return parts
+
+
+def families(net, law_of):
+    """The families of all pairs of bodies of a net, of one kind each.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        With bodies.
+    law_of : callable
+        (stiffness, exponent, damping, friction, slip velocity) of two bodies.
+    """
+    if not (pairs := pairs_of(net)):
+        raise InputError(
+            "between_bodies = true has no meaning here: it takes two bodies, one of them free; leave it out"
+        )
+    pressed, losing = {}, {}
+    for a, b in pairs:
+        law, depths = law_of(a, b), tuple(body.shape.depth() for body in (a, b))
+        pressed.setdefault(depths, []).append((a, b, law))
+        if law[2] > 0.0 or law[3] > 0.0:
+            losing.setdefault(depths, []).append((a, b, law))
+    return [_penalty(net, depths, group) for depths, group in pressed.items()]
+
+
+def _penalty(net, depths, group):
+    from .apart import kernels, near
+
+    force, energy, stiffness, bound = kernels(*depths)
+    return Family(
+        **_shared(net, group),
+        force=force,
+        energy=energy,
+        stiffness=stiffness,
+        bound=bound,
+        near=near,
+        book="body_contact_energy",
+        symmetric=not any(body.turn is not None for a, b, _ in group for body in (a, b)),  # moments, and quaternions
+    )
+
+
+def _shared(net, group):
+    """What a `Family` has of some pairs."""
+    cells, data = zip(*(_pair(net, *pair) for pair in group), strict=True)
+    room = np.zeros((len(data), max(len(row) for row in data)))
+    for row, own in zip(room, data, strict=True):
+        row[: len(own)] = own
+    room[:, 0] = room[:, 0].max()
+    return dict(name="contact", internal=True, cells=np.array(cells, dtype=np.int32), data=room, observed=1)
+
+
+def _pair(net, first, second, law):
+    """(rows, numbers) of two bodies."""
+    skeletons = [skeleton_of(body) for body in (first, second)]
+    points = [len(parts) == 1 and body.shape.once for parts, body in zip(skeletons, (first, second), strict=True)]
+    if points[0] or points[1]:
+        skeletons[0 if points[1] and not points[0] else 1] = np.zeros((0, COLUMNS))
+    rows, sides, begin = [first.row, second.row], [], SIDES + 2 * SIDE
+    grown = [max(parts[:, THICKNESS], default=0.0) for parts in reversed(skeletons)]
+    for body, parts, more in zip((first, second), skeletons, grown, strict=True):
+        spins = [row for row in (body.spin, body.turn) if row is not None]
+        rows += (spins + [body.row, body.row])[:2]
+        sides.append(_side(body, len(spins), law, len(parts), begin, more))
+        begin += parts.size
+    convex = all(getattr(body.shape.depth(), "convex", True) for body in (first, second))
+    room = PER_PART * sum(len(parts) for parts in skeletons) + (0 if convex else MORE)
+    numbers = [[room], net.points[first.row] - net.points[second.row], *sides, *(parts.ravel() for parts in skeletons)]
+    return rows, np.concatenate(numbers)
+
+
+def _side(body, spins, law, parts, begin, more):
+    """Numbers of one body of a pair, see `refweb.effects.contact.pressing`, the other being ``more`` thick."""
+    (radius, core, round_, *field), (stiffness, *losses) = body.shape.touched(more), law
+    mobility = body.mobility[np.triu_indices(3)] if spins == 2 else (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
+    own = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, _lever(body, spins), body.extent]
+    own += [not body.fixed, body.thickness, parts, begin]
+    pair = [body.shape.extent, stiffness, *np.zeros(6), *losses, radius, *core, round_, False, False]
+    pair += [*np.eye(3).ravel(), *field]
+    return np.array([*own, *pair], dtype=float)
+
+
+def _lever(body, spins):
+    """√(I (y × g)·J⁻¹(y × g)) for any point y of a body, at most [m]."""
+    if spins < 2:
+        return body.radius
+    return lever(body)

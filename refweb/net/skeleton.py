@@ -1,0 +1,85 @@
+"""Skeletons: the points, straight lines and arcs by which a body touches other bodies, each grown by a thickness.
+
+Two convex bodies touch with a corner on a face, a face on a corner, or with two edges: so what touches is a corner or
+an edge of one of them, held against the depth in the other. A sphere is a point and a capsule a line of great
+thickness, a box its edges, a cylinder its two rims. An edge has corners at its ends, each of which one edge owns: at
+the others it would count again.
+
+A rim is made of arcs in two rows, one half an arc behind the other. Each touches once, with a window sin²(π ξ); both
+windows together are 1 wherever the rim is deepest, so that it rolls without a bump.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+POINT, SEGMENT, ARC = 0.0, 1.0, 2.0
+"""Kinds of a part."""
+KIND, THICKNESS, FROM, TO, THIRD, OWNS, COLUMNS = 0, 1, 2, 5, 8, 11, 13
+"""Columns of a part: kind; thickness [m]; the point, both ends of a line, or the centre of an arc and two vectors at
+right angles of its radius, of which the places are centre + TO cos φ + THIRD sin φ [m]; whether it owns its ends, or φ
+at both ends [rad]. All is from the centre of the shape along its axes."""
+ARCS = 4
+"""Number of arcs in a row around a rim."""
+
+
+def points(places, thickness):
+    """Parts that are points (n, 3), shape (n, `COLUMNS`)."""
+    found = np.zeros((len(places), COLUMNS))
+    found[:, KIND], found[:, THICKNESS], found[:, FROM:TO] = POINT, thickness, places
+    return found
+
+
+def edges(places, pairs, thickness):
+    """Parts that are the lines between pairs (n, 2) of points (n, 3), shape (n, `COLUMNS`).
+
+    Each point belongs to the first line that ends there.
+    """
+    found, owned = np.zeros((len(pairs), COLUMNS)), set()
+    found[:, KIND], found[:, THICKNESS] = SEGMENT, thickness
+    for n, pair in enumerate(pairs):
+        for end, (corner, column) in enumerate(zip(pair, (FROM, TO), strict=True)):
+            found[n, column : column + 3] = places[corner]
+            found[n, OWNS + end] = corner not in owned
+            owned.add(corner)
+    return found
+
+
+def rim(radius, height, thickness):
+    """Parts of a circle about the third axis, shape (2 `ARCS`, `COLUMNS`)."""
+    found = np.zeros((2 * ARCS, COLUMNS))
+    found[:, KIND], found[:, THICKNESS] = ARC, thickness
+    found[:, FROM + 2], found[:, TO], found[:, THIRD + 1] = height, radius, radius
+    found[:, OWNS] = math.pi / ARCS * np.arange(2 * ARCS)
+    found[:, OWNS + 1] = found[:, OWNS] + 2.0 * math.pi / ARCS
+    return found
+
+
+def of_box(grown):
+    """Parts of a box that has grown, a `refweb.net.rigid_body.Grown`: also of a point or a line."""
+    corners = np.array(list(itertools.product(*([-c, c] if c > 0.0 else [0.0] for c in grown.core))))
+    pairs = [
+        (i, j)
+        for i, j in itertools.combinations(range(len(corners)), 2)
+        if np.count_nonzero(corners[i] != corners[j]) == 1
+    ]
+    return edges(corners, pairs, grown.radius) if pairs else points(corners, grown.radius)
+
+
+def of_cylinder(grown):
+    """Parts of a cylinder about the third axis that has grown: its rims, and if it is long its axis.
+
+    The axis has grown to a capsule inside, for sides that cross. Where they do so nearer to an end than the radius, one
+    lies up to 0.13 of it in the other before a rim touches.
+    """
+    radius, _, half = grown.core
+    if not radius > 0.0:
+        return of_box(grown)
+    parts = [rim(radius, height, grown.radius) for height in ((-half, half) if half > 0.0 else (0.0,))]
+    if (inner := half - radius) > 0.0:
+        ends = np.array([[0.0, 0.0, -inner], [0.0, 0.0, inner]])
+        parts.append(edges(ends, [(0, 1)], grown.radius + radius))
+    return np.vstack(parts)
