@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..effects.base import pairs_of
 from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
 from ..results import probes
@@ -48,6 +49,10 @@ def _probes_of_warnings(system, followed):
         from ..results.observables.overlap import probe_of
 
         found |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
+    if pairs_of(system):
+        from ..results.observables.overlap import probes_between
+
+        found |= probes_between(system)
     return found
 
 
@@ -111,6 +116,8 @@ class Watch:
         self._warned = _probes_of_warnings(system, self.probes)
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
+        if pairs_of(system) and scene.solve.method != "central-difference":
+            self.sums.append(Sum(weights(system, "step_size"), 1.0))
         self.events = self._add_events(scene.event)
         used = self._of_warning("utilisation")
         if system.weakness is not None and used is not None:
@@ -296,6 +303,20 @@ class Watch:
             value, place = float(extremes.values[at]), int(extremes.places[at])
             if value > 0.0:
                 overlaps.note(i, value, float(extremes.times[at]), int(self.system.net.line[place]))
+
+        if overlaps.pairs is not None:
+            for i in range(len(overlaps.pairs.found)):
+                at = self._of_warning(("between", i))
+                overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]))
+
+    def note_way(self, course, pairs, solve):
+        """Note what bounds the way of bodies in a step in `refweb.effects.contact.pair_overlap.PairOverlaps`."""
+        if solve.method == "central-difference" and solve.step_size is None:
+            pairs.note_way(safety=solve.safety)
+            return
+        speed, values = self._of_warning("body speed"), course.extremes.values
+        step = len(self.probes) + len(self._followed)
+        pairs.note_way(step=float(values[step]), speed=float(values[speed]))
 
     def _of_warning(self, name):
         """Number of the probe of a warning, None where there is none."""

@@ -245,6 +245,9 @@ class Simulation:
         self._strain = watch.strain(course)
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
+            if (pairs := self.overlaps.pairs) is not None:
+                watch.note_way(course, pairs, self.scene.solve)
+                solution.pairs, solution.passage = pairs.plain(), {"bodies": pairs.passage()}
         if np.isfinite(course.x).all():
             solution.state = self._state(course)
         if course.breaks is not None:

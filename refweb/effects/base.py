@@ -82,7 +82,9 @@ class Family:
         natural lengths may follow time. ``out`` is then one array for all such families: the whole tension and the
         strain, in the columns `TENSION` and `STRAIN`, and the `POWER` of a force beside that of the law.
     contact : bool
-        Whether it is contact with bodies.
+        Whether it is contact of lines with bodies.
+    pairs : tuple of (RigidBody, RigidBody)
+        The bodies of each cell, where it is contact between bodies; ``out`` is then how deep they are in each other.
     angular_velocity : sequence of 3 float, optional
         That of the frame [rad/s], where the forces are those of inertia in a frame that turns.
     orbit_radius : float, optional
@@ -128,6 +130,7 @@ class Family:
     power: int | None = None
     lines: bool = False
     contact: bool = False
+    pairs: tuple = ()
     angular_velocity: tuple | None = None
     orbit_radius: float | None = None
     damping: Callable | None = None
@@ -147,6 +150,11 @@ class Family:
     def dead(self):
         """Whether it is a load that follows from time alone, with a power and a potential."""
         return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
+
+
+def pairs_of(system):
+    """Pairs of bodies of a system that may touch each other, in the order of families and their cells."""
+    return [pair for family in system.families for pair in family.pairs]
 
 
 def without(columns):

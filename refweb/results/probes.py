@@ -268,3 +268,19 @@ def deepest(t, x, v, f, lines, rows, data, where):
                 where[0] = n
                 break
     return best
+
+
+@kernel(PROBE)
+def surface_speed(t, x, v, f, lines, rows, data, where):
+    """Largest speed that a point of a body may have; ``rows`` are those of its place and rotation, or −1.
+
+    data is the largest distance from the place times the largest angular velocity over that of the row.
+    """
+    best = 0.0
+    for n in range(data.shape[0]):
+        place, spin = rows[2 * n], rows[2 * n + 1]
+        speed = math.sqrt(v[place, 0] ** 2 + v[place, 1] ** 2 + v[place, 2] ** 2)
+        if spin >= 0:
+            speed += data[n, 0] * math.sqrt(v[spin, 0] ** 2 + v[spin, 1] ** 2 + v[spin, 2] ** 2)
+        best = max(best, speed)
+    return best

@@ -108,6 +108,11 @@ class SolutionData:
         Of each body that the web may touch, by name: its deepest ``overlap`` [m], ``time`` and ``line`` of that, the
         overlap ``allowed``, and the ``stiffness`` of its contact, ``chosen`` by refweb or given; of a mesh the
         ``surface_error`` [m], by which its field misses the surface.
+    pairs : dict
+        Of each two bodies that have touched each other, by names: the deepest ``overlap`` [m], its ``time``, the
+        overlap ``allowed`` and the ``stiffness`` of their contact.
+    passage : dict
+        By what may have passed through what: "certified" where nothing can have, or why that is not certain.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
     horizon : dict
@@ -146,6 +151,8 @@ class SolutionData:
     horizon: dict = field(default_factory=dict)
     utilisation: tuple | None = None
     bodies: dict = field(default_factory=dict)
+    pairs: dict = field(default_factory=dict)
+    passage: dict = field(default_factory=dict)
 
     @property
     def results(self) -> dict[str, Result]:
@@ -187,6 +194,8 @@ class SolutionData:
             "warnings": self.warnings,
             **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
+            **({"pairs": self.pairs} if self.pairs else {}),
+            **({"passage": self.passage} if self.passage else {}),
             **({"throw": self.throw} if self.throw else {}),
             **({"horizon": self.horizon} if self.horizon else {}),
         }

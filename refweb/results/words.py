@@ -100,6 +100,11 @@ def on_run(summary):
         text = f"{text}, stiffness {body['stiffness']:g}" + ", chosen" * body["chosen"]
         error = body.get("surface_error")
         yield "contact", text + (f", its surface within {error:.1e} m" if error is not None else "")
+    for name, pair in summary.get("pairs", {}).items():
+        text = f"bodies {name} at most {readable(pair['overlap'], None, 'm')} deep in each other"
+        yield "contact", f"{text}, stiffness {pair['stiffness']:g}"
+    for name, shown in summary.get("passage", {}).items():
+        yield "passage", f"{name}: {'nothing can have passed: certified' if shown == 'certified' else shown}"
     if (breaks := summary.get("breaks")) is not None:
         yield from _breaks(breaks)
     if worst := summary.get("utilisation"):

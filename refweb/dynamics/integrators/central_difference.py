@@ -324,7 +324,9 @@ class CentralDifference(Integrator):
                 change = now - system.energy_of(family, before, course.before[0])
                 if change.max(initial=-np.inf) > most:
                     most, of, cell = change.max(), family, int(change.argmax())
-        if of.cells.shape[1] > 1:
+        if of.pairs:
+            place = " and ".join(f'body "{body.name}"' for body in of.pairs[cell])
+        elif of.cells.shape[1] > 1:
             place = f"line {system.net.line[np.isin(system.net.cells, of.cells[cell]).sum(axis=1).argmax()]}"
         else:
             place = self.system.row_name(of.cells[cell, 0])

@@ -72,6 +72,7 @@ def _penalty(net, depths, group):
         stiffness=stiffness,
         bound=bound,
         near=near,
+        pairs=tuple((a, b) for a, b, _ in group),
         book="body_contact_energy",
         symmetric=not any(body.turn is not None for a, b, _ in group for body in (a, b)),  # moments, and quaternions
     )

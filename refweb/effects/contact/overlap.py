@@ -20,6 +20,7 @@ import numpy as np
 from ...errors import InputError, SolverError, TooSoft
 from ...net.net import AXIAL_STIFFNESS
 from ...net.rigid_body import RigidBody
+from ..base import pairs_of
 
 SHARE = 0.1
 """Overlap that is allowed, over the size of the body."""
@@ -186,6 +187,11 @@ class Overlaps:
         self._laws = [scene.contact.law_of(body) for body in system.net.bodies]
         self._load_steps = getattr(scene.solve, "load_steps", ())
         self.found = [self._deepest(i, 0.0, 0.0, None) for i in range(len(self.bodies))]
+        self.pairs = None
+        if moving and pairs_of(system):
+            from .pair_overlap import PairOverlaps
+
+            self.pairs = PairOverlaps(scene.contact, scene.chosen, system)
 
     @property
     def bodies(self):
@@ -215,6 +221,8 @@ class Overlaps:
         """Refuse what may not be, see `Deepest.refuse`."""
         for deepest in self.found:
             deepest.refuse()
+        if self.pairs is not None:
+            self.pairs.refuse()
 
     def plain(self):
         """As ``run.json`` has it, by name."""
@@ -222,8 +230,12 @@ class Overlaps:
 
     def remarks(self):
         """What a reader of the results has to know."""
+        elsewhere = self.pairs.touched if self.pairs is not None else ()
         for deepest in self.found:
-            yield from deepest.remarks()
+            if deepest.overlap > 0.0 or deepest.body.name not in elsewhere:
+                yield from deepest.remarks()
+        if self.pairs is not None:
+            yield from self.pairs.remarks()
 
 
 def first_stiffness(system, body, exponent, load_steps=()):
@@ -262,6 +274,10 @@ def first_stiffness(system, body, exponent, load_steps=()):
     if net.quasi_static:
         return rounded_up(max(asked, float(lines.max())))
     asked = max(asked, (exponent + 1.0) * _energy(system, body) / deep ** (exponent + 1.0))
+    if own := [pair for pair in pairs_of(system) if body in pair]:
+        from .pair_overlap import first_between
+
+        asked = max([asked, *(first_between(system, pair, exponent) for pair in own)])
     return rounded_up(asked if asked > 0.0 else float(lines.min()))
 
 

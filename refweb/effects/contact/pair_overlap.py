@@ -1,0 +1,222 @@
+"""How deep bodies may be in each other, the stiffness that holds them there, and what shows that none passes.
+
+An overlap is held against the smaller of two bodies, as that of a line is against one, see
+`refweb.effects.contact.overlap`. Nothing has passed through a body unless its middle was passed, between two steps or
+at one. In a step two bodies come nearer by at most its length times the speeds of their fastest points. So where the
+deepest overlap of all steps and that way together are less than the least distance from a middle to its surface, it is
+certain that nothing has passed. Explicit steps by the bound are so short that this way is 0.2 of that distance times
+``safety``; for all others the longest step and the largest speed of the run tell.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...errors import InputError, SolverError, TooSoft
+from ...net.rigid_body import RigidBody
+from ..base import pairs_of
+from .overlap import AIM, CORE, DEEPER, STIFFER, allowed, rounded_up, size_of
+
+WAY = 0.2
+"""Way of two bodies in an explicit step, over the thickness of the smaller and ``safety``: what the bound allows."""
+
+
+class DeepestPair(NamedTuple):
+    """The deepest contact of two bodies.
+
+    Attributes
+    ----------
+    bodies : tuple of 2 refweb.net.rigid_body.RigidBody
+        The bodies.
+    overlap, time : float
+        Depth [m], 0 where they have not touched, and when [s].
+    stiffness, exponent : float
+        k [N/m^p] and p of their contact.
+    chosen : tuple of str
+        Names of those whose stiffness is refweb's choice.
+    least : float
+        Stiffness that their energy asks for at the start [N/m^p].
+    initial : float
+        Overlap at t = 0 [m], which no stiffness changes.
+    """
+
+    bodies: tuple[RigidBody, RigidBody]
+    overlap: float
+    time: float
+    stiffness: float
+    exponent: float
+    chosen: tuple
+    least: float
+    initial: float
+
+    @property
+    def name(self):
+        """Names of both."""
+        return " and ".join(f'"{body.name}"' for body in self.bodies)
+
+    @property
+    def allowed(self):
+        """Overlap that is allowed [m]."""
+        return min(map(allowed, self.bodies))
+
+    @property
+    def thickness(self):
+        """Least distance from a middle to its surface [m]."""
+        return min(body.thickness for body in self.bodies)
+
+    @property
+    def in_core(self):
+        """Whether one is in the core of the other."""
+        return self.overlap > CORE * self.thickness
+
+    @property
+    def enough(self):
+        """Stiffness that would do [N/m^p]."""
+        own = self.stiffness * (self.overlap / (AIM * self.allowed)) ** (self.exponent + 1.0)
+        return rounded_up(max(own, self.least) if self.in_core else own)
+
+    def plain(self):
+        """As ``run.json`` has it."""
+        when = self.time if self.overlap > 0.0 else None
+        return {"overlap": self.overlap, "time": when, "allowed": self.allowed, "stiffness": self.stiffness}
+
+    @property
+    def _where(self):
+        return f"bodies {self.name} are {self.overlap:.3g} m deep in each other at t = {self.time:.6g} s"
+
+    def refuse(self):
+        """Refuse a body in the core of another, and a choice that was too soft.
+
+        Raises
+        ------
+        TooSoft
+            Where refweb chose the stiffness and the overlap is not allowed.
+        SolverError
+            Where one is in the core of the other.
+        """
+        if self.in_core and self.overlap <= self.initial:
+            raise SolverError(f"{self._where}, in the core, where they start: move one of them")
+        if self.chosen and self.overlap > self.allowed and self.overlap > DEEPER * self.initial:
+            stiffer = rounded_up(max(self.enough, STIFFER * self.stiffness))
+            raise TooSoft(
+                f"{self._where} with stiffness = {self.stiffness:g}, {self.allowed:.3g} m are allowed; repeated with "
+                f"stiffness = {stiffer:g}",
+                dict.fromkeys(self.chosen, stiffer),
+            )
+        if self.in_core:
+            raise SolverError(f"{self._where}, in the core, {self.thickness:.3g} m below the surface; {self._remedy}")
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        if self.overlap > self.allowed:
+            remedy = "there they start" if self.overlap <= self.initial else self._remedy
+            share = 100.0 * self.overlap / min(map(size_of, self.bodies))
+            yield f"{self._where}, {share:.3g} % of the smaller; {remedy}"
+
+    @property
+    def _remedy(self):
+        return f"stiffness = {self.enough:g} is enough in place of {self.stiffness:g}, or leave it out"
+
+
+class PairOverlaps:
+    """The deepest contacts of all pairs of bodies so far, and whether any can have passed.
+
+    Parameters
+    ----------
+    contact : refweb.effects.contact.table.Contact
+        With a stiffness for each body.
+    chosen : sequence of str
+        Names of the bodies whose stiffness is refweb's choice.
+    system : refweb.system.system.System
+        That of the scene.
+    """
+
+    def __init__(self, contact, chosen, system):
+        self._contact, self._chosen, self._system = contact, set(chosen), system
+        self.found = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
+        self._way, self._open = None, []
+
+    def _deepest(self, bodies, overlap, time, initial):
+        stiffness, exponent, *_ = self._contact.law_between(*bodies)
+        chosen = tuple(body.name for body in bodies if body.name in self._chosen)
+        deep = overlap > CORE * min(body.thickness for body in bodies)
+        least = first_between(self._system, bodies, exponent) if deep else 0.0
+        return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, least, initial)
+
+    def note(self, i, overlap, time):
+        """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
+        was = self.found[i]
+        if overlap > was.overlap:
+            initial = overlap if time == 0.0 else was.initial
+            self.found[i] = self._deepest(was.bodies, overlap, time, initial)
+
+    def note_way(self, safety=None, step=None, speed=None):
+        """Note what bounds the way in a step.
+
+        That is ``safety``, where steps follow the bound, or the longest step [s] and the largest speed of a point of a
+        body [m/s].
+        """
+        self._way = (lambda pair: WAY * safety * pair.thickness) if safety else (lambda pair: 2.0 * step * speed)
+
+    def refuse(self):
+        """Refuse what may not be, see `DeepestPair.refuse`."""
+        for deepest in self.found:
+            deepest.refuse()
+
+    def plain(self):
+        """As ``run.json`` has it, by names: the pairs that have touched."""
+        return {", ".join(b.name for b in pair.bodies): pair.plain() for pair in self.found if pair.overlap > 0.0}
+
+    def passage(self):
+        """ "certified", or of which pair it is not certain that nothing has passed, and when it was deepest."""
+        if self._way is None:
+            return "not certified"
+        for pair in self.found:
+            if not pair.overlap + (way := self._way(pair)) < pair.thickness:
+                when = f", deepest at t = {pair.time:.6g} s" if pair.overlap > 0.0 else ""
+                return (
+                    f"not certified: bodies {pair.name} may come nearer by {way:.3g} m in a step, and their middles are "
+                    f"{pair.thickness:.3g} m below their surfaces{when}"
+                )
+        return "certified"
+
+    @property
+    def touched(self):
+        """Names of the bodies that have touched others."""
+        return {body.name for pair in self.found if pair.overlap > 0.0 for body in pair.bodies}
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        for deepest in self.found:
+            yield from deepest.remarks()
+
+
+def first_between(system, bodies, exponent):
+    """Stiffness of contact between two bodies that a scene asks for before it is solved [N/m^p].
+
+    It is that of `refweb.effects.contact.overlap.AIM` of the allowed overlap under the energy ½ μ v² of both with the
+    energy by which they turn, and under the outer forces on all bodies that are free. v is their speed at the start
+    with what they gain under outer forces until they meet.
+    """
+    net, deep = system.net, AIM * min(map(allowed, bodies))
+    if not math.isfinite(deep):
+        raise InputError(
+            f'stiffness is missing for bodies "{bodies[0].name}" and "{bodies[1].name}", whose size is infinite: give '
+            "stiffness = ..."
+        )
+    v, force = system.initial_velocity(), np.where(system.supported, 0.0, system.outer_force(0.0))
+    free = [body for body in bodies if not body.fixed]
+    mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
+    falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
+    gap = float(np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]))
+    gap = max(gap - sum(body.thickness for body in bodies), 0.0)
+    square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
+    square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * gap
+    turns = [body for body in free if body.turn is not None]
+    turning = sum(0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v)) for body in turns)
+    push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.fixed)
+    stored = (exponent + 1.0) * (0.5 * mass * square + turning)
+    return max(push / deep**exponent, stored / deep ** (exponent + 1.0))
