@@ -16,7 +16,7 @@ import numpy as np
 from ...kernels import BOUND, ENERGY, FORCE, NEAR, STIFFNESS, kernel
 from ..vectors import cross, dot
 from .pair import power_of_depth
-from .penalty import slope_of_power
+from .penalty import SHALLOW, slope_of_power
 from .pressing import (
     DEPTH, EXTENT, FIRST, FREE, INNER, LEVER, NORMAL, SECOND, SIDE, SIDES, SPINS, THICK, WEIGHT, apart, law_of,
     meeting, vector_at,
@@ -101,7 +101,8 @@ def share_of(data, c, s, mass, cells):
     at = SIDES + SIDE * s
     if data[c, at + FREE] == 0.0:
         return 0.0, 0.0
-    turned = data[c, at + LEVER] / math.sqrt(mass[cells[c, 2 + 2 * s]]) if data[c, at + SPINS] > 0.0 else 0.0
+    turns = data[c, at + SPINS] > (0.0 if law_of(data, c).friction > 0.0 else 1.0)
+    turned = data[c, at + LEVER] / math.sqrt(mass[cells[c, 2 + 2 * s]]) if turns else 0.0
     return 1.0 / math.sqrt(mass[cells[c, s]]), turned
 
 
@@ -141,9 +142,12 @@ def kernels(first, second):
     @kernel()
     def add_forces(x, v, f, cells, data, c, space):
         deepest, law = 0.0, law_of(data, c)
-        for n in range(meet(0.0, x, cells, data, c, space)):
+        count = meet(0.0, x, cells, data, c, space)
+        for n in range(count):
             deepest = max(deepest, space.contacts[n, DEPTH])
             add_push(f, cells, data, c, space.contacts, n, push(law, space.contacts, n, WEIGHT))
+        if count == space.contacts.shape[0]:  # there is no room for all: the run is to end
+            f[cells[c, 0], 0] = math.nan
         return deepest
 
     slopes = slopes_of(space_of, add_forces)
@@ -186,10 +190,11 @@ def kernels(first, second):
     def bound(reach, speed, x, mass, rates, cells, data):
         space = space_of(data)
         for c in range(cells.shape[0]):
-            law, steep, ahead = law_of(data, c), 0.0, 2.0 * reach
-            for n in range(meet(ahead, x, cells, data, c, space)):
+            law, steep = law_of(data, c), 0.0
+            for n in range(meet(reach, x, cells, data, c, space)):
                 own = law.stiffness * slope_of_power(law.exponent, space.contacts[n, DEPTH])
                 steep += CURVED * own * (INWARD if space.contacts[n, INNER] != 0.0 else 1.0)
+            steep *= 1.0 + law.friction + SHALLOW * law.damping * speed * (1.0 + law.friction)
             if steep > 0.0:
                 add_rates(rates, steep, speed, mass, cells, data, c)
 

@@ -58,7 +58,8 @@ def families(net, law_of):
         pressed.setdefault(depths, []).append((a, b, law))
         if law[2] > 0.0 or law[3] > 0.0:
             losing.setdefault(depths, []).append((a, b, law))
-    return [_penalty(net, depths, group) for depths, group in pressed.items()]
+    families = [_penalty(net, depths, group) for depths, group in pressed.items()]
+    return families + [_friction(net, depths, group) for depths, group in losing.items()]
 
 
 def _penalty(net, depths, group):
@@ -75,6 +76,26 @@ def _penalty(net, depths, group):
         pairs=tuple((a, b) for a, b, _ in group),
         book="body_contact_energy",
         symmetric=not any(body.turn is not None for a, b, _ in group for body in (a, b)),  # moments, and quaternions
+    )
+
+
+def _friction(net, depths, group):
+    from .sliding import kernels
+
+    force, stiffness, damping, rubbing = kernels(*depths)
+    shared = _shared(net, group)
+    parts = shared["data"][:, [SIDES + PARTS, SIDES + SIDE + PARTS]].sum(axis=1)
+    return Family(
+        **shared,
+        force=force,
+        energy=None,
+        stiffness=stiffness,
+        book="dissipated_energy",
+        power=0,
+        damping=damping,
+        rubbing=rubbing(int(parts.max())),
+        symmetric=False,
+        at_rest=False,
     )
 
 
@@ -102,7 +123,7 @@ def _pair(net, first, second, law):
         sides.append(_side(body, len(spins), law, len(parts), begin, more))
         begin += parts.size
     convex = all(getattr(body.shape.depth(), "convex", True) for body in (first, second))
-    room = PER_PART * sum(len(parts) for parts in skeletons) + (0 if convex else MORE)
+    room = 1 + PER_PART * sum(len(parts) for parts in skeletons) + (0 if convex else MORE)
     numbers = [[room], net.points[first.row] - net.points[second.row], *sides, *(parts.ravel() for parts in skeletons)]
     return rows, np.concatenate(numbers)
 

@@ -254,9 +254,10 @@ def pressing(depth):
         for k in range(PAIR_WIDTH):
             row[0, k] = data[c, its + PAIR + k]
         growth, extent, most = row[0, AWAY + 6 + _GROWTH], row[0, 0], space.contacts.shape[0]
+        before = int(data[c, its + PARTS]) if s == 1 else 0
         for n in range(int(data[c, mine + PARTS])):
             at = int(data[c, mine + BEGIN]) + COLUMNS * n
-            kind, thickness, slot = data[c, at + KIND], data[c, at + THICKNESS], 3 * n
+            kind, thickness, slot = data[c, at + KIND], data[c, at + THICKNESS], 3 * (before + n)
             row[0, AWAY + 6 + _GROWTH], row[0, 0] = growth + thickness + ahead, extent + thickness + ahead
             p = add(times_transposed(own.axes, add(vector_at(data, c, at + FROM), centre)), away)
             p = less(times(other.axes, p), offset)
