@@ -11,6 +11,7 @@ import numpy as np
 from ..effects.base import pairs_of
 from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
+from ..registry import INTEGRATORS
 from ..results import probes
 from ..results.observables.book import weights
 from ..results.observables.observe import SIGN, Observe
@@ -116,7 +117,7 @@ class Watch:
         self._warned = _probes_of_warnings(system, self.probes)
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
-        if pairs_of(system) and scene.solve.method != "central-difference":
+        if pairs_of(system) and INTEGRATORS[scene.solve.method].knob != "safety":
             self.sums.append(Sum(weights(system, "step_size"), 1.0))
         self.events = self._add_events(scene.event)
         used = self._of_warning("utilisation")
@@ -309,14 +310,14 @@ class Watch:
                 at = self._of_warning(("between", i))
                 overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]))
 
-    def note_way(self, course, pairs, solve):
+    def note_way(self, course, pairs, integrator):
         """Note what bounds the way of bodies in a step in `refweb.effects.contact.pair_overlap.PairOverlaps`."""
-        if solve.method == "central-difference" and solve.step_size is None:
-            pairs.note_way(safety=solve.safety)
+        explicit, values = integrator.knob == "safety", course.extremes.values
+        if explicit and integrator.step_size is None:
+            pairs.note_way(safety=integrator.safety * integrator.stretch)
             return
-        speed, values = self._of_warning("body speed"), course.extremes.values
-        step = len(self.probes) + len(self._followed)
-        pairs.note_way(step=float(values[step]), speed=float(values[speed]))
+        step = integrator.step_size if explicit else float(values[len(self.probes) + len(self._followed)])
+        pairs.note_way(step=step, speed=float(values[self._of_warning("body speed")]))
 
     def _of_warning(self, name):
         """Number of the probe of a warning, None where there is none."""

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..effects.base import pairs_of
 from ..errors import InputError, NoEnd, SolverError
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
@@ -246,7 +247,7 @@ class Simulation:
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()
             if (pairs := self.overlaps.pairs) is not None:
-                watch.note_way(course, pairs, self.scene.solve)
+                watch.note_way(course, pairs, self.integrator)
                 solution.pairs, solution.passage = pairs.plain(), {"bodies": pairs.passage()}
         if np.isfinite(course.x).all():
             solution.state = self._state(course)
@@ -318,7 +319,12 @@ def _overlaps_of(scene, system):
         return None
     from ..effects.contact.overlap import Overlaps
 
-    return Overlaps(scene.settled(), system, moving=True)
+    settled, pairs = scene.settled(), None
+    if pairs_of(system):
+        from ..effects.contact.pair_overlap import PairOverlaps
+
+        pairs = PairOverlaps(settled.contact, settled.chosen, system)
+    return Overlaps(settled, system, moving=True, pairs=pairs)
 
 
 def _check_step(scene):

@@ -18,8 +18,23 @@ from ..vectors import cross, dot
 from .pair import power_of_depth
 from .penalty import SHALLOW, slope_of_power
 from .pressing import (
-    DEPTH, EXTENT, FIRST, FREE, INNER, LEVER, NORMAL, SECOND, SIDE, SIDES, SPINS, THICK, WEIGHT, apart, law_of,
-    meeting, vector_at,
+    DEPTH,
+    EXTENT,
+    FIRST,
+    FREE,
+    INNER,
+    LEVER,
+    NORMAL,
+    SECOND,
+    SIDE,
+    SIDES,
+    SPINS,
+    THICK,
+    WEIGHT,
+    apart,
+    law_of,
+    meeting,
+    vector_at,
 )  # fmt: skip
 
 STEP = 1e-6

@@ -8,15 +8,14 @@ say of its contact with another body, whose own skeleton is then left out.
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 
 from ...errors import InputError
 from ...net.skeleton import COLUMNS, THICKNESS
 from ..base import Family
-from .pair import AWAY, lever
-from .pressing import BEGIN, PARTS, SIDE, SIDES
+from .pair import lever
+from .pressing import PARTS, SIDE, SIDES
 
 PER_PART, MORE = 3, 1024
 """Contacts that a part of a skeleton has at most on a convex body; room for more where one is not convex."""

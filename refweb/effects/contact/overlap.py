@@ -179,19 +179,17 @@ class Overlaps:
         That of the scene.
     moving : bool
         Whether bodies come with energy, in dynamics, or are pushed.
+    pairs : refweb.effects.contact.pair_overlap.PairOverlaps, optional
+        Those of bodies in each other, where they touch.
     """
 
-    def __init__(self, scene, system, moving):
+    def __init__(self, scene, system, moving, pairs=None):
         self.system, self._chosen, self._moving = system, scene.chosen, moving
         self._initial = [0.0] * len(system.net.bodies)
         self._laws = [scene.contact.law_of(body) for body in system.net.bodies]
         self._load_steps = getattr(scene.solve, "load_steps", ())
         self.found = [self._deepest(i, 0.0, 0.0, None) for i in range(len(self.bodies))]
-        self.pairs = None
-        if moving and pairs_of(system):
-            from .pair_overlap import PairOverlaps
-
-            self.pairs = PairOverlaps(scene.contact, scene.chosen, system)
+        self.pairs = pairs
 
     @property
     def bodies(self):
@@ -275,10 +273,36 @@ def first_stiffness(system, body, exponent, load_steps=()):
         return rounded_up(max(asked, float(lines.max())))
     asked = max(asked, (exponent + 1.0) * _energy(system, body) / deep ** (exponent + 1.0))
     if own := [pair for pair in pairs_of(system) if body in pair]:
-        from .pair_overlap import first_between
-
         asked = max([asked, *(first_between(system, pair, exponent) for pair in own)])
     return rounded_up(asked if asked > 0.0 else float(lines.min()))
+
+
+def first_between(system, bodies, exponent):
+    """Stiffness of contact between two bodies that a scene asks for before it is solved [N/m^p].
+
+    It is that of `AIM` of the allowed overlap under the energy ½ μ v² of both with the
+    energy by which they turn, and under the outer forces on all bodies that are free. v is their speed at the start
+    with what they gain under outer forces until they meet.
+    """
+    net, deep = system.net, AIM * min(map(allowed, bodies))
+    if not math.isfinite(deep):
+        raise InputError(
+            f'stiffness is missing for bodies "{bodies[0].name}" and "{bodies[1].name}", whose size is infinite: give '
+            "stiffness = ..."
+        )
+    v, force = system.initial_velocity(), np.where(system.supported, 0.0, system.outer_force(0.0))
+    free = [body for body in bodies if not body.fixed]
+    mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
+    falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
+    gap = float(np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]))
+    gap = max(gap - sum(body.thickness for body in bodies), 0.0)
+    square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
+    square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * gap
+    turns = [body for body in free if body.turn is not None]
+    turning = sum(0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v)) for body in turns)
+    push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.fixed)
+    stored = (exponent + 1.0) * (0.5 * mass * square + turning)
+    return max(push / deep**exponent, stored / deep ** (exponent + 1.0))
 
 
 def _times(system):

@@ -10,15 +10,12 @@ certain that nothing has passed. Explicit steps by the bound are so short that t
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
-import numpy as np
-
-from ...errors import InputError, SolverError, TooSoft
+from ...errors import SolverError, TooSoft
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
-from .overlap import AIM, CORE, DEEPER, STIFFER, allowed, rounded_up, size_of
+from .overlap import AIM, CORE, DEEPER, STIFFER, allowed, first_between, rounded_up, size_of
 
 WAY = 0.2
 """Way of two bodies in an explicit step, over the thickness of the smaller and ``safety``: what the bound allows."""
@@ -178,8 +175,8 @@ class PairOverlaps:
             if not pair.overlap + (way := self._way(pair)) < pair.thickness:
                 when = f", deepest at t = {pair.time:.6g} s" if pair.overlap > 0.0 else ""
                 return (
-                    f"not certified: bodies {pair.name} may come nearer by {way:.3g} m in a step, and their middles are "
-                    f"{pair.thickness:.3g} m below their surfaces{when}"
+                    f"not certified: bodies {pair.name} may come nearer by {way:.3g} m in a step, and their middles "
+                    f"are {pair.thickness:.3g} m below their surfaces{when}"
                 )
         return "certified"
 
@@ -192,31 +189,3 @@ class PairOverlaps:
         """What a reader of the results has to know."""
         for deepest in self.found:
             yield from deepest.remarks()
-
-
-def first_between(system, bodies, exponent):
-    """Stiffness of contact between two bodies that a scene asks for before it is solved [N/m^p].
-
-    It is that of `refweb.effects.contact.overlap.AIM` of the allowed overlap under the energy ½ μ v² of both with the
-    energy by which they turn, and under the outer forces on all bodies that are free. v is their speed at the start
-    with what they gain under outer forces until they meet.
-    """
-    net, deep = system.net, AIM * min(map(allowed, bodies))
-    if not math.isfinite(deep):
-        raise InputError(
-            f'stiffness is missing for bodies "{bodies[0].name}" and "{bodies[1].name}", whose size is infinite: give '
-            "stiffness = ..."
-        )
-    v, force = system.initial_velocity(), np.where(system.supported, 0.0, system.outer_force(0.0))
-    free = [body for body in bodies if not body.fixed]
-    mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
-    falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
-    gap = float(np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]))
-    gap = max(gap - sum(body.thickness for body in bodies), 0.0)
-    square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
-    square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * gap
-    turns = [body for body in free if body.turn is not None]
-    turning = sum(0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v)) for body in turns)
-    push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.fixed)
-    stored = (exponent + 1.0) * (0.5 * mass * square + turning)
-    return max(push / deep**exponent, stored / deep ** (exponent + 1.0))

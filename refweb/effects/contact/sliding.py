@@ -11,8 +11,6 @@ from __future__ import annotations
 import functools
 import math
 
-import numpy as np
-
 from ...kernels import FORCE, GIVE, KEPT, MEET, STIFFNESS, SWEEP, kernel
 from ...net.rotation import times, times_transposed
 from ..base import Rubbing
@@ -23,9 +21,32 @@ from .places import hessian_times
 from .pressing import DOWN, FIRST, NORMAL, SECOND, SHARE, SIDE, SIDES, SPINS, frame_of, law_of, meeting, vector_at
 from .pressing import SLOT as WHICH
 from .rubbing import (
-    ARMS, AXES, CELL, DAMPING, FORCE as FORCES, FRICTION, LEVERS, MIXED, NOTED, OWN, PUSH, ROWS, SETTLING, SLIP, SLOT,
-    START, THETA, WIDTH, direction, fitted, mixture, solve_normal, solve_tangents,
+    ARMS,
+    AXES,
+    CELL,
+    DAMPING,
+    FRICTION,
+    LEVERS,
+    MIXED,
+    NOTED,
+    OWN,
+    PUSH,
+    ROWS,
+    SETTLING,
+    SLIP,
+    SLOT,
+    START,
+    THETA,
+    WIDTH,
+    direction,
+    fitted,
+    mixture,
+    solve_normal,
+    solve_tangents,
 )  # fmt: skip
+from .rubbing import (
+    FORCE as FORCES,
+)
 
 LEVERS_OF_SECOND, ARMS_OF_SECOND, WHOLE = WIDTH, WIDTH + 9, WIDTH + 18
 """Columns of what touches, behind those of `refweb.effects.contact.rubbing`: as there of the second body, whose row of
@@ -289,6 +310,9 @@ def kernels(first, second):
                 count += 1
         return count
 
-    return force, stiffness, damping, lambda parts: Rubbing(
-        meeting_all, recall, sweep, give, WHOLE, NOTED * SLOTS * parts
+    return (
+        force,
+        stiffness,
+        damping,
+        lambda parts: Rubbing(meeting_all, recall, sweep, give, WHOLE, NOTED * SLOTS * parts),
     )

@@ -1,0 +1,325 @@
+"""Bodies against bodies: forces from energies, momenta, tangents, bounds, hits, rolling, sliding, what passes."""
+
+import itertools
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import refweb
+from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.net import discretisation
+from refweb.net.rotation import quaternion_rate
+from refweb.system.system import System
+
+G = 9.81
+SHAPES = {
+    "sphere": dict(shape="sphere", radius=0.3, inertia=(0.04, 0.05, 0.06)),
+    "capsule": dict(shape="capsule", radius=0.2, length=0.4, axis=(0, 0, 1)),
+    "box": dict(shape="box", size=(0.6, 0.5, 0.7), rounding=0.05),
+    "cylinder": dict(shape="cylinder", radius=0.3, length=0.8, axis=(0, 0, 1), rounding=0.05),
+}
+PAIRS = list(itertools.combinations_with_replacement(SHAPES, 2))
+LAWS = [dict(stiffness=1e3), dict(stiffness=1e3, exponent=1.5)]
+LOSSES = dict(stiffness=1e3, damping=0.3, friction=0.4, slip_velocity=2.0)
+FLOOR = dict(name="floor", shape="box", size=[4, 4, 0.4], position=[0, 0, -0.2], fixed=True)
+FAR = refweb.SingleCable(start=(0, 0, 100), end=(1, 0, 100), elements=1).web()
+CABLE = refweb.Cable(law="linear", modulus=1e3, area=1e-4, density=100.0)
+
+
+def system(one, other, held=False, **contact):
+    """Two bodies that overlap, and nothing but their contact."""
+    bodies = [
+        refweb.Body(name="a", mass=1.0, position=(0, 0, 0), **SHAPES[one]),
+        refweb.Body(name="b", **(dict(fixed=True) if held else dict(mass=2.0)), position=(0.5, 0, 0), **SHAPES[other]),
+    ]
+    net = discretisation.build(FAR, CABLE)
+    whole = System(net, [*bodies, refweb.Contact(between_bodies=True, **contact)], np.zeros((2, 3), dtype=bool))
+    own = [family for family in whole.families if family.pairs or family.cells.shape[1] == 6]
+    return [System(whole.net, [SimpleNamespace(on=lambda _, f=f: f)], whole.supported[:2]) for f in own]
+
+
+def state(net, seed):
+    rng = np.random.default_rng(seed)
+    x, v = 0.1 * rng.standard_normal(net.points.shape), rng.standard_normal(net.points.shape)
+    for body in net.bodies:
+        q = rng.standard_normal(4)
+        if body.fixed:
+            x[body.row] = 0.0
+        else:
+            x[body.turn] = 0.0
+            x[body.turn, 0], x[body.spin] = q[0] - 1.0, q[1:]
+    return x, v
+
+
+def turned(net, x, d):
+    """A motion whose rows of rotation are angles, as one of the rows of quaternions."""
+    moved = d.copy()
+    for body in net.bodies:
+        if body.turn is not None:
+            rate = quaternion_rate(1.0 + x[body.turn, 0], *x[body.spin], d[body.spin])
+            moved[body.turn] = 0.0
+            moved[body.turn, 0], moved[body.spin] = rate[0], rate[1:]
+    return moved
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("pair", PAIRS)
+def test_force_is_the_slope_of_an_energy(pair, law):
+    """Force and moment on both against a difference quotient of step 1e-5; momenta vanish to rounding."""
+    (one,) = system(*pair, **law)
+    net, touched = one.net, 0
+    rows, spins, turns = ([getattr(b, key) for b in net.bodies] for key in ("row", "spin", "turn"))
+    for seed in range(12):
+        x, v = state(net, seed)
+        f = one.force(0.0, x, v)
+        d = 0.1 * np.random.default_rng(seed + 100).standard_normal(x.shape)
+        moved, h = turned(net, x, d), 1e-5
+        rate = (one.energy(0.0, x + h * moved) - one.energy(0.0, x - h * moved)) / (2.0 * h)
+        size = np.abs(f * d).sum()
+        assert abs(rate + np.delete(f * d, turns, axis=0).sum()) <= 1e-7 * size  # h² over the rounding squared
+        moment = np.cross((net.points + x)[rows], f[rows]).sum(axis=0) + f[spins].sum(axis=0)
+        assert np.abs([f[rows].sum(axis=0), moment]).max() <= 1e-15 * 10.0 * np.abs(f).sum()
+        touched += f.any()
+    assert touched >= 4
+
+
+@pytest.mark.parametrize("pair", [("sphere", "box"), ("capsule", "cylinder"), ("box", "box"), ("box", "cylinder")])
+@pytest.mark.parametrize("held", [False, True])
+def test_tangents(pair, held):
+    """−∂f/∂x and −∂f/∂v have remainders of order 2, of penalty and of losses, down to the 1e-8 of differences."""
+    for one in system(*pair, held, **LOSSES):
+        net = one.net
+        for seed in range(6):
+            x, v = state(net, seed)
+            f, d = one.force(0.0, x, v), turned(net, x, 0.1 * np.random.default_rng(seed).standard_normal(x.shape))
+            d[one.supported] = 0.0
+            tangents = [(one.stiffness(0.0, x, v), d, 0.0 * d)]
+            if (damping := one.damping(0.0, x, v)) is not None:
+                tangents.append((damping, 0.0 * d, d))
+            for values, dx, dv in tangents:
+                product = one.pattern.matrix(values) @ d.ravel()[one.free]
+                steps = np.array([1e-3, 5e-4, 2.5e-4])
+                change = [(one.force(0.0, x + h * dx, v + h * dv) - f).ravel()[one.free] for h in steps]
+                remainder = [np.linalg.norm(c + h * product) for h, c in zip(steps, change, strict=True)]
+                small = 1e-8 * np.linalg.norm(product) * steps[-1]
+                order = np.polyfit(np.log(steps), np.log(np.maximum(remainder, 1e-300)), 1)[0]
+                assert remainder[-1] <= small or order > 1.8, (seed, remainder)
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_power_of_losses(pair):
+    """It is that of their forces, and takes energy; momenta vanish."""
+    one = system(*pair, **LOSSES)[1]
+    net = one.net
+    for seed in range(6):
+        x, v = state(net, seed)
+        f, out = one.forces(0.0, x, v)
+        rates = v.copy()
+        for body in net.bodies:
+            rates[body.spin] = body.turning(x, v)
+        assert out[0][:, 0].sum() == pytest.approx((f * rates).sum(), rel=1e-11, abs=1e-13 * np.abs(f).sum())
+        assert out[0][:, 0].sum() <= 0.0
+        rows, spins = ([getattr(b, key) for b in net.bodies] for key in ("row", "spin"))
+        moment = np.cross((net.points + x)[rows], f[rows]).sum(axis=0) + f[spins].sum(axis=0)
+        assert np.abs([f[rows].sum(axis=0), moment]).max() <= 1e-14 * np.abs(f).sum()
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("held", [False, True])
+def test_bound_bounds(pair, held):
+    """2/ω of the tangent, with angles for quaternions, is never below the bound on steps."""
+    (one,) = system(*pair, held, stiffness=1e3)
+    net = one.net
+    for seed in range(12):
+        x, v = state(net, seed)
+        free = [body for body in net.bodies if not body.fixed]
+        rows = [r for body in free for r in (body.row, body.spin)]
+        inverse = np.zeros((3 * len(rows), 3 * len(rows)))
+        for n, body in enumerate(free):
+            axes = body.axes @ body.rotation(x).T
+            inverse[6 * n : 6 * n + 3, 6 * n : 6 * n + 3] = np.eye(3) / net.mass[body.row]
+            inverse[6 * n + 3 : 6 * n + 6, 6 * n + 3 : 6 * n + 6] = axes.T @ np.linalg.inv(body.inertia) @ axes
+        h, tangent = 1e-6, np.zeros_like(inverse)
+        for j, (row, k) in enumerate(itertools.product(rows, range(3))):
+            d = np.zeros_like(x)
+            d[row, k] = h
+            d = turned(net, x, d)
+            tangent[:, j] = (one.force(0.0, x - d, v) - one.force(0.0, x + d, v))[rows].ravel() / (2.0 * h)
+        fastest = np.abs(np.linalg.eigvals(inverse @ tangent)).max()
+        if fastest == 0.0:
+            continue
+        assert CentralDifference(one).bound(x, reach=0.0) <= 2.0 / np.sqrt(fastest) * (1.0 + 1e-6)
+
+
+def run(bodies, duration, contact, gravity=False, observe=(), **solve):
+    """A solution of bodies with no web near."""
+    scene = dict(
+        title="bodies",
+        web=dict(kind="cable", start=[0, 0, 100], end=[1, 0, 100], elements=1),
+        cable=dict(law="linear", modulus=1e3, area=1e-6, density=1.0),
+        body=bodies,
+        contact=dict(between_bodies=True, **contact),
+        solve=dict(kind="dynamic", duration=duration, **solve),
+        output=dict(interval=duration / 20),
+        accuracy=dict(error="none"),
+        observe=[dict(name="E", quantity="total_energy"), *observe],
+    )
+    if gravity:
+        scene["gravity"] = dict(acceleration=[0.0, 0.0, -G])
+    return refweb.run(refweb.Scene.from_dict(scene))
+
+
+def rows(solution, name):
+    """Row of a body and of its rotation."""
+    body = next(body for body in solution.state.system.net.bodies if body.name == name)
+    return body.row, body.spin
+
+
+BALLS = [
+    dict(name="a", radius=0.1, mass=1.0, position=[0, 0, 0], velocity=[1.0, 0, 0]),
+    dict(name="b", radius=0.1, mass=1.0, position=[0.25, 0, 0]),
+]
+
+
+@pytest.mark.parametrize("solve", [dict(method="cvode", rtol=1e-7), dict(method="ida", rtol=1e-7)])
+def test_equal_balls_exchange_speeds(solve):
+    s = run(BALLS, 0.15, dict(stiffness=1e4), **solve)
+    (a, _), (b, _) = rows(s, "a"), rows(s, "b")
+    np.testing.assert_allclose(s.state.v[[a, b]], [[0, 0, 0], [1, 0, 0]], atol=3e-6)
+    assert s.pairs["a, b"]["overlap"] == pytest.approx(np.sqrt(0.5 / 1e4), rel=1e-5)  # ½ k δ² = ½ μ v²
+
+
+def test_the_book_closes_with_order_2():
+    """Of two balls that hit: the error of the speed behind falls with the square of the step, to the exchange."""
+    errors = []
+    for step in (4e-4, 2e-4, 1e-4):
+        s = run(BALLS, 0.15, dict(stiffness=1e4), step_size=step)
+        a, _ = rows(s, "a")
+        errors.append(s.solver["energy_drift"])
+        assert s.solver["momentum_drift"] <= 1e-14
+        assert abs(s.state.v[a, 0]) <= 10.0 * step  # the step in which they part is not known better
+    assert np.polyfit(np.log([4, 2, 1]), np.log(errors), 1)[0] > 1.6
+
+
+METHODS = [dict(), dict(method="cvode", rtol=1e-6), dict(method="ida", rtol=1e-6)]
+
+
+@pytest.mark.parametrize("solve", METHODS)
+def test_a_ball_that_slides_ends_rolling(solve):
+    """At v/(1 + I/m r²) with the distance r = R − δ/2 from its centre to where it touches: 5/7 up to δ/R."""
+    k, radius = 1e5, 0.1
+    deep = G / k
+    ball = dict(name="b", radius=radius, mass=1.0, position=[-1, 0, radius - deep], velocity=[1.0, 0, 0])
+    s = run([FLOOR, ball], 0.5, dict(stiffness=k, friction=0.3), gravity=True, **solve)
+    row, spin = rows(s, "b")
+    reach = radius - 0.5 * deep
+    speed = 1.0 / (1.0 + 0.4 * radius**2 / reach**2)
+    np.testing.assert_allclose(s.state.v[row], [speed, 0, 0], atol=3e-6)
+    np.testing.assert_allclose(s.state.v[spin], [0, speed / reach, 0], atol=3e-5)
+    assert s.state.v[row, 0] == pytest.approx(5 / 7, rel=deep / radius)
+
+
+def test_a_box_slides_to_rest():
+    """Over (v √(v² + s²) + s² asinh(v/s))/(2 μ g), s being the slip velocity, and does not turn."""
+    k, v, slip, mu = 1e5, 1.0, 1e-2, 0.3
+    box = dict(name="b", shape="box", size=[0.4, 0.4, 0.1], mass=1.0, position=[-1, 0, 0.05 - G / (8 * k)])
+    law = dict(stiffness=k, friction=mu, slip_velocity=slip, damping=0.5)
+    s = run([FLOOR, box | dict(velocity=[v, 0, 0])], 0.5, law, gravity=True)
+    row, _ = rows(s, "b")
+    way = (v * np.hypot(v, slip) + slip**2 * np.arcsinh(v / slip)) / (2.0 * mu * G)
+    # At rest it still creeps by s e^(−μ g t/s) of that; it rocks on its front edge by some δ.
+    assert s.state.x[row, 0] == pytest.approx(way, abs=2e-6)
+    assert np.abs(s.state.v[row]).max() <= 1e-6
+
+
+@pytest.mark.parametrize("solve", [dict(), dict(method="explicit", order=4)])
+def test_a_box_on_its_edge(solve):
+    """It bounces off a fixed box, turning, and keeps its energy and what it has along the floor."""
+    turn = np.pi / 8
+    q = [np.cos(turn), 0.8 * np.sin(turn), 0.6 * np.sin(turn), 0.0]
+    box = dict(name="b", shape="box", size=[0.3, 0.4, 0.5], mass=1.0, position=[0, 0, 0.5], orientation=q)
+    s = run([FLOOR, box], 0.6, dict(stiffness=1e5), gravity=True, **solve)
+    row, spin = rows(s, "b")
+    assert s.solver["energy_drift"] <= 3e-4
+    assert s.pairs["floor, b"]["overlap"] > 1e-3
+    assert np.linalg.norm(s.state.v[spin]) > 0.1
+    np.testing.assert_allclose(s.state.v[row, :2], 0.0, atol=1e-12)  # the floor is flat there: it pushes upward
+    assert s.passage == {"bodies": "certified"}
+
+
+def test_edges_do_not_pass():
+    """Two bars crossed edge on edge: no corner is near, and they exchange their speeds."""
+    c, s = np.cos(np.pi / 8), np.sin(np.pi / 8)
+    bars = [
+        dict(name="a", shape="box", size=[1.0, 0.1, 0.1], mass=1.0, position=[0, 0, 0.16], velocity=[0, 0, -1])
+        | dict(orientation=[c, s, 0, 0]),
+        dict(name="b", shape="box", size=[0.1, 1.0, 0.1], mass=1.0, position=[0, 0, 0], orientation=[c, 0, s, 0]),
+    ]
+    found = run(bars, 0.1, dict(stiffness=1e5))
+    (a, _), (b, _) = rows(found, "a"), rows(found, "b")
+    np.testing.assert_allclose(found.state.v[[a, b], 2], [0.0, -1.0], atol=2e-3)
+    assert found.state.position[a, 2] > found.state.position[b, 2]
+    assert found.passage == {"bodies": "certified"}
+
+
+BOXES = [
+    dict(name="a", shape="box", size=[0.3, 0.4, 0.5], mass=1.0, position=[0, 0, 0], velocity=[1.0, 0, 0])
+    | dict(angular_velocity=[1, 2, 3]),
+    dict(
+        name="b", shape="box", size=[0.3, 0.3, 0.2], mass=2.0, position=[0.45, 0.2, 0.1], orientation=[1, 0.3, 0.2, 0.1]
+    ),
+]
+
+
+def test_an_eccentric_hit_keeps_both_momenta():
+    """To rounding, with losses too; all methods agree."""
+    law = dict(stiffness=1e4, damping=0.2, friction=0.3, slip_velocity=0.1)
+    ends = []
+    for solve in (dict(safety=0.05), *METHODS[1:]):
+        s = run(BOXES, 0.3, law, **solve)
+        net, v = s.state.system.net, s.state.v
+        momentum, moment = np.zeros(3), np.zeros(3)
+        for body in net.bodies:
+            p = net.mass[body.row] * v[body.row]
+            momentum += p
+            moment += np.cross(s.state.position[body.row], p) + body.moment * v[body.spin]
+        tight = 1e-12 if not solve.get("method") else 1e-5
+        np.testing.assert_allclose(momentum, [1, 0, 0], atol=tight)
+        np.testing.assert_allclose(moment, net.bodies[0].inertia @ [1, 2, 3], atol=tight)
+        ends.append(np.concatenate([v[r] for b in net.bodies for r in (b.row, b.spin)]))
+        assert s.history["dissipated_energy"][-1] > 1e-3
+    for end in ends[1:]:
+        np.testing.assert_allclose(end, ends[0], atol=3e-3)
+
+
+def test_stiffness_left_out():
+    """It is chosen so that no overlap is above a tenth of the smaller body."""
+    s = run(BALLS, 0.15, {})
+    assert 0.0 < s.pairs["a, b"]["overlap"] <= s.pairs["a, b"]["allowed"] == pytest.approx(0.01)
+    assert not any("touches the web" in text for text in s.warnings)
+
+
+def test_what_is_too_deep():
+    """A warning names the pair and the stiffness that would do; a body in the core of another ends the run."""
+    s = run(BALLS, 0.15, dict(stiffness=2e3))
+    assert any('bodies "a" and "b" are' in text and "stiffness = " in text for text in s.warnings)
+    with pytest.raises(refweb.SolverError, match=r'bodies "a" and "b" are .* in the core'):
+        run(BALLS, 0.15, dict(stiffness=50.0))
+
+
+def test_passage():
+    """Steps that are given may be too long for that to be certain."""
+    quick = [BALLS[0] | dict(velocity=[20.0, 0, 0]), BALLS[1]]
+    assert run(quick, 0.02, dict(stiffness=1e7), step_size=1e-5).passage == {"bodies": "certified"}
+    long = run([BALLS[0] | dict(velocity=[20.0, 0, 0], position=[0, 0.5, 0]), BALLS[1]], 0.02, dict(stiffness=1e4))
+    assert long.passage == {"bodies": "certified"}
+
+
+def test_refusals():
+    alone = [BALLS[0]]
+    with pytest.raises(refweb.InputError, match="takes two bodies"):
+        run(alone, 0.1, dict(stiffness=1e4))
+    mixed = dict(stiffness=1e4, bodies=dict(a=dict(exponent=1.5)))
+    with pytest.raises(refweb.InputError, match="must be equal"):
+        run(BALLS, 0.1, mixed)
