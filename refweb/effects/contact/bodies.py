@@ -98,7 +98,7 @@ def _friction(net, depths, group):
     )
 
 
-def _shared(net, group):
+def _shared(net, group) -> dict:
     """What a `Family` has of some pairs."""
     cells, data = zip(*(_pair(net, *pair) for pair in group), strict=True)
     room = np.zeros((len(data), max(len(row) for row in data)))
