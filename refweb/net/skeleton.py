@@ -16,6 +16,8 @@ import math
 
 import numpy as np
 
+from ..errors import InputError
+
 POINT, SEGMENT, ARC = 0.0, 1.0, 2.0
 """Kinds of a part."""
 KIND, THICKNESS, FROM, TO, THIRD, OWNS, COLUMNS = 0, 1, 2, 5, 8, 11, 13
@@ -24,6 +26,10 @@ right angles of its radius, of which the places are centre + TO cos φ + THIRD s
 at both ends [rad]. All is from the centre of the shape along its axes."""
 ARCS = 4
 """Number of arcs in a row around a rim."""
+FLAT = 1e-3
+"""Angle between two triangles below which they are one face [rad]."""
+MOST = 3000
+"""Largest number of edges of a surface."""
 
 
 def points(places, thickness):
@@ -83,3 +89,32 @@ def of_cylinder(grown):
         ends = np.array([[0.0, 0.0, -inner], [0.0, 0.0, inner]])
         parts.append(edges(ends, [(0, 1)], grown.radius + radius))
     return np.vstack(parts)
+
+
+def of_surface(corners, triangles):
+    """Parts of a surface of triangles (t, 3), outward, of corners (n, 3): its edges that stand out, by `FLAT`.
+
+    Raises
+    ------
+    InputError
+        For more than `MOST` of them.
+    """
+    a, b, c = (corners[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    side: dict = {}
+    for t, triangle in enumerate(triangles.tolist()):
+        for k in range(3):
+            side[triangle[k], triangle[k - 2]] = t, triangle[k - 1]
+    pairs = []
+    for (i, j), (t, _) in side.items():
+        other, across = side[j, i]
+        below = normals[t] @ (corners[across] - corners[i])
+        if i < j and below < 0.0 and normals[t] @ normals[other] < math.cos(FLAT):
+            pairs.append((i, j))
+    if len(pairs) > MOST:
+        raise InputError(
+            f"its surface has {len(pairs)} edges that stand out, and between_bodies = true takes at most {MOST}: give "
+            "a coarser surface"
+        )
+    return edges(corners, pairs, 0.0)

@@ -28,7 +28,10 @@ def pairs_of(net):
 
 def skeleton_of(body):
     """The skeleton of the shape of a body, or a refusal by name."""
-    parts = body.shape.skeleton()
+    try:
+        parts = body.shape.skeleton()
+    except InputError as error:
+        raise InputError(f'body "{body.name}": {error}') from None
     if parts is None:
         raise InputError(
             f'between_bodies = true: body "{body.name}" has a shape that says nothing of its edges and does not touch '

@@ -108,8 +108,9 @@ def depth_at(p, address):
 
 @kernel()
 def depth(p, grown):
-    """As `refweb.net.grown_core.depth`, of the field whose numbers stand at ``grown.field``."""
-    return depth_at(p, grown.field)
+    """As `refweb.net.grown_core.depth`, of the field whose numbers stand at ``grown.field``, grown by the radius."""
+    deep, gradient, hessian = depth_at(p, grown.field)
+    return deep + grown.radius, gradient, hessian
 
 
 depth.convex = False
@@ -149,6 +150,11 @@ class Field:
     thickness: float
 
     @property
+    def margin(self):
+        """How far from the body it reaches [m]."""
+        return float(self.numbers[MARGIN])
+
+    @property
     def address(self):
         """Where its numbers stand in memory, which kernels read as long as there is this field."""
         return float(self.numbers.ctypes.data)
@@ -160,8 +166,10 @@ class Field:
         return found[:, 0], found[:, 1:]
 
 
-def field_of(points, triangles, cells):
+def field_of(points, triangles, cells, around=AROUND, known=None):
     """The `Field` of the solid that a surface bounds, with so many cells along its longest side.
+
+    So many points of the grid stand ``around`` it. Of a wider one error and thickness are those of ``known``, a field.
 
     Raises
     ------
@@ -172,16 +180,18 @@ def field_of(points, triangles, cells):
 
     low, size = points.min(axis=0), np.ptp(points, axis=0)
     h = float(size.max()) / cells
-    counts = np.ceil(size / h).astype(np.int64) + 1 + 2 * AROUND
+    counts = np.ceil(size / h).astype(np.int64) + 1 + 2 * around
     shape = tuple(counts.tolist())
     memory.check(BYTES * float(np.prod(counts.astype(float))), f"the {' × '.join(map(str, shape))} points of its grid")
     origin = low + 0.5 * size - 0.5 * h * (counts - 1)
     deep, nearest = np.full(shape, np.inf), np.full(shape, -1, dtype=np.int32)
     signed(points, triangles, origin, h, deep, nearest, np.zeros(shape, dtype=np.uint8))
     del nearest
-    head = [*origin, 1.0 / h, *counts, (AROUND - 1) * h]
+    head = [*origin, 1.0 / h, *counts, (around - 1) * h]
     numbers = np.concatenate([head, _coefficients(deep).ravel()])
     field = Field(numbers, h, shape, 0.0, 0.0)
+    if known is not None:
+        return replace(field, error=known.error, thickness=known.thickness)
     error = np.abs(field.at(_on_surface(points, triangles))[0]).max()
     return replace(field, error=float(error), thickness=_thickness(field, points, triangles))
 

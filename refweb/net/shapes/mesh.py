@@ -17,6 +17,8 @@ from ..rigid_body import Grown, Shape, axes_of
 
 GRID = 48
 """Number of cells of the grid along the longest side, where none is given and no wall is too thin for it."""
+WIDE = 96
+"""The same of a grid for bodies that are thicker than the first one reaches: far from a surface depth is smooth."""
 WALL = 2.0
 """Least number of cells from the middle of a wall to its surface."""
 MOST = 4_000_000
@@ -155,6 +157,32 @@ class Mesh(Shape):
         from ..boundary.field import depth
 
         return depth
+
+    def skeleton(self):
+        """Its edges that stand out."""
+        from ..skeleton import of_surface
+
+        return of_surface(self.solid.points, self.solid.triangles)
+
+    def touched(self, thickness):
+        """Its field, or for what is thicker than that reaches a wider one, with `WIDE` cells along all it fills."""
+        field, grown = self.solid.field, self.grown()
+        if thickness <= field.margin:
+            return grown
+        from ..boundary.field import field_of
+
+        wide = vars(self).setdefault("_wide", {})  # kept as long as this: kernels read it where it stands
+        if thickness not in wide:
+            points, triangles, size = (
+                self.solid.points,
+                self.solid.triangles,
+                float(np.ptp(self.solid.points, axis=0).max()),
+            )
+            spacing = max((size + 2.0 * thickness) / WIDE, field.spacing)
+            cells = max(int(np.ceil(size / spacing)), 1)
+            around = int(np.ceil(1.1 * thickness * cells / size)) + 2
+            wide[thickness] = field_of(points, triangles, cells, around, field)
+        return grown._replace(field=wide[thickness].address)
 
     def surface(self):
         """Its triangles."""

@@ -52,6 +52,12 @@ class Ring(Shape):
         """Its axis, grown by the radius."""
         return Grown(self.radius, (0.0, 0.0, math.inf))
 
+    def skeleton(self):
+        """The circle."""
+        from ..skeleton import rim
+
+        return rim(self.radius, 0.0, 0.0)
+
     def frame(self):
         """Unit vectors of its axes, the normal third."""
         return axes_about("normal", self.normal)
