@@ -85,7 +85,7 @@ class Simulation:
         system = self.begin.torn(system)
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
-        self.overlaps = _overlaps_of(scene, system)
+        self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
         self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self._stand(kept)
@@ -186,6 +186,8 @@ class Simulation:
                 if len(self.schedule.between):
                     self._compared += self.watch.compared(self.watch.table(compared)).tolist()
                 self._refuse_overlap(course)
+                if self._silent is not None:
+                    self._silent.look(course.time, course.x)
                 last = first + len(table) - 1
                 if folder is None:
                     self._tables.append(table)
@@ -295,6 +297,8 @@ class Simulation:
         yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()
+        if self._silent is not None:
+            yield from self._silent.remarks()
         for name in self._unfilled:
             end = self._tables[-1][-1, 0]
             yield f"{name} is the mean of the whole run: it ended at t = {end:.6g} s, before a window was full"
@@ -325,6 +329,15 @@ def _overlaps_of(scene, system):
 
         pairs = PairOverlaps(settled.contact, settled.chosen, system)
     return Overlaps(settled, system, moving=True, pairs=pairs)
+
+
+def _silent_of(system):
+    """The `refweb.effects.contact.silent.Silent` of a system, None where there are no two bodies."""
+    if len(system.net.bodies) < 2:
+        return None
+    from ..effects.contact.silent import silent_of
+
+    return silent_of(system)
 
 
 def _check_step(scene):

@@ -150,13 +150,13 @@ class PairOverlaps:
             initial = overlap if time == 0.0 else was.initial
             self.found[i] = self._deepest(was.bodies, overlap, time, initial)
 
-    def note_way(self, safety=None, step=None, speed=None):
+    def note_way(self, safety=0.0, step=0.0, speed=0.0):
         """Note what bounds the way in a step.
 
         That is ``safety``, where steps follow the bound, or the longest step [s] and the largest speed of a point of a
         body [m/s].
         """
-        self._way = (lambda pair: WAY * safety * pair.thickness) if safety else (lambda pair: 2.0 * step * speed)
+        self._way = (lambda pair: WAY * safety * pair.thickness) if safety > 0.0 else (lambda pair: 2.0 * step * speed)
 
     def refuse(self):
         """Refuse what may not be, see `DeepestPair.refuse`."""

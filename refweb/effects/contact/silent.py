@@ -1,0 +1,96 @@
+"""Bodies that lie in each other where they do not touch: a reader of the results is told.
+
+It is looked at with every block of rows. Where the spheres around two bodies meet, places on the skeleton of each are
+held against the depth in the other: so it costs next to nothing, and a short overlap may be missed.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from ...net.skeleton import ARC, FROM, KIND, OWNS, POINT, THICKNESS, THIRD, TO
+
+PLACES = 9
+"""Number of places that are looked at on each part."""
+LEAST = 1e-6
+"""Overlap that is told, over the size of the smaller body."""
+MOST = 3
+"""Largest number of pairs that are named."""
+
+
+def silent_of(system):
+    """The `Silent` of a system whose bodies may meet and do not touch each other, None where they cannot."""
+    bodies = system.net.bodies
+    if len(bodies) < 2 or all(body.fixed for body in bodies) or any(family.pairs for family in system.families):
+        return None
+    return Silent(system.net)
+
+
+class Silent:
+    """Pairs of bodies that have been in each other.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        With the bodies.
+    """
+
+    def __init__(self, net):
+        self._net, self._found = net, {}
+        pairs = [(a, b) for a, b in itertools.combinations(net.bodies, 2) if not (a.fixed and b.fixed)]
+        self._pairs = pairs
+        self._rows = np.array([(a.row, b.row) for a, b in pairs])
+        self._reach = np.array([a.extent + b.extent for a, b in pairs])
+
+    def look(self, time, x):
+        """Note which bodies are in each other at displacements x, shape (rows, 3)."""
+        places = self._net.points + x
+        away = np.linalg.norm(places[self._rows[:, 0]] - places[self._rows[:, 1]], axis=1)
+        for n in np.flatnonzero(away < self._reach).tolist():
+            a, b = self._pairs[n]
+            if (a.name, b.name) not in self._found:
+                deep = max(_depth(a, b, places, x), _depth(b, a, places, x))
+                if deep > LEAST * min(a.thickness, b.thickness):
+                    self._found[a.name, b.name] = deep, time
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        for (a, b), (deep, time) in itertools.islice(self._found.items(), MOST):
+            yield (
+                f'bodies "{a}" and "{b}" are {deep:.3g} m deep in each other at t = {time:.6g} s and do not feel it: '
+                "between_bodies = true in [contact] lets bodies touch"
+            )
+        if (more := len(self._found) - MOST) > 0:
+            yield f"{more} more pairs of bodies are in each other"
+
+
+def _depth(body, other, places, x):
+    """How deep the skeleton of a body is in another one [m]."""
+    parts = body.shape.skeleton()
+    if parts is None:
+        return 0.0
+    axes, its = (one.axes @ one.rotation(x).T for one in (body, other))
+    own = (_along(parts) + body.offset) @ axes + places[body.row] - places[other.row]
+    own = own @ its.T - other.offset
+    depth, deepest = other.shape.depth(), 0.0
+    grown = other.shape.touched(float(parts[:, THICKNESS].max()))
+    for place, thickness in zip(own, np.repeat(parts[:, THICKNESS], PLACES), strict=True):
+        thick = grown._replace(radius=float(grown.radius + thickness))
+        deepest = max(deepest, depth(tuple(place.tolist()), thick)[0])
+    return deepest
+
+
+def _along(parts):
+    """Places on parts of a skeleton, shape (parts × `PLACES`, 3)."""
+    found = np.empty((len(parts), PLACES, 3))
+    for n, part in enumerate(parts):
+        share = np.linspace(0.0, 1.0, PLACES)[:, None]
+        if part[KIND] == ARC:
+            angle = part[OWNS] + share * (part[OWNS + 1] - part[OWNS])
+            found[n] = part[FROM:TO] + np.cos(angle) * part[TO:THIRD] + np.sin(angle) * part[THIRD:OWNS]
+        else:
+            end = part[FROM:TO] if part[KIND] == POINT else part[TO:THIRD]
+            found[n] = (1.0 - share) * part[FROM:TO] + share * end
+    return found.reshape(-1, 3)
