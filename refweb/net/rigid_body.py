@@ -36,8 +36,9 @@ grown on all sides: ``grown.radius`` and ``grown.core`` in a kernel. If the core
 round about its axis, ``depth`` and ``surface`` are those of `Shape`, and ``Grown(radius, (0.0, 0.0, length / 2))`` is a
 capsule; otherwise ``farthest`` may bring the surface, whose triangles face outward. A shape that may move and turn sets
 ``free = True``; if it is no such core it brings its ``volume()`` and the tensor ``inertia(mass)`` about its centre. One
-that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as `refweb.net.shapes.mesh` has. The
-line in ``SHAPES`` of ``refweb/registry.py``::
+that is not convex has ``depth.convex = False`` and the length ``fine`` of `Grown`, as `refweb.net.shapes.mesh` has. By
+its ``skeleton()``, points, lines and arcs of `refweb.net.skeleton`, it touches other bodies; where they are to touch,
+one without is refused. The line in ``SHAPES`` of ``refweb/registry.py``::
 
     "wall": "refweb.net.shapes.wall:Wall",
 """

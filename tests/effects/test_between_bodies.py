@@ -3,8 +3,10 @@
 import itertools
 from types import SimpleNamespace
 
+import meshio
 import numpy as np
 import pytest
+import solids
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
@@ -156,7 +158,7 @@ def run(bodies, duration, contact, gravity=False, observe=(), **solve):
     """A solution of bodies with no web near."""
     scene = dict(
         title="bodies",
-        web=dict(kind="cable", start=[0, 0, 100], end=[1, 0, 100], elements=1),
+        web=dict(kind="cable", start=[0, 50, 100], end=[1, 50, 100], elements=1),
         cable=dict(law="linear", modulus=1e3, area=1e-6, density=1.0),
         body=bodies,
         contact=dict(between_bodies=True, **contact),
@@ -323,3 +325,103 @@ def test_refusals():
     mixed = dict(stiffness=1e4, bodies=dict(a=dict(exponent=1.5)))
     with pytest.raises(refweb.InputError, match="must be equal"):
         run(BALLS, 0.1, mixed)
+
+
+def ell(width=0.2):
+    """A prism over an L, which is not convex, and its triangles."""
+    corners = np.array([[0, 0], [0.6, 0], [0.6, 0.2], [0.2, 0.2], [0.2, 0.6], [0, 0.6]]) - 0.2
+    points = np.vstack([np.column_stack([corners, np.full(6, z)]) for z in (-width, width)])
+    top = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]])
+    i = np.arange(6)
+    j = np.roll(i, -1)
+    sides = np.vstack([np.column_stack([i, j, j + 6]), np.column_stack([i, j + 6, i + 6])])
+    return points, np.vstack([top + 6, top[:, ::-1], sides])
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("surfaces")
+    found = {"block": solids.box((0.6, 0.5, 0.7)), "ell": ell()}
+    for name, (points, triangles) in found.items():
+        meshio.write(folder / f"{name}.stl", meshio.Mesh(points, [("triangle", triangles)]))
+    return {name: dict(shape="mesh", file=str(folder / f"{name}.stl"), grid=24) for name in found}
+
+
+@pytest.mark.parametrize("pair", [("sphere", "block"), ("box", "ell"), ("cylinder", "ell"), ("block", "ell")])
+def test_meshes(pair, files, monkeypatch):
+    """A ball that is thicker than a field reaches as well; bodies that are not convex."""
+    for name, shape in files.items():
+        monkeypatch.setitem(SHAPES, name, shape)
+    test_force_is_the_slope_of_an_energy(pair, LAWS[0])
+
+
+def test_a_mesh_is_the_box_that_it_is(files):
+    """Force of a ball on a block from a file and on a box with sharp edges, beyond a face, an edge and a corner."""
+    ball = dict(name="a", radius=0.1, mass=1.0)
+    for place in ([0.0, 0.1, 0.43], [0.38, 0.05, 0.38], [0.36, 0.28, 0.40]):
+        found = []
+        for other in (files["block"] | dict(grid=48), dict(shape="box", size=(0.6, 0.5, 0.7), rounding=1e-5)):
+            bodies = [
+                refweb.Body(**ball, position=place),
+                refweb.Body(name="b", fixed=True, position=(0, 0, 0), **other),
+            ]
+            contact = refweb.Contact(stiffness=1e3, between_bodies=True)
+            whole = System(discretisation.build(FAR, CABLE), [*bodies, contact], np.zeros((2, 3), dtype=bool))
+            found.append(whole.force(0.0, np.zeros((whole.rows, 3)))[2])
+        assert np.abs(found[1]).max() > 5.0
+        np.testing.assert_allclose(found[0], found[1], atol=1e3 * 1.2e-4)  # splines of 0.015 m miss depth by so much
+
+
+def test_rings():
+    """Two coins in a plane exchange their speeds, as balls do: their windows add up to 1 up to δ/r of it."""
+    ring = dict(shape="ring", radius=0.1, mass=1.0, normal=[0, 0, 1])
+    coins = [
+        ring | dict(name="a", position=[0, 0, 0], velocity=[0.8, 0.6, 0]),
+        ring | dict(name="b", position=[0.184, 0.138, 0]),
+    ]
+    s = run(coins, 0.15, dict(stiffness=1e4), safety=0.1)
+    (a, _), (b, _) = rows(s, "a"), rows(s, "b")
+    np.testing.assert_allclose(s.state.v[[a, b]], [[0, 0, 0], [0.8, 0.6, 0]], atol=2e-3)
+    assert s.pairs["a, b"]["overlap"] == pytest.approx(np.sqrt(0.5 / 2e4), rel=0.05)  # each feels the other: 2 k
+
+
+def test_cylinders_roll_without_a_bump():
+    """On its side at speed v with v/r: neither changes by more than its overlap over the radius, nor its height."""
+    k, radius = 1e5, 0.1
+    deep = G / (5.0 * k)  # two rims, and the axis at both ends and in between
+    drum = dict(name="b", shape="cylinder", radius=radius, length=0.4, axis=[0, 1, 0], mass=1.0, rounding=0.01)
+    at = dict(position=[-1, 0, radius - deep], velocity=[1.0, 0, 0], angular_velocity=[0, 10.0, 0])
+    s = run([FLOOR, drum | at], 0.5, dict(stiffness=k, friction=0.3), gravity=True)
+    row, spin = rows(s, "b")
+    np.testing.assert_allclose(s.state.x[row], [0.5, 0, 0], atol=5e-4)
+    assert s.state.v[row, 0] == pytest.approx(1.0, abs=5e-4)
+    assert s.state.v[row, 2] == pytest.approx(0.0, abs=2e-3)
+
+
+def test_bodies_that_do_not_touch_are_told():
+    scene = dict(title="through", web=dict(kind="cable", start=[0, 0, 9], end=[1, 0, 9], elements=1), body=BALLS)
+    scene |= dict(cable=dict(law="linear", modulus=1e3, area=1e-6, density=1.0), contact=dict(stiffness=1e4))
+    scene |= dict(solve=dict(kind="dynamic", duration=0.2), output=dict(interval=0.02))
+    s = refweb.run(refweb.Scene.from_dict(scene))
+    assert any('bodies "a" and "b" are' in text and "between_bodies = true" in text for text in s.warnings)
+    apart = [BALLS[0] | dict(position=[0, 0.5, 0]), BALLS[1]]
+    s = refweb.run(refweb.Scene.from_dict(scene | dict(body=apart)))
+    assert not any("between_bodies" in text for text in s.warnings)
+
+
+@pytest.mark.slow
+def test_a_stack_rests():
+    """Three boxes on a floor for 100 000 steps: they sink by what bears them, and stay, to rounding."""
+    k = 1e5
+    boxes = [
+        dict(name=f"b{i}", shape="box", size=[0.4] * 3, mass=1.0, position=[0, 0, 0.2 + 0.4 * i]) for i in range(3)
+    ]
+    s = run([FLOOR, *boxes], 1.5, dict(stiffness=k, damping=30.0, friction=0.3), gravity=True)
+    assert s.solver["nsteps"] >= 100_000
+    at = [rows(s, f"b{i}") for i in range(3)]
+    assert max(np.abs(s.state.v[list(r)]).max() for r in at) <= 1e-12
+    sunk = [s.state.x[row, 2] for row, _ in at]
+    # On the floor four corners, each of one edge, and four edges bear a box; on a box so do those of that one.
+    bearing = np.cumsum([3 / 8, 2 / 16, 1 / 16]) * G / k
+    np.testing.assert_allclose(sunk, -bearing, rtol=1e-6)
+    assert max(np.abs(s.state.x[row, :2]).max() for row, _ in at) <= 1e-12

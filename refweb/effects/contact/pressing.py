@@ -22,6 +22,7 @@ from ...net.skeleton import ARC, COLUMNS, FROM, KIND, OWNS, SEGMENT, THICKNESS, 
 from ..vectors import dot
 from .pair import _DAMPING, _EXPONENT, _FIELD, _FRICTION, _GROWTH, _SLIP, AWAY, PENALTY, pair_of
 from .places import hessian_times, places, window
+from .several import STEEPEST
 
 ROOM, APART, SIDES = 0, 1, 4
 """Columns of data: number of contacts there is room for, the first body's row from the second's at the start [m], and
@@ -265,6 +266,9 @@ def pressing(depth):
             if kind == SEGMENT:
                 q = add(times_transposed(own.axes, add(vector_at(data, c, at + TO), centre)), away)
                 q = less(times(other.axes, q), offset)
+                d, middle = less(q, p), (0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2]))
+                if depth(middle, pair.shape)[0] + 0.5 * STEEPEST * math.sqrt(dot(d, d)) <= 0.0:
+                    continue
                 for k in range(3):
                     space.x[0, k], space.x[1, k] = p[k], q[k]
                 for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.found)):
