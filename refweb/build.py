@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import memory
+from .effects.base import refuse_found
 from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
 from .messages import nearest, shown
@@ -70,6 +71,10 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     if system.constraints:
         _check_links(solve)
     _check_start(solve, accuracy)
+    if solve.method in INTEGRATORS and INTEGRATORS[solve.method].knob == "rtol":
+        refuse_found(system.families, f'method = "{solve.method}"')
+    if getattr(solve, "start", "web") == "equilibrium":
+        refuse_found(system.families, 'start = "equilibrium"')
     system.initial_velocity()
     if system.laid is not None and solve.start != "web":
         raise InputError(f'[solve] start = {shown(solve.start)} must be "web" with [fold], which is a start of its own')

@@ -110,6 +110,17 @@ def skew_web():
     return Web(points=points, lines=pairs, natural_length=factor * distance, rim=np.array([0, 2]), groups=groups)
 
 
+def crossed_web():
+    """Four lines of two chains and two alone that cross, lie along each other and end at each other, 0.21 m apart."""
+    points = [[0, 0, 0], [0.6, 0, 0], [1.2, 0.1, 0], [0.5, -0.6, 0.21], [0.5, 0.5, 0.22], [0.1, 0.3, 0.43]]
+    points += [[0.7, 0, -0.21], [1.3, 0.12, -0.22], [0.2, 0.95, 0.2], [0.52, 0.76, 0.2]]
+    pairs = np.array([[0, 1], [1, 2], [3, 4], [4, 5], [6, 7], [8, 9]])
+    points = np.array(points, dtype=float)
+    distance = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    factor, groups = np.array([0.99, 1.05, 1.0, 0.9, 1.02, 0.97]), ("edge", "", "tie", "", "", "tie")
+    return Web(points=points, lines=pairs, natural_length=factor * distance, rim=np.array([0, 2]), groups=groups)
+
+
 def skew_cable(law="smooth"):
     """A cable whose groups differ in everything."""
     groups = {"edge": dict(modulus=2e5, area=3e-4, density=900.0), "tie": dict(area=2e-4)}

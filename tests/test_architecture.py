@@ -36,6 +36,11 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
         "Contact of lines with bodies: where they touch, how deep, and the forces of penalty, damping and friction.",
     ),
     (
+        "effects.self_contact",
+        "*",
+        "Lines against lines: which are near, how they push each other apart, and what that takes from their motion.",
+    ),
+    (
         "effects.drag",
         "*",
         "Drag of a fluid on lines and bodies: its table, its force, and how explicit kicks solve for it.",

@@ -54,6 +54,7 @@ EXAMPLES = {
         dict(stiffness=1e3),
         dict(stiffness=1e3, exponent=1.5, damping=0.1, friction=0.4, slip_velocity=2.0),
     ],
+    "SelfContact": [dict(radius=0.1, stiffness=50.0), dict(radius=0.1, stiffness=50.0, damping=0.5)],
     "Frame": [dict(angular_velocity=(1.0, -2.0, 3.0))],
     "Drag": [
         dict(density=20.0, normal=1.1, tangential=0.3),
@@ -114,7 +115,8 @@ def example(name, i):
 
 def make(name, i, law, tensionless=False):
     """(net, system of one effect); contact has bodies to touch, with ends of lines and with their middles."""
-    web = replace(nets.skew_web(), natural_length=None) if tensionless else nets.skew_web()
+    web = nets.crossed_web() if name == "SelfContact" else nets.skew_web()
+    web = replace(web, natural_length=None) if tensionless else web
     pieces = 3 if name == "Bending" else 1  # no line of it continues another
     net = discretisation.build(web, replace(nets.skew_cable(law), subdivide=pieces))
     bodies = [example("Body", k) for k in ((0, 1) if i < 6 else (2, 3, 4))] if name in ("Contact", "Attach") else []

@@ -138,6 +138,7 @@ EFFECTS = {
     "link": st.lists(table(nodes=NUMBERS), min_size=1, max_size=1),
     "damping": table(optional={"time": ANY, "rate": ANY}),
     "bending": table(stiffness=ANY),
+    "self_contact": table(radius=ANY, optional={"stiffness": ANY, "damping": ANY}),
     "frame": table(angular_velocity=VECTOR),
     "drag": table(density=ANY, optional={"wind": VECTOR, "normal": ANY}),
     "orbit": table(mean_motion=ANY),

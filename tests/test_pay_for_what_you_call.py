@@ -88,6 +88,7 @@ BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", 
 VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
 BELOW["contact"] |= VECTORS | {"net.rotation"}
+BELOW["self_contact"] = VECTORS | {f"effects.self_contact{n}" for n in ("", ".pair", ".press", ".search", ".smeared")}
 BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
 BELOW |= {"bending": VECTORS, "drag": VECTORS | {f"effects.drag{name}" for name in ("", ".force", ".kick")}}
 GENERAL = {"effects.contact.places", "effects.contact.tumbling", "net.grown_core"}
@@ -241,6 +242,7 @@ TABLES = {
     "thrust": {"node": 4, "line": 0, "force": 1.0},
     "damping": {"time": 1e-4},
     "bending": {"stiffness": 1e-3},
+    "self_contact": {"radius": 1e-3},
     "reel": {"lines": [2, 3], "factor": [[0.0, 1.0], [1.0, 0.9]]},
     "temperature": {"expansion": 1e-5, "change": 10.0},
     "rupture": {"strength": 1e9},
@@ -252,7 +254,7 @@ LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
-KERNELS["contact"] = {**FAMILY, "near": 1}
+KERNELS |= {name: {**FAMILY, "near": 1} for name in ("contact", "self_contact")}
 KERNELS["attach"] = {"motion": 1}  # to a body that is fixed
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
@@ -310,6 +312,12 @@ def continued(web):
     ]
 
 
+def apart(web, one, other):
+    """Whether two nodes stand on two lines that share none."""
+    first, last = (web.lines[(web.lines == node).any(axis=1)] for node in (one, other))
+    return (first[:, None, :, None] != last[None, :, None, :]).all(axis=(2, 3)).any()
+
+
 def expected(*effects):
     web = scene_of().build().net.web
     pairs, held, rows = web.lines.tolist(), set(web.rim.tolist()), len(web.points)
@@ -317,6 +325,8 @@ def expected(*effects):
         held = set()
     if "bending" in effects:
         pairs = pairs + continued(web)
+    if "self_contact" in effects:  # every line with every other
+        pairs = pairs + [(one, other) for one in range(rows) for other in range(one) if apart(web, one, other)]
     if "motion" in effects:
         held = held | {TABLES["motion"]["node"]}
     if {"body", "contact"} & set(effects):

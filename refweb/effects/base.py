@@ -23,6 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import InputError
+
 TENSION, STRAIN, POWER = range(3)
 """Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
 
@@ -96,6 +98,10 @@ class Family:
     near : kernel, optional
         Finds the cells that may act soon, for an explicit method: the others add nothing and show 0; None where all
         are looked at.
+    finder : kernel, optional
+        As ``near``, where cells are elements of which any two may act on each other, or pairs of them: finds (numbers
+        of the elements, their rows, their data) of the pairs that may act soon. Such a family has no stiffness; None
+        where cells are what acts.
     rubbing : Rubbing, optional
         How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
     internal : bool
@@ -136,6 +142,7 @@ class Family:
     damping: Callable | None = None
     damping_bound: Callable | None = None
     near: Callable | None = None
+    finder: Callable | None = None
     rubbing: Rubbing | None = None
     internal: bool = False
     impulse: Callable | None = None
@@ -155,6 +162,22 @@ class Family:
 def pairs_of(system):
     """Pairs of bodies of a system that may touch each other, in the order of families and their cells."""
     return [pair for family in system.families for pair in family.pairs]
+
+
+def refuse_found(families, what):
+    """Refuse families whose pairs are found, `Family.finder`, of which there is no tangent, where ``what`` needs one.
+
+    Raises
+    ------
+    InputError
+        For the first of them.
+    """
+    for family in families:
+        if family.finder is not None:
+            raise InputError(
+                f"[{family.name}] has more pairs of elements than a tangent may hold, in a web of {len(family.cells)} "
+                f'elements, and {what} needs one: use method = "central-difference" and start = "web"'
+            )
 
 
 def without(columns):

@@ -32,7 +32,7 @@ from .events import ended_by, note_events
 from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, note_momentum, push_on, set_push
-from .nearby import bits_of, follow_near, reach_all, show_near
+from .nearby import bits_of, covers, exchange, follow_near, reach_all, show_near, spread_of
 from .step import (
     add_forces,
     give_impulse,
@@ -232,10 +232,20 @@ def steps_until(end, changing, scheme, model, running):
         speed = max(speed, (own + turning) ** 2)
         push = max(push, (inverse[turns.rows[n, 0], 0] * force + inverse[turns.rows[n, 1], 0] * moment) ** 2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
-    reach_all(2.0 * interval * fastest, running.x, model.nearby, model.families)
-    return interval / (
-        scheme.safety * safe_step(time, end, changing, 2.0 * interval * fastest, fastest, running.x, f, model)
-    )
+    if model.nearby.at.shape[0]:
+        fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
+    reach = 2.0 * interval * fastest
+    reach_all(reach, running.x, model.nearby, model.families)
+    if covers(reach, model.nearby):
+        return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
+    families, cells, data = model.families, model.families.cells.copy(), model.families.data.copy()
+    more, first = len(cells) - len(data), 2 * len(data) - len(cells)
+    for m in range(more):
+        cells[m], data[m] = cells[first + m], data[first + m]
+    exchange(model.nearby, families, cells, data)
+    bound = safe_step(time, end, changing, reach, fastest, running.x, f, model)
+    exchange(model.nearby, families, cells, data)
+    return interval / (scheme.safety * bound)
 
 
 @kernel()

@@ -4,6 +4,11 @@ A list of the lines within a skin of a body holds until something may have come 
 nothing moves by more than the fastest row, and a line comes nearer to a body by no more than twice that. So nothing is
 missed, and the numbers are those of all lines to the last bit, since lines that do not touch add nothing to any sum.
 
+Where cells are pairs of elements that are found, ways of fast rows are those relative to each other, for a net that is
+thrown flies as a whole, and a list that is used up is held against where rows really went before another is made: waves
+come and go. Its skin is not deeper than `WIDEST` of an element, where every element would be near another, and is to
+last for fewer steps, down to `FEWEST`, where to look at its pairs takes longer than to find them.
+
 A list is deep enough for the `LASTS` steps ahead, and for the bound on the steps of the next row where that reaches no
 more than `LONGEST` of them. So it is made once in some rows, by a look at all lines.
 """
@@ -18,12 +23,21 @@ import numpy as np
 from numba import types
 from numba.typed import List
 
-from ...kernels import INDICES, MATRIX, VECTOR, kernel, typed_list
+from ...kernels import INDICES, MATRIX, VECTOR, copy_rows, kernel, typed_list
 
 LASTS = 64.0
 """Number of steps that a list is to last at the speed of its first."""
 LONGEST = 256.0
 """The same where a bound on the next row's steps asks for a deeper skin."""
+WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
+"""Depth of a skin around pairs over the mean length of elements, at most; number of steps that it is to last, at most
+and at least."""
+PRICE = 16.0
+"""Time that it takes to find the pairs of an element, over that to look at one."""
+HALF = 0.5
+"""Share of the reach of a bound by which rows come nearer to each other: it is twice what its speeds make."""
+KEPT_UP_TO = 0.7
+"""Share of a skin around pairs that may be used up where a list is kept."""
 COVERED = 3
 """Number of steps whose ways are known before a list is made: peaks are looked for in that many."""
 SHARE = 0.999
@@ -33,14 +47,15 @@ SIGN = np.int64(0x7FFFFFFFFFFFFFFF)
 
 SKIN = np.dtype(
     {
-        "names": ["depth", "used", "last", "before", "earlier", "wished", "steps", "top", "fastest"],
-        "formats": [*(6 * [float]), np.int64, np.int64, float],
-        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 56],
+        "names": ["depth", "used", "last", "before", "earlier", "wished", "lasts", "steps", "top", "fastest"],
+        "formats": [*(7 * [float]), np.int64, np.int64, float],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 64],
     }
 )
 """Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
 bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
-of steps of which that is known; the largest component of a velocity, as a whole number and as what it is [m/s]."""
+of steps that a list of pairs is to last; number of steps of which that is known; the largest component of a velocity,
+as a whole number and as what it is [m/s]."""
 TAKE, SHOW = 0, 1
 """What is asked for: the cells within the skin, all where it is infinitely deep, or to show what those show."""
 NOWHERE = np.zeros((0, 3))
@@ -62,19 +77,28 @@ class Nearby(NamedTuple):
         Their numbers.
     skin : ndarray of `SKIN`, shape (1,)
         How long what is chosen will do.
+    at : ndarray, shape (rows, 3)
+        Displacement at which pairs were found [m]; no rows where none are found.
+    widest : float
+        Largest depth of the skin around pairs [m].
     """
 
     swaps: List
     families: np.ndarray
     skin: np.ndarray
+    at: np.ndarray
+    widest: float
 
     @classmethod
     def of(cls, system):
         """Those of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
-        skin["depth"] = np.inf
-        swaps = typed_list(SWAP, [swap_of(system.families[i].near) for i in near])
-        return cls(swaps, np.array(near, dtype=np.int64), skin)
+        skin["depth"], skin["lasts"] = np.inf, MANY
+        swaps = typed_list(SWAP, [swap_for(system.families[i]) for i in near])
+        pairs = any(family.finder is not None for family in system.families)
+        at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
+        widest = WIDEST * float(system.net.natural_length.mean())
+        return cls(swaps, np.array(near, dtype=np.int64), skin, at, widest)
 
     def without(self):
         """That of no families."""
@@ -83,7 +107,12 @@ class Nearby(NamedTuple):
 
 def near_of(system):
     """Numbers of the families of a system whose cells act only near something."""
-    return [i for i, family in enumerate(system.families) if family.near is not None]
+    return [i for i, family in enumerate(system.families) if family.near is not None or family.finder is not None]
+
+
+def swap_for(family):
+    """The kernel that swaps the cells of a family."""
+    return swap_of(family.near) if family.finder is None else swap_pairs_of(family.finder)
 
 
 @functools.cache
@@ -126,6 +155,40 @@ def swap_of(near):
     return swap
 
 
+@functools.cache
+def swap_pairs_of(pairs):
+    """As `swap_of`, of a family whose cells are elements: they are swapped for the pairs that ``pairs`` finds.
+
+    What an element shows is the largest value of its pairs, or the smallest where these are below 0.
+    """
+
+    @kernel(SWAP)
+    def swap(what, i, m, depth, x, cells, data, outs, stored):
+        more, own = len(cells) - len(data), outs[i]
+        whole, numbers = len(data) - more + m, len(data) + m
+        shown, chosen_before = outs[whole], cells[numbers]
+        if what == SHOW:
+            for n in range(chosen_before.shape[0]):
+                for k in range(shown.shape[1]):
+                    shown[chosen_before[n, 0], k] = shown[chosen_before[n, 1], k] = 0.0
+            for n in range(chosen_before.shape[0]):
+                for e in range(2):
+                    for k in range(shown.shape[1]):
+                        if abs(own[n, k]) > abs(shown[chosen_before[n, e], k]):
+                            shown[chosen_before[n, e], k] = own[n, k]
+            return
+        if depth == math.inf:
+            cells[i], data[i], outs[i], stored[i] = cells[whole], data[whole], shown, stored[whole]
+            cells[numbers] = np.empty((0, 1), dtype=np.int32)
+            return
+        found, rows, values = pairs(depth, x, cells[whole], data[whole])
+        shown[:] = 0.0
+        cells[i], data[i], cells[numbers] = rows, values, found.astype(np.int32)
+        outs[i], stored[i] = np.zeros((rows.shape[0], shown.shape[1])), np.zeros(rows.shape[0])
+
+    return swap
+
+
 @kernel()
 def ask(what, x, nearby, families):
     """Swap the cells of all families for those within the skin at displacement x, or write what these show."""
@@ -141,7 +204,7 @@ def look_at_all(system, model):
     skin, families = model.nearby.skin[0], model.families
     if skin["depth"] < np.inf:
         for m, i in enumerate(near_of(system)):
-            swap_of(system.families[i].near)(
+            swap_for(system.families[i])(
                 TAKE, i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
             )
     skin["depth"], skin["steps"] = np.inf, 0
@@ -160,14 +223,75 @@ def show_near(nearby, families):
         ask(SHOW, families.outs[0], nearby, families)
 
 
+@kernel()
+def covers(reach, nearby):
+    """Whether pairs that were found, or all cells, are all that can touch within the reach of a bound [m]."""
+    return not nearby.at.shape[0] or nearby.skin[0].used + HALF * reach <= SHARE * nearby.skin[0].depth
+
+
+@kernel()
+def take_pairs(x, nearby, families):
+    """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
+    copy_rows(x[: nearby.at.shape[0]], nearby.at)
+    ask(TAKE, x, nearby, families)
+    skin, pairs, elements = nearby.skin[0], 0, 0
+    for m in range(nearby.families.size):
+        pairs += families.cells[nearby.families[m]].shape[0]
+        elements += families.cells[len(families.cells) - nearby.families.size + m].shape[0]
+    if pairs * skin.lasts > PRICE * elements:
+        skin.lasts = max(0.5 * skin.lasts, FEWEST)
+    elif 4.0 * pairs * skin.lasts < PRICE * elements:
+        skin.lasts = min(2.0 * skin.lasts, MANY)
+
+
 @kernel(forceinline=True)
 def reach_all(reach, x, nearby, families):
-    """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m]."""
+    """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
+
+    Pairs that are found stay, or are found anew within a skin that is as deep, if there are few; else see `exchange`.
+    """
     skin = nearby.skin[0]
     skin.wished = 2.0 * reach
+    if nearby.at.shape[0]:
+        if not covers(reach, nearby) and skin.depth < math.inf and skin.lasts == MANY and reach <= nearby.widest:
+            skin.depth, skin.used = min(2.0 * HALF * reach, nearby.widest), 0.0
+            take_pairs(x, nearby, families)
+        return
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf
         ask(TAKE, x, nearby, families)
+
+
+@kernel()
+def exchange(nearby, families, cells, data):
+    """Exchange cells and data of families that act nearby with those that stand in two lists."""
+    for m in range(nearby.families.size):
+        i = nearby.families[m]
+        families.cells[i], cells[m] = cells[m], families.cells[i]
+        families.data[i], data[m] = data[m], families.data[i]
+
+
+@kernel(fastmath={"contract", "nnan", "nsz"})
+def spread_of(rows):
+    """Root of the sum of the squares of the ranges of three columns: no two rows differ by more."""
+    a0 = a1 = a2 = -math.inf
+    b0 = b1 = b2 = math.inf
+    for r in range(rows.shape[0]):
+        x, y, z = rows[r, 0], rows[r, 1], rows[r, 2]
+        a0, b0 = x if x > a0 else a0, x if x < b0 else b0
+        a1, b1 = y if y > a1 else a1, y if y < b1 else b1
+        a2, b2 = z if z > a2 else a2, z if z < b2 else b2
+    return math.sqrt((a0 - b0) ** 2 + (a1 - b1) ** 2 + (a2 - b2) ** 2)
+
+
+@kernel()
+def spread_since(x, at):
+    """The same of how far rows have come from where they were [m]."""
+    way = np.empty(at.shape)
+    for r in range(at.shape[0]):
+        for k in range(3):
+            way[r, k] = x[r, k] - at[r, k]
+    return spread_of(way)
 
 
 @kernel(forceinline=True)
@@ -179,7 +303,7 @@ def follow_near(drift, x, bits, before, driven, nearby, families):
     """
     if not bits.size:
         return
-    skin, most = nearby.skin[0], np.int64(0)
+    skin, most, pairs = nearby.skin[0], np.int64(0), nearby.at.shape[0] > 0
     for q in range(bits.size):
         most = max(most, bits[q] & SIGN)
     skin.top = most
@@ -188,10 +312,22 @@ def follow_near(drift, x, bits, before, driven, nearby, families):
         for k in range(3):
             way = max(way, abs(x[driven[d], k] - before[d, k]))
     way *= 2.0 * math.sqrt(3.0)
+    if pairs and FEWEST * way > nearby.widest and not driven.size:
+        way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
     skin.earlier, skin.before, skin.last = skin.before, skin.last, way
     skin.used += way
     skin.steps += 1
     if skin.steps > COVERED and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
         recent = skin.last + skin.before + skin.earlier
+        if pairs:
+            if skin.depth < math.inf:
+                skin.used = spread_since(x, nearby.at) + recent
+                if skin.used + way <= KEPT_UP_TO * skin.depth:
+                    return
+            near = way if driven.size else abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
+            skin.depth = max(min(skin.lasts * near, nearby.widest), 4.0 * recent)
+            skin.used = 0.0
+            take_pairs(x, nearby, families)
+            return
         skin.depth, skin.used = max(LASTS * way, 4.0 * recent, min(skin.wished, LONGEST * way)), 0.0
         ask(TAKE, x, nearby, families)

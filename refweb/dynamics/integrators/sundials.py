@@ -17,6 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...effects.base import refuse_found
 from ...system.factorization import Factor
 from .step_observer import StepObserver, Stopped
 
@@ -54,6 +55,7 @@ class Sundials(StepObserver):
 
     def __init__(self, system, *observed, **tolerances):
         super().__init__(system, *observed, **tolerances)
+        refuse_found(system.families, f'method = "{self.method}"')
         self._product, self._exact, self._true = None, False, False
 
     def tolerance(self):

@@ -78,6 +78,12 @@ class BodyContactEnergy(Booked):
     needs = "[contact] with between_bodies = true"
 
 
+class SelfContactEnergy(Booked):
+    """Of touching lines."""
+
+    needs = "[self_contact]"
+
+
 class BendingEnergy(Booked):
     """Of bent lines."""
 

@@ -1,0 +1,86 @@
+"""Numbers of elements, and of pairs of elements, as the kernels of lines against lines read them.
+
+Cells of a family are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
+`refweb.effects.self_contact.search` makes pairs of them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ...kernels import kernel
+from ..vectors import cross, dot
+
+TOUCH, SCALE, LENGTH, OTHER, DAMPING, SHAPE, WIDTH = 0, 1, 2, 3, 4, 5, 14
+"""Columns of the data of a pair: distance of centre lines at which they touch [m], κ of `refweb.effects.self_contact.
+press` [N/m⁴], 0 where an element is broken, natural lengths of both [m], d [s/m], and from the first node of the first
+element the vectors to the three others in the web's position; number of columns."""
+ENDS, APART = 5, 11
+"""First columns of the data of an element, behind the same but `OTHER`: reference positions of its nodes, and numbers
+of the elements that it does not touch, being within the distance of touch along the net, −1 for none."""
+
+
+class Place(NamedTuple):
+    """Where a pair is: vectors u and w of both elements, p from the first node of the other to that of the first."""
+
+    p: tuple
+    u: tuple
+    w: tuple
+
+
+@kernel(forceinline=True)
+def place_of(x, cells, data, c):
+    """The `Place` of pair c at displacements x."""
+    i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
+    u = (
+        data[c, SHAPE] + x[j, 0] - x[i, 0],
+        data[c, SHAPE + 1] + x[j, 1] - x[i, 1],
+        data[c, SHAPE + 2] + x[j, 2] - x[i, 2],
+    )
+    p = (
+        x[i, 0] - x[k, 0] - data[c, SHAPE + 3],
+        x[i, 1] - x[k, 1] - data[c, SHAPE + 4],
+        x[i, 2] - x[k, 2] - data[c, SHAPE + 5],
+    )
+    w = (
+        data[c, SHAPE + 6] - data[c, SHAPE + 3] + x[m, 0] - x[k, 0],
+        data[c, SHAPE + 7] - data[c, SHAPE + 4] + x[m, 1] - x[k, 1],
+        data[c, SHAPE + 8] - data[c, SHAPE + 5] + x[m, 2] - x[k, 2],
+    )
+    return Place(p, u, w)
+
+
+@kernel(forceinline=True)
+def apart(place, touch):
+    """Whether a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to."""
+    p, u, w = place
+    m = p[0] + 0.5 * (u[0] - w[0]), p[1] + 0.5 * (u[1] - w[1]), p[2] + 0.5 * (u[2] - w[2])
+    # within √2 touch of each other, and (a + b + c)² ≤ 3 (a² + b² + c²)
+    if dot(m, m) > 0.75 * (dot(u, u) + dot(w, w)) + 6.0 * touch * touch:
+        return True
+    n = cross(u, w)
+    off = dot(p, n)
+    return off * off > touch * touch * dot(n, n)
+
+
+@kernel(forceinline=True)
+def angle_factor(n, first, last, touch):
+    """(f, the product of the natural lengths), n = u × w, see `refweb.effects.self_contact.press`."""
+    area = first * last
+    return math.sqrt(dot(n, n) / (area * area) + touch * touch / area), area
+
+
+@kernel(forceinline=True)
+def nearest(p, u, w):
+    """(s, t, squared distance) of the points of two segments that are nearest each other."""
+    a, b, c = dot(u, u), dot(u, w), dot(w, w)
+    d, e = dot(u, p), dot(w, p)
+    scale = a * c - b * b
+    s = min(max((b * e - c * d) / scale, 0.0), 1.0) if scale > 0.0 else 0.0
+    t = (b * s + e) / c if c > 0.0 else 0.0
+    if not 0.0 <= t <= 1.0 or c == 0.0:
+        t = min(max(t, 0.0), 1.0)
+        s = min(max((b * t - d) / a, 0.0), 1.0) if a > 0.0 else 0.0
+    q = (p[0] + s * u[0] - t * w[0], p[1] + s * u[1] - t * w[1], p[2] + s * u[2] - t * w[2])
+    return s, t, dot(q, q)

@@ -1,0 +1,281 @@
+"""The push between lines, as compiled kernels.
+
+Two elements with natural lengths L and L', whose vectors are u and w, have the energy
+
+    E = ½ κ f (L I + L' I'),        f² = |u × w|²/(L L')² + c²/(L L'),        κ = k/(√12 c³),
+
+I and I' being the overlaps of each with the line of the other, see `refweb.effects.self_contact.smeared`, c = 2r the
+distance at which lines touch, and k the stiffness. All of it follows from the four nodes smoothly and does not change
+as the pair is carried and turned: its forces are the gradient, their resultant and their moment are zero.
+
+Lines that cross with their centre lines h apart overlap over a length that goes with one over the sine of their angle.
+f takes that away: whatever the angle, at any place that is not at a free end,
+
+    E = (16/15) κ (c² − h²)^(5/2) f/sin,        push = k h (c² − h²)^(3/2)/(√27 r³) · f/sin,
+
+where f/sin is 1 but for (c/L)². For a small overlap δ that is 3.08 k δ^(3/2)/√r, as crossed cylinders push by Hertz; at
+h = r it is k r and largest. Lines that lie along each other push with 2 κ f h (c² − h²)·2 on their length: elements of
+a pair together by up to k r again, over the length that they share. So the stiffness of a pair is of the order of k at
+any angle, and steps need not be shorter for lines that are parallel.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..vectors import cross, dot
+from .pair import ENDS, LENGTH, OTHER, SCALE, TOUCH, angle_factor, apart, nearest, place_of
+from .search import REACH, found
+from .smeared import ROOM, add_second, first
+
+MARGIN = 0.75
+"""Factor on that of a rigid body: of 4000 pairs at random no row sum is above 0.7 of what it leaves."""
+MOST = 6.0
+"""Number of others that lie against an element at one time in bounds, at most: so many equal lines fit around one."""
+FAR = 0.2
+"""Reach over the longest element above which a bound does not look which elements are near each other."""
+OF_REACH = 0.5
+"""Share of the reach of a bound that pairs come nearer by: that is twice what two rows may at its speed."""
+NOT_SEEN = -1.0
+"""What a pair shows that does not overlap."""
+
+
+@kernel(forceinline=True)
+def overlap(place, data, c, ends):
+    """(J, its gradients by the nodes, least squared distance), E = f J; the gradients are in the order of the pair."""
+    touch, half = data[c, TOUCH], 0.5 * data[c, SCALE]
+    p, u, w = place
+    one, a, b, d, least = first(p, u, w, touch, ends)
+    other, e, g, h, nearer = first((-p[0], -p[1], -p[2]), w, u, touch, ends)
+    own, more = half * data[c, LENGTH], half * data[c, OTHER]
+    first_node = (
+        own * a[0] - more * (e[0] + g[0] + h[0]),
+        own * a[1] - more * (e[1] + g[1] + h[1]),
+        own * a[2] - more * (e[2] + g[2] + h[2]),
+    )
+    second = own * b[0] + more * h[0], own * b[1] + more * h[1], own * b[2] + more * h[2]
+    third = (
+        more * e[0] - own * (a[0] + b[0] + d[0]),
+        more * e[1] - own * (a[1] + b[1] + d[1]),
+        more * e[2] - own * (a[2] + b[2] + d[2]),
+    )
+    last = more * g[0] + own * d[0], more * g[1] + own * d[1], more * g[2] + own * d[2]
+    return own * one + more * other, first_node, second, third, last, min(least, nearer)
+
+
+@kernel(forceinline=True)
+def slopes_of_factor(u, w, n, f, area):
+    """(∂f/∂u, ∂f/∂w)."""
+    one, other, scale = cross(w, n), cross(n, u), 1.0 / (f * area * area)
+    return (
+        (scale * one[0], scale * one[1], scale * one[2]),
+        (scale * other[0], scale * other[1], scale * other[2]),
+    )
+
+
+@kernel(forceinline=True)
+def press(x, f, cells, data, c, nodes, ends):
+    """Add the forces of pair c to the rows ``nodes[c]`` of f; how deep it overlaps [m], `NOT_SEEN` where it does not.
+
+    Of ``nodes`` with a single row that is taken. What is apart costs no call.
+    """
+    place = place_of(x, cells, data, c)
+    return NOT_SEEN if apart(place, data[c, TOUCH]) else add_push(place, f, data, c, nodes, ends)
+
+
+@kernel()
+def add_push(place, f, data, c, nodes, ends):
+    """As `press`, where a pair may touch."""
+    touch = data[c, TOUCH]
+    j, g0, g1, g2, g3, least = overlap(place, data, c, ends)
+    if least == math.inf:
+        return NOT_SEEN
+    n = cross(place.u, place.w)
+    factor, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
+    by_u, by_w = slopes_of_factor(place.u, place.w, n, factor, area)
+    row = min(c, nodes.shape[0] - 1)
+    for k in range(3):
+        f[nodes[row, 0], k] -= factor * g0[k] - j * by_u[k]
+        f[nodes[row, 1], k] -= factor * g1[k] + j * by_u[k]
+        f[nodes[row, 2], k] -= factor * g2[k] - j * by_w[k]
+        f[nodes[row, 3], k] -= factor * g3[k] + j * by_w[k]
+    return touch - math.sqrt(max(least, 0.0))
+
+
+@kernel()
+def stored(x, cells, data, c, ends):
+    """Energy of pair c [J]."""
+    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
+    if apart(place, touch):
+        return 0.0
+    n = cross(place.u, place.w)
+    factor, _ = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
+    return factor * overlap(place, data, c, ends)[0]
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    ends = np.empty(ROOM)
+    if cells.shape[1] == 4:
+        for c in range(cells.shape[0]):
+            out[c, 0] = max(press(x, f, cells, data, c, cells, ends), 0.0)
+        return
+    out[:, 0] = 0.0
+    chosen, rows, numbers = found(0.0, x, cells, data)
+    for c in range(rows.shape[0]):
+        deep = press(x, f, rows, numbers, c, rows, ends)
+        for n in range(2):
+            out[chosen[c, n], 0] = max(out[chosen[c, n], 0], deep)
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    ends = np.empty(ROOM)
+    if cells.shape[1] == 4:
+        for c in range(cells.shape[0]):
+            out[c] = stored(x, cells, data, c, ends)
+        return
+    out[:] = 0.0
+    chosen, rows, numbers = found(0.0, x, cells, data)
+    for c in range(rows.shape[0]):
+        own = 0.5 * stored(x, rows, numbers, c, ends)
+        for n in range(2):
+            out[chosen[c, n]] += own
+
+
+@kernel()
+def add_turning(block, place, j, slopes, by_u, by_w, f, area):
+    """Add what follows of f as the elements turn: ∇f ∇J + ∇J ∇f + J ∇∇f; ``slopes (4, 3)`` are those of J."""
+    u, w, of_u, of_w = place.u, place.w, (-1.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 1.0)
+    uu, uw, ww, scale = dot(u, u), dot(u, w), dot(w, w), j / (f * area * area)
+    for a in range(3):
+        for b in range(3):
+            one = 1.0 if a == b else 0.0
+            first_block = scale * (ww * one - w[a] * w[b]) - j * by_u[a] * by_u[b] / f
+            mixed = scale * (2.0 * u[a] * w[b] - w[a] * u[b] - uw * one) - j * by_u[a] * by_w[b] / f
+            last_block = scale * (uu * one - u[a] * u[b]) - j * by_w[a] * by_w[b] / f
+            for m in range(4):
+                tilt = of_u[m] * by_u[a] + of_w[m] * by_w[a]
+                for n in range(4):
+                    other = of_u[n] * by_u[b] + of_w[n] * by_w[b]
+                    value = tilt * slopes[n, b] + slopes[m, a] * other
+                    value += of_u[m] * of_u[n] * first_block + of_w[m] * of_w[n] * last_block
+                    value += of_u[m] * of_w[n] * mixed
+                    block[3 * m + a, 3 * n + b] += value
+                    block[3 * n + b, 3 * m + a] += of_u[m] * of_w[n] * mixed
+
+
+@kernel()
+def add_all_second(x, cells, data, c, definite, ends, block):
+    """Add the second derivatives of the energy of pair c to its block, or a part that is positive semidefinite."""
+    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
+    if apart(place, touch):
+        return
+    p, u, w = place
+    n = cross(u, w)
+    f, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
+    half = 0.5 * data[c, SCALE] * f
+    add_second(p, u, w, touch, half * data[c, LENGTH], definite, (0, 1, 2, 3), ends, block)
+    back = -p[0], -p[1], -p[2]
+    add_second(back, w, u, touch, half * data[c, OTHER], definite, (2, 3, 0, 1), ends, block)
+    if definite:
+        return
+    j, g0, g1, g2, g3, _ = overlap(place, data, c, ends)
+    slopes = np.empty((4, 3))
+    for k in range(3):
+        slopes[0, k], slopes[1, k], slopes[2, k], slopes[3, k] = g0[k], g1[k], g2[k], g3[k]
+    by_u, by_w = slopes_of_factor(u, w, n, f, area)
+    add_turning(block, place, j, slopes, by_u, by_w, f, area)
+
+
+@kernel(STIFFNESS)
+def stiffness(t, x, v, blocks, cells, data, definite):
+    ends = np.empty(ROOM)
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        add_all_second(x, cells, data, c, definite, ends, blocks[c])
+
+
+@kernel(forceinline=True)
+def steepest(touch, scale, first_length, other_length, room):
+    """Bound on the stiffness of a pair [N/m] whose c² − D is at most ``room``: 8 c² κ f times the length in reach."""
+    eta = touch / math.sqrt(first_length * other_length)
+    shared = eta * (min(first_length, other_length) + 2.0 * touch)
+    return MARGIN * 8.0 * touch * touch * scale * math.sqrt(4.0 * room + shared * shared)
+
+
+@kernel(forceinline=True)
+def room_left(most, touch, scale, stored_now, moving):
+    """c² − D that a pair may come to: what is within reach, and for what its energy and that of motion allow."""
+    if not scale > 0.0:
+        return 0.0
+    most, power = min(most, touch * touch), 1.875 * (stored_now + moving) / scale
+    return most if power >= touch**5 else min(most, power**0.4)
+
+
+@kernel(forceinline=True)
+def foreseen(reach, speed, x, mass, cells, data, c, ends):
+    """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
+    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
+    square = nearest(place.p, place.u, place.w)[2]
+    if not square < (REACH * touch + reach) ** 2:
+        return 0.0
+    own, other = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
+    reduced = own * other / (own + other) if min(own, other) > 0.0 else max(own, other)
+    moving = 0.5 * reduced * speed * speed if speed > 0.0 else math.inf
+    left = max(math.sqrt(square) - reach, 0.0)
+    return room_left(2.0 * touch * touch - left * left, touch, data[c, SCALE], stored(x, cells, data, c, ends), moving)
+
+
+@kernel()
+def note_pairs(reach, speed, x, mass, cells, data, own, most):
+    """Write the sum and the largest of the bounds of all pairs of each row."""
+    ends = np.empty(ROOM)
+    for c in range(cells.shape[0]):
+        room = foreseen(reach, speed, x, mass, cells, data, c, ends)
+        if room > 0.0:
+            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
+            for n in range(4):
+                own[cells[c, n]] += value
+                most[cells[c, n]] = max(most[cells[c, n]], value)
+
+
+@kernel()
+def note_all(speed, mass, cells, data, own, most):
+    """The same where any two elements may touch: each has its middle touched by another like it."""
+    for c in range(cells.shape[0]):
+        touch, scale, length = data[c, TOUCH], data[c, SCALE], data[c, LENGTH]
+        moving = math.inf if speed == 0.0 else 0.25 * (mass[cells[c, 0]] + mass[cells[c, 1]]) * speed * speed
+        room = room_left(math.inf, touch, scale, 0.0, moving)
+        value = steepest(touch, scale, length, length, room)
+        for n in range(2):
+            most[cells[c, n]] = own[cells[c, n]] = max(most[cells[c, n]], value)
+
+
+@kernel()
+def longest(x, cells, data):
+    """Length of the longest element."""
+    square = 0.0
+    for c in range(cells.shape[0]):
+        i, j, own = cells[c, 0], cells[c, 1], 0.0
+        for k in range(3):
+            own += (data[c, ENDS + 3 + k] - data[c, ENDS + k] + x[j, k] - x[i, k]) ** 2
+        square = max(square, own)
+    return math.sqrt(square)
+
+
+@kernel(BOUND)
+def bound(reach, speed, x, mass, rates, cells, data):
+    own, most, reach = np.zeros(rates.size), np.zeros(rates.size), OF_REACH * reach
+    if cells.shape[1] == 4:
+        note_pairs(reach, speed, x, mass, cells, data, own, most)
+    elif reach > FAR * longest(x, cells, data):
+        note_all(speed, mass, cells, data, own, most)
+    else:
+        _, rows, numbers = found(reach, x, cells, data)
+        note_pairs(reach, speed, x, mass, rows, numbers, own, most)
+    for r in range(rates.size):
+        rates[r] += min(own[r], MOST * most[r])

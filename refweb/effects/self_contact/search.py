@@ -1,0 +1,216 @@
+"""Which elements are near each other: pairs of a list, or of all elements by a grid of cells.
+
+The grid is as wide as the longest element and the distance looked for together. So what is near an element has its
+middle in the same cell or in one beside it, and the time goes with the number of elements. Elements that share a node
+make no pair, nor do those that are listed as near along the net.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import NEAR, kernel
+from .pair import APART, DAMPING, ENDS, LENGTH, OTHER, SCALE, SHAPE, TOUCH, WIDTH, nearest, place_of
+
+REACH = math.sqrt(2.0)
+"""Distance of two segments up to which they may push each other, over that at which lines touch: an element ends
+smeared, by as much along itself as its line is thick."""
+BOXES = 4
+"""Largest number of cells of the grid over that of elements."""
+
+
+@kernel()
+def middles(x, cells, data, room):
+    """Write middle and half length of each element to ``room (elements, 4)``; the largest half length."""
+    most = 0.0
+    for c in range(cells.shape[0]):
+        i, j, square = cells[c, 0], cells[c, 1], 0.0
+        for k in range(3):
+            a, b = data[c, ENDS + k] + x[i, k], data[c, ENDS + 3 + k] + x[j, k]
+            room[c, k] = 0.5 * (a + b)
+            square += (b - a) * (b - a)
+        room[c, 3] = 0.5 * math.sqrt(square)
+        most = max(most, room[c, 3])
+    return most
+
+
+@kernel()
+def boxes_of(width, room):
+    """(least place, width of the cells of a grid, numbers along the axes); no cells where places are not finite."""
+    low, high, count = np.full(3, math.inf), np.full(3, -math.inf), np.ones(3, dtype=np.int64)
+    for c in range(room.shape[0]):
+        for k in range(3):
+            low[k], high[k] = min(low[k], room[c, k]), max(high[k], room[c, k])
+    size = (high - low).max()
+    if not (math.isfinite(size) and math.isfinite(width) and width > 0.0):
+        count[0] = 0
+        return low, width, count
+    width = max(width, size / 1e6)
+    while True:
+        total = 1.0
+        for k in range(3):
+            count[k] = int((high[k] - low[k]) / width) + 1
+            total *= count[k]
+        if total <= BOXES * room.shape[0] + 64:
+            return low, width, count
+        width *= 1.3
+
+
+@kernel()
+def sorted_by_box(low, width, count, room):
+    """(elements in the order of boxes, where each box begins among them, and their rows of ``room``)."""
+    own, start = np.empty(room.shape[0], dtype=np.int64), np.zeros(count.prod() + 1, dtype=np.int64)
+    for c in range(room.shape[0]):
+        at = 0
+        for k in range(3):
+            at = at * count[k] + min(int((room[c, k] - low[k]) / width), count[k] - 1)
+        own[c] = at
+        start[at + 1] += 1
+    for b in range(1, start.size):
+        start[b] += start[b - 1]
+    order, filled, rows = np.empty(room.shape[0], dtype=np.int64), start[:-1].copy(), np.empty(room.shape)
+    for c in range(room.shape[0]):
+        at = filled[own[c]]
+        order[at] = c
+        filled[own[c]] += 1
+        for k in range(4):
+            rows[at, k] = room[c, k]
+    return order, start, rows
+
+
+@kernel(forceinline=True)
+def strangers(a, b, cells, data):
+    """Whether two elements share no node, and are not near along the net."""
+    i, j, k, m = cells[a, 0], cells[a, 1], cells[b, 0], cells[b, 1]
+    if i == k or i == m or j == k or j == m:
+        return False
+    for n in range(APART, data.shape[1]):
+        if data[a, n] < 0.0:
+            return True
+        if data[a, n] == b:
+            return False
+    return True
+
+
+@kernel(forceinline=True)
+def near_each_other(reach, a, b, x, cells, data):
+    """Whether two elements that may touch are nearer than a distance."""
+    if not strangers(a, b, cells, data):
+        return False
+    i, j, k, m = cells[a, 0], cells[a, 1], cells[b, 0], cells[b, 1]
+    first = data[a, ENDS] + x[i, 0], data[a, ENDS + 1] + x[i, 1], data[a, ENDS + 2] + x[i, 2]
+    other = data[b, ENDS] + x[k, 0], data[b, ENDS + 1] + x[k, 1], data[b, ENDS + 2] + x[k, 2]
+    p = first[0] - other[0], first[1] - other[1], first[2] - other[2]
+    u = (
+        data[a, ENDS + 3] + x[j, 0] - first[0],
+        data[a, ENDS + 4] + x[j, 1] - first[1],
+        data[a, ENDS + 5] + x[j, 2] - first[2],
+    )
+    w = (
+        data[b, ENDS + 3] + x[m, 0] - other[0],
+        data[b, ENDS + 4] + x[m, 1] - other[1],
+        data[b, ENDS + 5] + x[m, 2] - other[2],
+    )
+    return nearest(p, u, w)[2] < reach * reach
+
+
+@kernel(forceinline=True)
+def set_ranges(box, count, start, ranges):
+    """Write where elements begin and end that stand in half of the boxes beside a box; their number."""
+    z = box % count[2]
+    y, q = box // count[2] % count[1], box // count[2] // count[1]
+    before, behind, amount = (1 if z > 0 else 0), (1 if z + 1 < count[2] else 0), 1
+    ranges[0, 1] = start[box + behind + 1]  # of its own and the one behind it, from an element on
+    for n in range(4):
+        i, j = (1, n - 1) if n < 3 else (0, 1)
+        if q + i < count[0] and 0 <= y + j < count[1]:
+            other = box + (i * count[1] + j) * count[2]
+            ranges[amount, 0], ranges[amount, 1] = start[other - before], start[other + behind + 1]
+            amount += 1
+    return amount
+
+
+@kernel()
+def fill(reach, count, start, order, rows, x, cells, data, found):
+    """Write all pairs of elements nearer than a reach to ``found``, as far as it has room; their number."""
+    ranges, amount = np.empty((5, 2), dtype=np.int64), 0
+    for box in range(start.size - 1):
+        if start[box] == start[box + 1]:
+            continue
+        beside = set_ranges(box, count, start, ranges)
+        for m in range(start[box], start[box + 1]):
+            ranges[0, 0] = m + 1
+            m0, m1, m2, wide = rows[m, 0], rows[m, 1], rows[m, 2], rows[m, 3] + reach
+            for part in range(beside):
+                for n in range(ranges[part, 0], ranges[part, 1]):
+                    d0, d1, d2, both = rows[n, 0] - m0, rows[n, 1] - m1, rows[n, 2] - m2, wide + rows[n, 3]
+                    if d0 * d0 + d1 * d1 + d2 * d2 < both * both:
+                        a, b = min(order[m], order[n]), max(order[m], order[n])
+                        if near_each_other(reach, a, b, x, cells, data):
+                            if amount < found.shape[0]:
+                                found[amount, 0], found[amount, 1] = a, b
+                            amount += 1
+    return amount
+
+
+@kernel()
+def pairs_within(skin, x, cells, data):
+    """Numbers of all pairs of elements that may push each other when they come nearer by ``skin`` [m], shape (., 2)."""
+    found, room = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 4))
+    if cells.shape[0] < 2:
+        return found[:0]
+    reach = REACH * data[0, TOUCH] + skin
+    low, width, count = boxes_of(2.0 * middles(x, cells, data, room) + reach, room)
+    if count[0] == 0:
+        return found[:0]
+    order, start, rows = sorted_by_box(low, width, count, room)
+    amount = fill(reach, count, start, order, rows, x, cells, data, found)
+    if amount > found.shape[0]:
+        found = np.empty((amount, 2), dtype=np.int64)
+        fill(reach, count, start, order, rows, x, cells, data, found)
+    return found[:amount]
+
+
+@kernel()
+def paired(chosen, cells, data):
+    """(nodes, numbers) of pairs of elements, as `refweb.effects.self_contact.pair` has them."""
+    rows, numbers = np.empty((chosen.shape[0], 4), dtype=np.int32), np.empty((chosen.shape[0], WIDTH))
+    for c in range(chosen.shape[0]):
+        a, b = chosen[c, 0], chosen[c, 1]
+        for n in range(2):
+            rows[c, n], rows[c, 2 + n] = cells[a, n], cells[b, n]
+        numbers[c, TOUCH], numbers[c, DAMPING] = data[a, TOUCH], data[a, DAMPING]
+        numbers[c, SCALE] = min(data[a, SCALE], data[b, SCALE])
+        numbers[c, LENGTH], numbers[c, OTHER] = data[a, LENGTH], data[b, LENGTH]
+        for k in range(3):
+            first = data[a, ENDS + k]
+            numbers[c, SHAPE + k] = data[a, ENDS + 3 + k] - first
+            numbers[c, SHAPE + 3 + k] = data[b, ENDS + k] - first
+            numbers[c, SHAPE + 6 + k] = data[b, ENDS + 3 + k] - first
+    return rows, numbers
+
+
+@kernel()
+def found(skin, x, cells, data):
+    """(numbers of the elements, nodes, numbers) of all pairs within a skin of touching."""
+    chosen = pairs_within(skin, x, cells, data)
+    rows, numbers = paired(chosen, cells, data)
+    return chosen, rows, numbers
+
+
+@kernel(NEAR)
+def near(skin, x, cells, data, chosen):
+    count = 0
+    for c in range(cells.shape[0]):
+        p, u, w = place_of(x, cells, data, c)
+        reach = REACH * data[c, TOUCH] + skin
+        m = p[0] + 0.5 * (u[0] - w[0]), p[1] + 0.5 * (u[1] - w[1]), p[2] + 0.5 * (u[2] - w[2])
+        square = m[0] * m[0] + m[1] * m[1] + m[2] * m[2]
+        span = u[0] * u[0] + u[1] * u[1] + u[2] * u[2] + w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        if square > 0.75 * span + 3.0 * reach * reach or nearest(p, u, w)[2] >= reach * reach:
+            continue  # what is not a number is near
+        chosen[count] = c
+        count += 1
+    return count

@@ -1,0 +1,195 @@
+"""The overlap of one straight element with the line of another, as an integral in closed form.
+
+Of a point at a of the first element let p = a − b₀ be its place from the first end of the other, w = b₁ − b₀ that
+element, M = |w|, ŵ = w/M, y = p·ŵ how far along it the point is, and D = |p − y ŵ|² its squared distance from the
+straight line. With the distance c at which lines touch,
+
+    I = ∫₀¹ W(y, M) e(D) ds,      e = (c² − D)² where D < c², else 0,      W = S(y/c) − S((y − M)/c),
+
+S(x) = ½ + ¾ x − ¼ x³ from 0 at x = −1 to 1 at x = 1. W is the element smeared along itself: where elements continue
+each other in a straight line their W add up to 1, whatever their lengths, and I does not know where one of them ends.
+What slides along a line feels no joint. Beyond a free end, or a corner, an element fades over the distance c; no corner
+is without W, for within c of it that of either side is above 0.
+
+Along the first element p and y are linear in s and D is quadratic, so the integrand is piecewise a polynomial, of
+degree 7, as are those of its first and second derivatives. Four Gauss points on each piece integrate all of them to
+rounding. At the ends of the pieces integrand and gradient are continuous. So I is a smooth function of the four nodes,
+with Lipschitz continuous first derivatives, also where lines are parallel, and its derivatives are the integrals of
+those of the integrand.
+
+Three other ways were weighed. The distance of the nearest points of two segments jumps to other points where lines are
+parallel. The least value of ½ |d(s, t)|² + ½ ε ((s − ½)² + (t − ½)²) over both segments is smooth, but near a joint the
+elements on either side of it both push: within √(4 r δ) of it the energy of an overlap δ doubles, and what slides over
+it is held back by ¼ √(δ/r) of the push. A sum over Gauss points on both lines needs many where r is much smaller than
+an element.
+
+An element of no length has no direction; then I is 0, as it is in the limit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import kernel
+from ..vectors import dot
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+PLACES, WEIGHTS = tuple((0.5 * (1.0 + _POINTS)).tolist()), tuple((0.5 * _WEIGHTS).tolist())
+"""Gauss points and weights on [0, 1]."""
+ROOM = 8
+"""Numbers of a row of space to work in: ends of pieces."""
+SHORT = 1e-9
+"""Length of an element over the distance of touch below which it has no direction."""
+
+
+@kernel(forceinline=True)
+def step_of(x):
+    """(S, S', S'') at x."""
+    if x <= -1.0:
+        return 0.0, 0.0, 0.0
+    if x >= 1.0:
+        return 1.0, 0.0, 0.0
+    return 0.5 + x * (0.75 - 0.25 * x * x), 0.75 * (1.0 - x * x), -1.5 * x
+
+
+@kernel(forceinline=True)
+def along(p, u, w):
+    """(M, ŵ, y, y', p − y ŵ, and its derivative) at the first node of u, p being that from the first node of w."""
+    length = math.sqrt(dot(w, w))
+    unit = w[0] / length, w[1] / length, w[2] / length
+    y, rate = dot(p, unit), dot(u, unit)
+    across = p[0] - y * unit[0], p[1] - y * unit[1], p[2] - y * unit[2]
+    turn = u[0] - rate * unit[0], u[1] - rate * unit[1], u[2] - rate * unit[2]
+    return length, unit, y, rate, across, turn
+
+
+@kernel()
+def pieces(length, y, rate, across, turn, touch, ends):
+    """Write the ends of the pieces on which the integrand is a polynomial to ``ends``; their number, 0 where it is 0.
+
+    The last number of ``ends`` is the least squared distance there.
+    """
+    square, half, over = dot(turn, turn), dot(across, turn), dot(across, across) - touch * touch
+    root = half * half - square * over
+    if root <= 0.0 and over >= 0.0:
+        return 0
+    low, high = 0.0, 1.0
+    if square > 0.0:
+        q = -(half + math.copysign(math.sqrt(max(root, 0.0)), half))
+        one, other = q / square, (over / q if q != 0.0 else math.inf)
+        low, high = max(low, min(one, other)), min(high, max(one, other))
+        nearest = min(max(-half / square, low), high)
+    else:
+        nearest = 0.0
+    if not low < high:
+        return 0
+    count = 1
+    ends[0] = low
+    if rate != 0.0:
+        first, last = (-touch - y) / rate, (length + touch - y) / rate
+        low, high = max(low, min(first, last)), min(high, max(first, last))
+        if not low < high:
+            return 0
+        ends[0], nearest = low, min(max(nearest, low), high)
+        one, other = (touch - y) / rate, (length - touch - y) / rate
+        for inner in (min(one, other), max(one, other)):
+            if low < inner < high:
+                ends[count] = inner
+                count += 1
+    elif not -touch < y < length + touch:
+        return 0
+    ends[count] = high
+    ends[ROOM - 1] = over + touch * touch + nearest * (2.0 * half + nearest * square)
+    return count
+
+
+@kernel()
+def first(p, u, w, touch, ends):
+    """(I, its gradients by the two nodes of the first element and by the second node of the other, least D).
+
+    That by the first node of the other is the negative of their sum. p is the first node of the first element from the
+    first node of the other.
+    """
+    total, least = 0.0, math.inf
+    f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
+    count = 0
+    if dot(w, w) > (SHORT * touch) ** 2:
+        length, unit, y0, rate, across, turn = along(p, u, w)
+        count = pieces(length, y0, rate, across, turn, touch, ends)
+        if count:
+            least = ends[ROOM - 1]
+        for n in range(count):
+            low, span = ends[n], ends[n + 1] - ends[n]
+            for i in range(4):
+                s = low + span * PLACES[i]
+                weight, y = span * WEIGHTS[i], y0 + s * rate
+                d0, d1, d2 = across[0] + s * turn[0], across[1] + s * turn[1], across[2] + s * turn[2]
+                deep = touch * touch - (d0 * d0 + d1 * d1 + d2 * d2)
+                near, far = step_of(y / touch), step_of((y - length) / touch)
+                own, energy = near[0] - far[0], weight * deep * deep
+                total += own * energy
+                pull, tilt = -4.0 * weight * own * deep, energy * (near[1] - far[1]) / touch
+                x0, x1, x2 = pull * d0 + tilt * unit[0], pull * d1 + tilt * unit[1], pull * d2 + tilt * unit[2]
+                rest = 1.0 - s
+                f0, f1, f2 = f0 + rest * x0, f1 + rest * x1, f2 + rest * x2
+                g0, g1, g2 = g0 + s * x0, g1 + s * x1, g2 + s * x2
+                a, b = (tilt - pull * y) / length, energy * far[1] / touch
+                h0, h1, h2 = h0 + a * d0 + b * unit[0], h1 + a * d1 + b * unit[1], h2 + a * d2 + b * unit[2]
+    return total, (f0, f1, f2), (g0, g1, g2), (h0, h1, h2), least
+
+
+@kernel(forceinline=True)
+def add_product(block, weights, others, value, i, j, order):
+    """Add to the entries i, j of the blocks of four nodes, in an order, the products of two rows of their shares."""
+    for m in range(4):
+        for n in range(4):
+            block[3 * order[m] + i, 3 * order[n] + j] += weights[m] * others[n] * value
+
+
+@kernel()
+def add_second(p, u, w, touch, scale, definite, order, ends, block):
+    """Add the second derivatives of I, times a scale, to the block of four nodes: of a pair, in an order of its nodes.
+
+    ``definite`` takes the part that is positive semidefinite in any state: 2 ∇D∇D of e.
+    """
+    if not dot(w, w) > (SHORT * touch) ** 2:
+        return
+    length, unit, y0, rate, across, turn = along(p, u, w)
+    for k in range(pieces(length, y0, rate, across, turn, touch, ends)):
+        low, span = ends[k], ends[k + 1] - ends[k]
+        for point in range(4):
+            s = low + span * PLACES[point]
+            weight, y = scale * span * WEIGHTS[point], y0 + s * rate
+            d = across[0] + s * turn[0], across[1] + s * turn[1], across[2] + s * turn[2]
+            deep, part = touch * touch - dot(d, d), y / length
+            near, far = step_of(y / touch), step_of((y - length) / touch)
+            own, e, steep = weight * (near[0] - far[0]), deep * deep, -2.0 * deep
+            by_y, by_m = weight * (near[1] - far[1]) / touch, weight * far[1] / touch
+            yy, mm = weight * (near[2] - far[2]) / touch**2, -weight * far[2] / touch**2
+            if definite:
+                e = steep = 0.0
+            of_p, of_w = (1.0 - s, s, -1.0, 0.0), (0.0, 0.0, -1.0, 1.0)
+            for i in range(3):
+                for j in range(3):
+                    # ∇y = (ŵ, d/M), ∇M = (0, ŵ), ∇D = (2 d, −2 τ d), each for p and for w
+                    y_p, y_w, d_p, d_w = unit[i], d[i] / length, 2.0 * d[i], -2.0 * part * d[i]
+                    z_p, z_w, e_p, e_w = unit[j], d[j] / length, 2.0 * d[j], -2.0 * part * d[j]
+                    flat = (1.0 if i == j else 0.0) - unit[i] * unit[j]
+                    slope, mixed = own * steep, by_y * steep
+                    pp = yy * e * y_p * z_p + mixed * (y_p * e_p + d_p * z_p) + 2.0 * own * d_p * e_p
+                    pp += 2.0 * slope * flat
+                    pw = yy * e * y_p * z_w + mixed * (y_p * e_w + d_p * z_w) + 2.0 * own * d_p * e_w
+                    pw += (-mm * e * y_p + by_m * steep * d_p) * unit[j] + by_y * e * flat / length
+                    pw -= 2.0 * slope * (unit[i] * d[j] / length + part * flat)
+                    ww = yy * e * y_w * z_w + mixed * (y_w * e_w + d_w * z_w) + 2.0 * own * d_w * e_w
+                    ww += mm * e * (unit[i] * unit[j] - y_w * unit[j] - unit[i] * z_w)
+                    ww += by_m * (steep * (d_w * unit[j] + unit[i] * e_w) + e * flat / length)
+                    bent = (unit[i] * d[j] + d[i] * unit[j]) / length
+                    ww -= by_y * e * (bent + part * flat) / length
+                    ww += 2.0 * slope * (part * bent + part * part * flat - y_w * z_w)
+                    add_product(block, of_p, of_p, pp, i, j, order)
+                    add_product(block, of_p, of_w, pw, i, j, order)
+                    add_product(block, of_w, of_p, pw, j, i, order)
+                    add_product(block, of_w, of_w, ww, i, j, order)

@@ -1,0 +1,192 @@
+"""Contact of lines with lines: what a scene says of it, and its families."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
+from ...tables import Table, real, table
+from ..base import Family, without
+from .pair import APART, DAMPING, ENDS, SCALE, TOUCH
+from .pair import LENGTH as OWN_LENGTH
+from .search import found, near, paired
+
+LISTED = 20_000
+"""Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
+ROUNDING = 1e-9
+"""Share of the radius by which a distance may be wrong."""
+
+
+@table
+class SelfContact(Table):
+    """Contact of lines with lines, of the same web.
+
+    Lines are round, and touch where their centre lines are less than two radii apart. Two elements push each other over
+    the length on which they do, as a smooth function of their four nodes whatever their angle, see
+    `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³), which is k r
+    at half the distance of touch, where it is largest: what is pushed harder passes. Elements that share a node do not
+    touch, nor do those that are within two radii of each other along the net.
+
+    Explicit methods find pairs as they come near. Statics, cvode and ida take all pairs of a small web as one list.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of all lines [m].
+    stiffness : float, optional
+        k [N/m], the push of lines that cross at half the distance of touch, over the radius. By default EA/L of the
+        stiffest element.
+    damping : float
+        d of Hunt and Crossley [s/m]: a push of 1 + d δ̇ times that of the overlap, never a pull; δ̇ is the rate of the
+        overlap.
+
+    Raises
+    ------
+    InputError
+        For a radius or a stiffness that is not > 0, or damping < 0; from ``on``, for curved elements, lines that
+        overlap in the web's position, and in statics a web of too many pairs.
+
+    Examples
+    --------
+        [self_contact]
+        radius = 1e-3
+        damping = 0.1
+    """
+
+    radius: float = real(above=0, unit="m")
+    stiffness: float | None = real(default=None, above=0, unit="N/m")
+    damping: float = real(default=0.0, at_least=0, unit="s/m")
+
+    def on(self, net):
+        """The family of the push, and with damping that of losses.
+
+        ``out`` is how deep a pair or an element overlaps [m], or the power of what is lost [W].
+        """
+        if net.order > 1:
+            raise InputError(
+                f"radius = {self.radius:g} needs [cable] order = 1, not {net.order}: lines touch as straight elements; "
+                f"use subdivide = {net.order * net.subdivide}, which has the same nodes"
+            )
+        from . import press
+
+        cells, data = self._elements(net)
+        self._refuse_overlap(net, cells, data)
+        chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
+        common = dict(internal=True, sever=without(SCALE), finder=None, near=near)
+        if chosen is not None and len(chosen) <= LISTED:
+            rows, numbers = paired(chosen, cells, data)
+            common |= dict(cells=rows, data=numbers, elements=chosen)
+            all_listed = True
+        else:
+            if net.quasi_static:
+                raise InputError(
+                    f"radius = {self.radius:g}: {len(cells)} elements make more than {LISTED} pairs, which statics "
+                    'does not take: use [solve] kind = "dynamic" and a [damping], or a smaller web'
+                )
+            common |= dict(cells=cells, data=data, elements=np.arange(len(cells)), near=None, finder=found)
+            all_listed = False
+        push = Family(
+            name="self_contact", force=press.force, energy=press.energy, bound=press.bound, observed=1,
+            stiffness=press.stiffness if all_listed else None, book="self_contact_energy", **common,
+        )  # fmt: skip
+        if self.damping == 0.0:
+            return push
+        from . import losses
+
+        lost = Family(
+            name="self_contact", force=losses.force, bound=losses.bound,
+            stiffness=losses.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
+            damping=losses.damping, damping_bound=losses.damping_bound, symmetric=False, at_rest=False, **common,
+        )  # fmt: skip
+        return [push, lost]
+
+    def stiffness_on(self, net):
+        """Its stiffness [N/m], chosen where it is left out."""
+        if self.stiffness is not None:
+            return self.stiffness
+        return float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+
+    def _elements(self, net):
+        """Nodes and numbers of all elements, see `refweb.effects.self_contact.pair`."""
+        touch, beside = 2.0 * self.radius, near_along(net, 2.0 * self.radius)
+        data = np.zeros((len(net.cells), APART + beside.shape[1]))
+        data[:, TOUCH], data[:, DAMPING] = touch, self.damping
+        data[:, SCALE] = self.stiffness_on(net) / (math.sqrt(12.0) * touch**3)
+        data[:, OWN_LENGTH] = net.natural_length
+        data[:, ENDS : ENDS + 3] = net.points[net.cells[:, 0]]
+        data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data[:, REFERENCE : REFERENCE + 3]
+        data[:, APART:] = beside
+        return np.ascontiguousarray(net.cells, dtype=np.int32), data
+
+    def _refuse_overlap(self, net, cells, data):
+        """Refuse lines that overlap in the web's position."""
+        rest = np.zeros_like(net.points)
+        chosen, rows, numbers = found(0.0, rest, cells, data)
+        if not len(rows):
+            return
+        from .press import force
+
+        deep = np.zeros((len(rows), 1))
+        force(0.0, rest, rest, np.zeros_like(rest), rows, numbers, deep)
+        worst = int(deep[:, 0].argmax())
+        if deep[worst, 0] <= ROUNDING * self.radius:
+            return
+        one, other = net.line[chosen[worst]]
+        raise InputError(
+            f"radius = {self.radius:g}: lines {one} and {other} overlap by {deep[worst, 0]:.3g} m in the web's "
+            f"position, without being neighbours: it must be ≤ {0.5 * (2.0 * self.radius - deep[worst, 0]):.4g} [m], "
+            "or the lines further apart"
+        )
+
+    def with_stiffness(self, stiffness):
+        """The table with a stiffness."""
+        return replace(self, stiffness=stiffness)
+
+
+def listed(cells, data):
+    """All pairs of elements that may touch, shape (pairs, 2)."""
+    one, other = np.triu_indices(len(cells), 1)
+    first, last = cells[one], cells[other]
+    shared = (first[:, :, None] == last[:, None, :]).any(axis=(1, 2))
+    shared |= (data[one, APART:] == other[:, None]).any(axis=1)
+    return np.column_stack([one, other])[~shared].astype(np.int64)
+
+
+def near_along(net, distance):
+    """Elements that share no node and are within a distance of each other along the net, shape (elements, most).
+
+    Rows are filled with −1. Lengths are natural ones.
+    """
+    cells, count = net.cells, net.nodes
+    if distance < net.natural_length.min():
+        return np.zeros((len(cells), 0))
+    from scipy.sparse import coo_array, csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    ends, lengths = np.sort(cells, axis=1), net.natural_length
+    order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))
+    shortest = order[np.append(True, (np.diff(ends[order], axis=0) != 0).any(axis=1))]
+    graph = coo_array((lengths[shortest], ends[shortest].T), shape=(count, count)).tocsr()
+    meets = csr_array((np.ones(2 * len(cells)), (cells.ravel(), np.repeat(np.arange(len(cells)), 2))))
+    reached = []
+    for begin in range(0, count, 1000):
+        nodes = np.arange(begin, min(begin + 1000, count))
+        away = dijkstra(graph, directed=False, indices=nodes, limit=distance * (1.0 + ROUNDING))
+        one, other = np.nonzero(np.isfinite(away))
+        reached.append(np.column_stack([nodes[one], other]))
+    one, other = np.concatenate(reached).T
+    close = csr_array((np.ones(len(one)), (one, other)), shape=(count, count))
+    pairs = (meets.T @ close[: meets.shape[0], : meets.shape[0]] @ meets).tocoo()
+    first, last = pairs.coords
+    apart = (cells[first][:, :, None] != cells[last][:, None, :]).all(axis=(1, 2))
+    first, last = first[apart], last[apart]
+    order = np.lexsort((last, first))
+    first, last = first[order], last[order]
+    place = np.arange(len(first)) - np.searchsorted(first, first)
+    beside = np.full((len(cells), place.max(initial=-1) + 1), -1.0)
+    beside[first, place] = last
+    return beside

@@ -1,0 +1,345 @@
+"""Lines against lines: derivatives and closed forms of a pair, which pairs are found, and what runs keep."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import refweb
+from refweb.effects.self_contact import losses, press, search, table
+from refweb.effects.self_contact.pair import DAMPING, LENGTH, OTHER, SCALE, SHAPE, TOUCH, WIDTH
+from refweb.errors import InputError
+from refweb.net import discretisation
+from refweb.net.web import Web
+from refweb.registry import INTEGRATORS
+
+RADIUS, STIFFNESS = 0.1, 100.0
+REST = np.zeros((4, 3))
+ONE = np.array([[0, 1, 2, 3]], dtype=np.int32)
+
+
+class Pair:
+    """Two elements by the places of their four nodes, of natural lengths as they are there."""
+
+    def __init__(self, points, damping=0.3):
+        self.points = np.array(points, dtype=float)
+        p, touch = self.points, 2.0 * RADIUS
+        self.data = np.zeros((1, WIDTH))
+        self.data[0, [TOUCH, SCALE, DAMPING]] = touch, STIFFNESS / (np.sqrt(12.0) * touch**3), damping
+        self.data[0, [LENGTH, OTHER]] = np.linalg.norm(p[1] - p[0]), np.linalg.norm(p[3] - p[2])
+        self.data[0, SHAPE:] = (p[1:] - p[0]).ravel()
+
+    def energy(self, x=REST):
+        out = np.zeros(1)
+        press.energy(0.0, x, ONE, self.data, out)
+        return out[0]
+
+    def force(self, x=REST):
+        f, out = np.zeros((4, 3)), np.zeros((1, 1))
+        press.force(0.0, x, 0.0 * x, f, ONE, self.data, out)
+        return f, out[0, 0]
+
+    def loss(self, x, v):
+        f, out = np.zeros((4, 3)), np.zeros((1, 1))
+        losses.force(0.0, x, v, f, ONE, self.data, out)
+        return f, out[0, 0]
+
+    def tangent(self, kernel, x, v, definite=False):
+        block = np.zeros((1, 12, 12))
+        kernel(0.0, x, v, block, ONE, self.data, definite)
+        return block[0]
+
+
+def by_differences(function, x, step=1e-5):
+    """Derivative of a function by each component, last axis, by central differences."""
+    columns = []
+    for n in range(12):
+        e = np.zeros(12)
+        e[n] = step
+        columns.append((function(x + e.reshape(4, 3)) - function(x - e.reshape(4, 3))) / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+def lines(angle, height, along=0.0, across=0.0, offset=0.0, length=1.0):
+    """Places of a line of length 1 along x, and of one above it that crosses it there at an angle."""
+    u = np.array([np.cos(angle), np.sin(angle), 0.0])
+    middle = np.array([along, across, height]) + offset * u
+    return [[-0.5, 0, 0], [0.5, 0, 0], middle - 0.5 * length * u, middle + 0.5 * length * u]
+
+
+def some_pairs(count=60):
+    """Pairs that overlap: crossed, nearly parallel, parallel, one at the end of the other, and at random."""
+    rng, found = np.random.default_rng(3), []
+    for n in itertools.count():
+        kind, height = n % 5, rng.uniform(0.02, 0.19)
+        angle = [rng.uniform(0.1, 3.0), rng.uniform(-1e-3, 1e-3), 0.0, rng.uniform(0.3, 2.5), rng.uniform(0, 3)][kind]
+        along = rng.choice([-0.5, 0.5]) + rng.uniform(-0.1, 0.1) if kind == 3 else rng.uniform(-0.8, 0.8)
+        pair = Pair(lines(angle, height, along, rng.uniform(-0.05, 0.05), rng.uniform(-0.6, 0.6), rng.uniform(0.3, 2)))
+        x = np.zeros((4, 3)) if kind == 2 else 1e-2 * rng.standard_normal((4, 3))
+        if pair.force(x)[1] > 0.0:
+            found.append((pair, x, rng.standard_normal((4, 3))))
+        if len(found) == count:
+            return found
+
+
+# One pair
+
+
+def test_forces_are_the_gradient_and_keep_momenta():
+    """Central differences of 1e-5 are good to some 1e-9 of what they are of, and to 1e-5 at the kinks of K."""
+    for pair, x, _ in some_pairs():
+        force, deep = pair.force(x)
+        size, energy = np.abs(force).max(), pair.energy(x)
+        assert 0.0 < deep <= 2.0 * RADIUS and energy > 0.0
+        np.testing.assert_allclose(by_differences(pair.energy, x), -force.ravel(), atol=1e-5 * size + 1e-9 * energy)
+        assert np.abs(force.sum(axis=0)).max() <= 1e-14 * size
+        assert np.abs(np.cross(pair.points + x, force).sum(axis=0)).max() <= 1e-14 * size
+
+
+def test_tangents_are_those_of_the_forces():
+    for pair, x, v in some_pairs():
+        stiffness = pair.tangent(press.stiffness, x, v)
+        size = np.abs(stiffness).max()
+        change = by_differences(lambda y, pair=pair: pair.force(y)[0].ravel(), x)
+        np.testing.assert_allclose(-change, stiffness, atol=1e-4 * size)
+        assert np.abs(stiffness - stiffness.T).max() <= 1e-13 * size
+        part = np.linalg.eigvalsh(pair.tangent(press.stiffness, x, v, True))
+        assert part[0] >= -1e-12 * part[-1]
+        own = pair.tangent(losses.stiffness, x, v)
+        change = by_differences(lambda y, pair=pair, v=v: pair.loss(y, v)[0].ravel(), x)
+        np.testing.assert_allclose(-change, own, atol=1e-3 * np.abs(own).max() + 1e-12)
+
+
+def test_losses_take_energy_and_keep_momenta():
+    for pair, x, v in some_pairs():
+        force, power = pair.loss(x, v)
+        size = np.abs(force).max()
+        assert power <= 0.0 and power == pytest.approx((force * v).sum(), rel=1e-12, abs=1e-15)
+        assert np.abs(force.sum(axis=0)).max() <= 1e-14 * size
+        assert np.abs(np.cross(pair.points + x, force).sum(axis=0)).max() <= 1e-14 * size
+        turning = np.cross([0.3, -0.7, 0.4], pair.points + x) + [1.0, 2.0, 3.0]
+        assert np.abs(pair.loss(x, turning)[0]).max() <= 1e-12 * np.abs(pair.force(x)[0]).max()
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, 1.0, 2.5])
+def test_push_of_crossed_lines(angle):
+    """k h (4 r² − h²)^(3/2)/(√27 r³) f/sin, where the overlap ends more than 2r from all ends: to rounding."""
+    for height in (0.02, RADIUS, 0.15, 0.199):
+        longer = lines(angle, height, 0.02, length=1.9)
+        longer[0][0], longer[1][0] = -1.0, 1.0
+        force, deep = Pair(longer).force()
+        factor = np.sqrt(np.sin(angle) ** 2 + 4.0 * RADIUS**2 / (2.0 * 1.9)) / np.sin(angle)
+        push = STIFFNESS * height * (4.0 * RADIUS**2 - height**2) ** 1.5 / (np.sqrt(27.0) * RADIUS**3) * factor
+        np.testing.assert_allclose(force[2:].sum(axis=0), [0.0, 0.0, push], rtol=1e-10, atol=1e-10 * push)
+        assert deep == pytest.approx(2.0 * RADIUS - height, rel=1e-12)
+
+
+def test_what_slides_along_a_line_feels_no_joint():
+    """The energies of the elements of a straight line with one that crosses it add up to the same at any place."""
+    ends = np.array([-1.0, -0.3, -0.15, 0.4, 1.0])
+    energies = []
+    for along in np.linspace(-0.7, 0.7, 29):
+        other = lines(1.2, 0.13, along, length=1.9)[2:]
+        total = 0.0
+        for first, last in itertools.pairwise(ends):
+            pair = Pair([[first, 0, 0], [last, 0, 0], *other])
+            factor = np.sqrt(np.sin(1.2) ** 2 + 4.0 * RADIUS**2 / (pair.data[0, LENGTH] * 1.9))
+            total += pair.energy() / factor
+        energies.append(total)
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-12)
+
+
+def test_bound_is_above_row_sums():
+    """Rows of blocks, whose sums bound the largest eigenvalue."""
+    for pair, x, v in some_pairs(200):
+        blocks = pair.tangent(press.stiffness, x, v).reshape(4, 3, 4, 3).transpose(0, 2, 1, 3)
+        rows, rates = np.linalg.norm(blocks, 2, axis=(2, 3)).sum(axis=1), np.zeros(4)
+        press.bound(0.0, 0.0, x, np.ones(4), rates, ONE, pair.data)
+        assert rows.max() <= rates.max()
+
+
+# Which pairs
+
+
+def distance(p, q):
+    """Smallest distance of two segments, by a look at ends and at where both lines are nearest."""
+    (a, b), (c, d) = p, q
+    u, w, r = b - a, d - c, a - c
+    best = []
+    for s, t in itertools.product((0.0, 1.0), repeat=2):
+        best.append(np.linalg.norm(r + s * u - t * w))
+    for s in (0.0, 1.0):
+        t = np.clip((r + s * u) @ w / (w @ w), 0.0, 1.0)
+        best.append(np.linalg.norm(r + s * u - t * w))
+    for t in (0.0, 1.0):
+        s = np.clip((t * w - r) @ u / (u @ u), 0.0, 1.0)
+        best.append(np.linalg.norm(r + s * u - t * w))
+    s, t = np.linalg.lstsq(np.column_stack([u, -w]), -r, rcond=None)[0]
+    if 0.0 <= s <= 1.0 and 0.0 <= t <= 1.0:
+        best.append(np.linalg.norm(r + s * u - t * w))
+    return min(best)
+
+
+@pytest.mark.parametrize("flat, skin", [(1.0, 0.0), (1.0, 0.2), (0.0, 0.1), (1e3, 0.5)])
+def test_search_finds_all_pairs(flat, skin):
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-1.0, 1.0, (60, 3)) * [1.0, 1.0, flat]
+    rows = np.array([(n, n + 1) for n in range(59) if n % 5 != 4])
+    lengths = np.linalg.norm(points[rows[:, 1]] - points[rows[:, 0]], axis=1)
+    web = Web(points=points, lines=rows, natural_length=lengths, rim=np.array([0]))
+    net = discretisation.build(web, refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3))
+    touch = refweb.SelfContact(radius=1e-4)
+    cells, data = touch._elements(net)
+    x = 0.3 * rng.standard_normal((60, 3))
+    place = (points + x)[rows]
+    near = search.REACH * 2e-4 + skin
+    expected = {
+        (a, b)
+        for a, b in itertools.combinations(range(len(rows)), 2)
+        if not set(rows[a]) & set(rows[b]) and distance(place[a], place[b]) < near
+    }
+    assert {tuple(pair) for pair in search.pairs_within(skin, x, cells, data).tolist()} == expected
+    assert expected or not skin
+
+
+def test_what_is_near_along_the_net_does_not_touch():
+    """A chain whose elements are shorter than its line is thick pushes nothing where it is straight."""
+    points = np.column_stack([np.arange(12) * 0.03, np.zeros(12), np.zeros(12)])
+    web = refweb.Inline(points=points.tolist(), lines=[(n, n + 1) for n in range(11)]).web(None)
+    net = discretisation.build(web, refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3))
+    beside = table.near_along(net, 0.1)
+    apart = [sorted(int(e) for e in row if e >= 0) for row in beside]
+    gap = lambda a, b: 0.03 * (abs(a - b) - 1)  # noqa: E731
+    assert apart == [[b for b in range(11) if abs(a - b) > 1 and gap(a, b) <= 0.1] for a in range(11)]
+    family = refweb.SelfContact(radius=0.05, stiffness=10.0).on(net)
+    f = np.zeros((12, 3))
+    family.force(0.0, 0.0 * f, 0.0 * f, f, family.cells, family.data, np.zeros((len(family.cells), 1)))
+    assert len(family.cells) and not f.any()
+
+
+def test_refusals():
+    crossed = refweb.Inline(points=[(-1, 0, 0), (1, 0, 0), (0, -1, 0.1), (0, 1, 0.1)], lines=[(0, 1), (2, 3)])
+
+    def scene(radius, web=crossed, method="central-difference", **cable):
+        cable = refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3, **cable)
+        solve = refweb.Dynamic(duration=0.1, method=method)
+        return refweb.Scene(web=web, cable=cable, effects=[refweb.SelfContact(radius=radius)], solve=solve)
+
+    scene(0.0499).build()
+    with pytest.raises(InputError, match=r"lines 0 and 1 overlap by 0\.02 m .* must be ≤ 0\.05 \[m\]"):
+        scene(0.06).build()
+    with pytest.raises(InputError, match=r"needs \[cable\] order = 1, not 2"):
+        scene(0.01, method="cvode", order=2).build()
+    large = refweb.Window(mesh="square", rows=14, columns=14, side=0.1)
+    scene(0.01, large).build()
+    for method in ("cvode", "ida"):
+        with pytest.raises(InputError, match="more pairs of elements than a tangent may hold"):
+            scene(0.01, large, method).build()
+
+
+# Runs
+
+
+def strings(method="central-difference", pieces=4, damping=0.0, held=True, duration=0.02, **solve):
+    """Two strings that cross without touching."""
+    points = [(-0.5, 0.03, 0), (0.5, 0.03, 0), (0.02, -0.5, 0.004), (0.02, 0.5, 0.004)]
+    web = refweb.Inline(points=points, lines=[(0, 1), (2, 3)], supports=[0, 1, 2, 3] if held else [])
+    return refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0, subdivide=pieces),
+        effects=[refweb.SelfContact(radius=1e-3, stiffness=1e4, damping=damping)],
+        solve=refweb.Dynamic(duration=duration, method=method, **solve),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+
+
+def thrown(scene, rows=40, **keys):
+    """(system, course, history) of one string thrown at the other at 3 m/s."""
+    system = scene.build()
+    solver = INTEGRATORS[scene.solve.method].integrator_of(scene.solve, system, (), (), (), **keys)
+    v, first = np.zeros((system.rows, 3)), np.abs(system.net.points[:, 2]) < 1e-9
+    v[first & ~system.supported.all(axis=1)] = 0.0, 0.0, 3.0
+    course = solver.start(None, v)
+    history = solver.advance(course, np.linspace(0.0, scene.solve.duration, rows + 1)[1:])
+    return system, course, history
+
+
+def test_pairs_that_are_found_give_the_same_run(monkeypatch):
+    runs = []
+    for limit in (20_000, 0):
+        monkeypatch.setattr(table, "LISTED", limit)
+        system, course, history = thrown(strings(damping=2.0, step_size=1e-5))
+        assert [family.finder is None for family in system.families][-1] == bool(limit)
+        runs.append((course.x, course.v, history.energies.sum(axis=1), course.work))
+    for one, other in zip(*runs, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
+
+
+def test_free_strings_keep_energy_and_momenta():
+    """Drift of energy falls with the square of the step; momentum is kept to rounding of some 1e3 steps."""
+    drifts = []
+    for finer in (1, 2, 4):
+        system, course, history = thrown(strings(held=False, duration=0.008), safety=0.2 / finer)
+        stored = [family.book for family in system.families].index("self_contact_energy")
+        assert history.energies[:, stored].max() > 1e-5
+        drifts.append(course.drift)
+        mass, place = system.net.mass[:, None], system.net.points
+        first, middle = np.abs(place[:, 2]) < 1e-9, place + course.x
+        momentum = (mass * course.v).sum(axis=0)
+        np.testing.assert_allclose(momentum, [0.0, 0.0, 3.0 * mass[first].sum()], atol=1e-12)
+        start = np.cross(place, mass * np.where(first[:, None], [0.0, 0.0, 3.0], 0.0)).sum(axis=0)
+        np.testing.assert_allclose(np.cross(middle, mass * course.v).sum(axis=0), start, atol=1e-12)
+    assert 2.5 < drifts[0] / drifts[1] < 6.0 and 2.5 < drifts[1] / drifts[2] < 6.0
+
+
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+def test_explicit_against_cvode(damping):
+    """Two methods, of which the explicit one has an error of order 2: seen to be 2e-7 m at these steps."""
+    explicit = thrown(strings(damping=damping), safety=0.04)[1]
+    implicit = thrown(strings("cvode", damping=damping), rtol=1e-9)[1]
+    assert np.abs(explicit.x).max() > 1e-2
+    np.testing.assert_allclose(explicit.x, implicit.x, atol=5e-7)
+
+
+def test_taut_strings_pressed_together():
+    """Two strings whose ends are moved past each other: of five elements each the middle ones touch at their middles.
+
+    These stay straight, so that the push of the overlap is that of both kinks, to what Newton's method leaves.
+    """
+    height, shift, radius, stiff, natural = 0.01, -0.02, 1e-3, 70.0, 0.2 / 1.1
+    points = [(-0.5, 0, 0), (0.5, 0, 0), (0, -0.5, height), (0, 0.5, height)]
+    scene = refweb.Scene(
+        web=refweb.Inline(points=points, lines=[(0, 1), (2, 3)], supports=[0, 1, 2, 3]),
+        cable=refweb.Cable(law="linear", modulus=7e7, area=1e-6, density=1e3, subdivide=5, prestrain=0.1),
+        effects=[
+            refweb.SelfContact(radius=radius, stiffness=250.0),
+            refweb.Motion(node=[2, 3], displacement=[(0, 0, 0, 0), (1, 0, 0, shift)]),
+        ],
+        solve=refweb.Static(load_steps=np.linspace(0.4, 1.0, 25).tolist()),
+    )
+    solution = refweb.run(scene, progress=False)
+    f = np.sqrt((0.2 / natural) ** 4 + (2.0 * radius / natural) ** 2)
+
+    def push(h, middle):  # over the natural length of the element
+        wide = 4.0 * radius**2 - h**2
+        return 250.0 * natural / middle * f * (middle / 0.2) ** 2 * h * wide**1.5 / (np.sqrt(27.0) * radius**3)
+
+    def state(h):
+        """(tension of the outer elements, of the middle one, its length, push of the kinks)."""
+        down, level = 0.5 * (h - height - shift), lambda length: stiff * (length / natural - 1.0)
+
+        def along(middle):
+            outer = np.hypot(0.5 * (1.0 - middle), down) / 2.0
+            return level(outer) * 0.25 * (1.0 - middle) / outer - level(middle)
+
+        middle = brentq(along, 0.15, 0.25)
+        outer = np.hypot(0.5 * (1.0 - middle), down) / 2.0
+        return level(outer), level(middle), middle, 2.0 * level(outer) * 0.5 * down / outer
+
+    h = brentq(lambda h: state(h)[3] - push(h, state(h)[2]), radius, 2.0 * radius)
+    outer, inner, middle, pressed = state(h)
+    assert pressed > 0.1
+    place = solution.positions[:, 2]
+    assert place[8:].max() - place[4:8].min() == pytest.approx(h, abs=1e-3 * radius)
+    np.testing.assert_allclose(sorted(solution.tension), [outer] * 2, rtol=1e-4)
