@@ -319,11 +319,11 @@ def test_taut_strings_pressed_together():
         solve=refweb.Static(load_steps=np.linspace(0.4, 1.0, 25).tolist()),
     )
     solution = refweb.run(scene, progress=False)
-    f = np.sqrt((0.2 / natural) ** 4 + (2.0 * radius / natural) ** 2)
 
-    def push(h, middle):  # over the natural length of the element
-        wide = 4.0 * radius**2 - h**2
-        return 250.0 * natural / middle * f * (middle / 0.2) ** 2 * h * wide**1.5 / (np.sqrt(27.0) * radius**3)
+    def push(h, middle):
+        """Of elements that are longer than their natural length, to which the energy goes."""
+        f, wide = np.hypot((middle / natural) ** 2, 2.0 * radius / natural), 4.0 * radius**2 - h**2
+        return 250.0 * f * natural / middle * h * wide**1.5 / (np.sqrt(27.0) * radius**3)
 
     def state(h):
         """(tension of the outer elements, of the middle one, its length, push of the kinks)."""
