@@ -237,7 +237,7 @@ def take_pairs(x, nearby, families):
     skin, pairs, elements = nearby.skin[0], 0, 0
     for m in range(nearby.families.size):
         pairs += families.cells[nearby.families[m]].shape[0]
-        elements += families.cells[len(families.cells) - nearby.families.size + m].shape[0]
+        elements += families.cells[len(families.cells) - 2 * nearby.families.size + m].shape[0]
     if pairs * skin.lasts > PRICE * elements:
         skin.lasts = max(0.5 * skin.lasts, FEWEST)
     elif 4.0 * pairs * skin.lasts < PRICE * elements:
