@@ -50,6 +50,11 @@ def _probes_of_warnings(system, followed):
         from ..results.observables.overlap import probe_of
 
         found |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
+    if (
+        pressed := next((i for i, f in enumerate(system.families) if f.book == "self_contact_energy"), None)
+    ) is not None:
+        cells = len(system.families[pressed].cells)
+        found["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=pressed)
     if pairs_of(system):
         from ..results.observables.overlap import probes_between
 
@@ -295,6 +300,13 @@ class Watch:
         cell = int(places[at])
         tension, (stiffness, *law) = values[at] / self.probes[at].data[cell, 0], net.line_data[cell, 1:4]
         return float(net.law.strain(tension, stiffness, *law)) if tension > 0.0 else 0.0, int(net.line[cell])
+
+    def overlap_of_lines(self, course):
+        """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""
+        if (at := self._of_warning("lines")) is None:
+            return None
+        extremes = course.extremes
+        return float(extremes.values[at]), float(extremes.times[at]), int(extremes.places[at])
 
     def note_overlaps(self, course, overlaps):
         """Note the deepest contact of each body in `refweb.effects.contact.overlap.Overlaps`."""

@@ -86,6 +86,7 @@ class Simulation:
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
+        self._lines = None
         self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self._stand(kept)
@@ -216,7 +217,7 @@ class Simulation:
     def again(self, folder):
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
-        self.overlaps = _overlaps_of(self.scene, self.system)
+        self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -238,6 +239,13 @@ class Simulation:
         if self.overlaps is not None:
             self.watch.note_overlaps(course, self.overlaps)
             self.overlaps.refuse()
+        if (deepest := self.watch.overlap_of_lines(course)) is not None:
+            if self._lines is None:
+                from ..effects.self_contact.passage import Passage
+
+                self._lines = Passage(self.system, self.scene.solve.method, hasattr(course, "way"))
+            self._lines.note(deepest[0], getattr(course, "way", np.inf), course.time)
+            self._lines.refuse(*deepest)
 
     def _note(self, course):
         """Take the state of a run over into the solution."""
@@ -251,6 +259,8 @@ class Simulation:
             if (pairs := self.overlaps.pairs) is not None:
                 watch.note_way(course, pairs, self.integrator)
                 solution.pairs, solution.passage = pairs.plain(), {"bodies": pairs.passage()}
+        if self._lines is not None:
+            solution.passage = {**solution.passage, "lines": self._lines.told()}
         if np.isfinite(course.x).all():
             solution.state = self._state(course)
         if course.breaks is not None:

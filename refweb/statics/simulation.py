@@ -92,6 +92,11 @@ class Simulation:
             self._passage.note(state)
             solution.bodies = self._passage.overlaps.plain()
             self._passage.overlaps.refuse()
+        if any(family.book == "self_contact_energy" for family in self.system.families):
+            solution.passage = {
+                **solution.passage,
+                "lines": "not certified: what moves between load steps is not followed",
+            }
         results = self._results(found, state, smoothing)
         row = [found.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():

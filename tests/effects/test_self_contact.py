@@ -1,6 +1,7 @@
 """Lines against lines: derivatives and closed forms of a pair, which pairs are found, and what runs keep."""
 
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from scipy.optimize import brentq
 import refweb
 from refweb.effects.self_contact import losses, press, search, table
 from refweb.effects.self_contact.pair import DAMPING, LENGTH, OTHER, SCALE, SHAPE, TOUCH, WIDTH
-from refweb.errors import InputError
+from refweb.errors import InputError, SolverError
 from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.registry import INTEGRATORS
+from refweb.results.words import on_run
 
 RADIUS, STIFFNESS = 0.1, 100.0
 REST = np.zeros((4, 3))
@@ -343,3 +345,107 @@ def test_taut_strings_pressed_together():
     place = solution.positions[:, 2]
     assert place[8:].max() - place[4:8].min() == pytest.approx(h, abs=1e-3 * radius)
     np.testing.assert_allclose(sorted(solution.tension), [outer] * 2, rtol=1e-4)
+
+
+# Nothing passes
+
+
+def linking_number(one, other):
+    """That of two closed polygons: half the sum of the signs of crossings, seen from a direction at random."""
+    axes = np.linalg.qr(np.random.default_rng(11).standard_normal((3, 3)))[0]
+    total = 0
+    a, b = one @ axes, other @ axes
+    for p, q in zip(a, np.roll(a, -1, axis=0), strict=True):
+        for r, s in zip(b, np.roll(b, -1, axis=0), strict=True):
+            u, w, d = q - p, s - r, r - p
+            area = u[0] * w[1] - u[1] * w[0]
+            i, j = (d[0] * w[1] - d[1] * w[0]) / area, (d[0] * u[1] - d[1] * u[0]) / area
+            if 0.0 < i < 1.0 and 0.0 < j < 1.0:
+                total += int(np.sign(area)) * (1 if (p + i * u)[2] > (r + j * w)[2] else -1)
+    return total // 2
+
+
+def loops(places, parts=12, **contact):
+    """(scene, nodes of each loop) of closed polygons of radius 0.3 m, by centres and two axes of their planes."""
+    angle = 2.0 * np.pi * np.arange(parts) / parts
+    points = [np.array(c) + 0.3 * (np.outer(np.cos(angle), a) + np.outer(np.sin(angle), b)) for c, a, b in places]
+    rings = [parts * n + np.arange(parts) for n in range(len(places))]
+    web = refweb.Inline(
+        points=np.concatenate(points).tolist(),
+        lines=[(int(a), int(b)) for ring in rings for a, b in zip(ring, np.roll(ring, -1), strict=True)],
+        supports=[],
+    )
+    scene = refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0),
+        effects=[refweb.SelfContact(radius=5e-3, **contact)],
+        solve=refweb.Dynamic(duration=0.3),
+        output=refweb.Output(interval=2e-3, frames=10),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    return scene, rings
+
+
+def pulled(scene, rings, speed):
+    own = [refweb.Velocity(node=rings[n].tolist(), value=(s * speed, 0.0, 0.0)) for n, s in ((0, -1.0), (1, 1.0))]
+    return scene.replace(effects=(*scene.effects, *own))
+
+
+HOPF = [((0.0, 0, 0), (1, 0, 0), (0, 1, 0)), ((0.3, 0, 0), (1, 0, 0), (0, 0, 1))]
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0])
+def test_linked_loops_do_not_separate(damping):
+    scene, rings = loops(HOPF, damping=damping)
+    solution = refweb.run(pulled(scene, rings, 1.0), progress=False)
+    told = dict(on_run(solution.summary()))
+    assert solution.passage["lines"] == "certified" and told["passage"] == "lines: nothing can have passed: certified"
+    linked = {linking_number(*(state.system.net.points[r] + state.x[r] for r in rings)) for _, state in solution.frames}
+    assert len(linked) == 1 and abs(linked.pop()) == 1 and len(solution.frames) > 10
+    assert np.abs(solution.state.v).max() < 100.0
+
+
+def test_what_is_too_soft_is_refused():
+    scene, rings = loops(HOPF, stiffness=1.0)
+    with pytest.raises(SolverError, match=r"overlap by .* more than their radius 0\.005, .* stiffness = .* is enough"):
+        refweb.run(pulled(scene, rings, 1.0), progress=False)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_certified_runs_keep_linking_numbers(seed):
+    """Four loops of random planes about one place, thrown at random: linked or not, they stay so.
+
+    A stiffness that is refused is taken as the message has it: that is enough within a few runs.
+    """
+    rng = np.random.default_rng(seed)
+    while True:
+        places = []
+        for _ in range(4):
+            a, b = np.linalg.qr(rng.standard_normal((3, 2)))[0].T
+            places.append((rng.uniform(-0.25, 0.25, 3), a, b))
+        scene, rings = loops(places)
+        try:
+            scene.build()
+            break
+        except InputError:
+            continue
+    own = [refweb.Velocity(node=ring.tolist(), value=tuple(rng.uniform(-2, 2, 3).tolist())) for ring in rings]
+    touching = scene.effects[0].with_stiffness(1e4)
+    for _ in range(4):
+        try:
+            solution = refweb.run(scene.replace(effects=(touching, *own)), progress=False)
+            break
+        except SolverError as error:
+            touching = touching.with_stiffness(float(re.search(r"stiffness = (\S+) or more", str(error))[1]))
+    assert solution.passage["lines"] == "certified"
+    numbers = []
+    for _, state in solution.frames:
+        at = [state.system.net.points[ring] + state.x[ring] for ring in rings]
+        numbers.append([linking_number(p, q) for p, q in itertools.combinations(at, 2)])
+    assert all(n == numbers[0] for n in numbers)
+
+
+def test_methods_that_are_not_followed_are_not_certified():
+    scene = strings("cvode", duration=2e-3)
+    solution = refweb.run(scene, progress=False)
+    assert solution.passage["lines"].startswith("not certified: cvode")

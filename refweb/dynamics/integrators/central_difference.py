@@ -48,12 +48,16 @@ class ExplicitCourse(Course):
         Force [N], last seen with the velocity at half a step.
     power : ndarray, shape (families,)
         Power of each family that is booked by it at the last step [W].
+    way : float
+        By how much two rows may have come nearer to each other in a step, at most [m]; infinite where that is not
+        known.
     before : ndarray, shape (3, rows, 3)
         Displacement, velocity and force at the row or the corner of a table before.
     """
 
     force: np.ndarray
     power: np.ndarray
+    way: float = 0.0
     before: np.ndarray = field(init=False, metadata={"saved": False})
 
     def __post_init__(self):
@@ -272,6 +276,9 @@ class CentralDifference(Integrator):
             raise
         finally:
             look_at_all(self.system, self._model)
+            followed = len(self.drifts) == 1 and not self.system.carried.any()
+            course.way = max(course.way, float(self._model.nearby.skin[0]["longest"]) if followed else math.inf)
+            self._model.nearby.skin["longest"] = 0.0
             for name in SHARED:
                 setattr(course, name, clock[name].item())
         if done and course.stopped and history.time[done - 1] == course.time:

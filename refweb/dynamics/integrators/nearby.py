@@ -47,15 +47,27 @@ SIGN = np.int64(0x7FFFFFFFFFFFFFFF)
 
 SKIN = np.dtype(
     {
-        "names": ["depth", "used", "last", "before", "earlier", "wished", "lasts", "steps", "top", "fastest"],
-        "formats": [*(7 * [float]), np.int64, np.int64, float],
-        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 64],
+        "names": [
+            "depth",
+            "used",
+            "last",
+            "before",
+            "earlier",
+            "wished",
+            "lasts",
+            "longest",
+            "steps",
+            "top",
+            "fastest",
+        ],
+        "formats": [*(8 * [float]), np.int64, np.int64, float],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 72],
     }
 )
 """Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
 bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
-of steps that a list of pairs is to last; number of steps of which that is known; the largest component of a velocity,
-as a whole number and as what it is [m/s]."""
+of steps that a list of pairs is to last; the longest of all ways of a step [m]; number of steps of which that is known;
+the largest component of a velocity, as a whole number and as what it is [m/s]."""
 TAKE, SHOW = 0, 1
 """What is asked for: the cells within the skin, all where it is infinitely deep, or to show what those show."""
 NOWHERE = np.zeros((0, 3))
@@ -315,6 +327,7 @@ def follow_near(drift, x, bits, before, driven, nearby, families):
     if pairs and FEWEST * way > nearby.widest and not driven.size:
         way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
     skin.earlier, skin.before, skin.last = skin.before, skin.last, way
+    skin.longest = max(skin.longest, way)
     skin.used += way
     skin.steps += 1
     if skin.steps > COVERED and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
