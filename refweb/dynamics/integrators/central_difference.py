@@ -276,9 +276,10 @@ class CentralDifference(Integrator):
             raise
         finally:
             look_at_all(self.system, self._model)
-            followed = len(self.drifts) == 1 and not self.system.carried.any()
-            course.way = max(course.way, float(self._model.nearby.skin[0]["longest"]) if followed else math.inf)
-            self._model.nearby.skin["longest"] = 0.0
+            nearby = self._model.nearby
+            followed = len(nearby.families) and len(self.drifts) == 1 and not self.system.carried.any()
+            course.way = max(course.way, float(nearby.skin[0]["longest"]) if followed else math.inf)
+            nearby.skin["longest"] = 0.0
             for name in SHARED:
                 setattr(course, name, clock[name].item())
         if done and course.stopped and history.time[done - 1] == course.time:
