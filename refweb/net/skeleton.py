@@ -76,18 +76,26 @@ def of_box(grown):
 
 
 def of_cylinder(grown):
-    """Parts of a cylinder about the third axis that has grown: its rims, and if it is long its axis.
+    """Parts of a cylinder about the third axis that has grown: its rims, and what fills it, for sides that cross.
 
-    The axis has grown to a capsule inside, for sides that cross. Where they do so nearer to an end than the radius, one
-    lies up to 0.13 of it in the other before a rim touches.
+    That is the capsule inside on the axis of a long one, or the thickest rim of a flat one, and rims of half that
+    thickness. Where sides cross between these one lies up to 0.03 of the radius in the other before they touch.
     """
     radius, _, half = grown.core
     if not radius > 0.0:
         return of_box(grown)
-    parts = [rim(radius, height, grown.radius) for height in ((-half, half) if half > 0.0 else (0.0,))]
-    if (inner := half - radius) > 0.0:
-        ends = np.array([[0.0, 0.0, -inner], [0.0, 0.0, inner]])
-        parts.append(edges(ends, [(0, 1)], grown.radius + radius))
+    thickest = grown.radius + min(radius, half)
+    parts = []
+    for thickness in dict.fromkeys((grown.radius, 0.5 * (grown.radius + thickest), thickest)):
+        inward = thickness - grown.radius
+        out, height = radius - inward, half - inward
+        heights = dict.fromkeys((-height, height))
+        if out > 0.0:
+            parts += [rim(out, at, thickness) for at in heights]
+        elif height > 0.0:
+            parts.append(edges(np.array([[0.0, 0.0, at] for at in heights]), [(0, 1)], thickness))
+        else:
+            parts.append(points(np.zeros((1, 3)), thickness))
     return np.vstack(parts)
 
 
