@@ -43,6 +43,13 @@ MIRRORS = {
     "net/grown_core": "effects/test_deep_contact.py",
     "effects/contact/overlap": "effects/test_overlap.py",
     "effects/contact/rubbing": "effects/test_rubbing.py effects/test_contact.py",
+    "effects/contact/apart": "effects/test_between_bodies.py",
+    "effects/contact/bodies": "effects/test_between_bodies.py",
+    "effects/contact/pair_overlap": "effects/test_between_bodies.py",
+    "effects/contact/pressing": "effects/test_between_bodies.py",
+    "effects/contact/silent": "effects/test_between_bodies.py",
+    "effects/contact/sliding": "effects/test_between_bodies.py",
+    "net/skeleton": "effects/test_between_bodies.py",
     "effects/contact/pair": "effects/test_tumbling.py test_contract.py",
     "effects/contact": "test_contract.py effects/test_contact.py effects/test_overlap.py effects/test_deep_contact.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
@@ -247,6 +254,14 @@ MUTANTS = [
     Mutant(
         "effects/contact/tumbling", "add_cross(block, at, at, moment, 1.0)", "add_cross(block, at, at, moment, -1.0)"
     ),
+    Mutant("effects/contact/pressing", "(thickness - 0.5 * deep)", "thickness"),
+    Mutant("effects/contact/apart", "steep * total / own", "steep / own"),
+    Mutant("effects/contact/sliding", "-own.lever[k], -own.arm[k]", "own.lever[k], own.arm[k]"),
+    Mutant(
+        "effects/contact/pair_overlap", "if not pair.overlap + (way := self._way(pair)) < pair.thickness", "if False"
+    ),
+    Mutant("effects/contact/silent", "if deep > LEAST * min(a.thickness, b.thickness)", "if False"),
+    Mutant("net/skeleton", "found[:, OWNS] + 2.0 * math.pi / ARCS", "found[:, OWNS] + 1.9 * math.pi / ARCS"),
     Mutant("effects/contact/pair", "across = np.sqrt((reach**2).sum() - reach**2)", "across = 0.3 * reach"),
     Mutant("effects/contact/rubbing", "arm = cross(axis, y)", "arm = cross(y, axis)"),
     # Systems and links

@@ -44,6 +44,7 @@ PLAIN = {
 BALL = {"name": "ball", "radius": 0.1, "mass": 1.0, "position": [0.0, 0.0, 0.11], "velocity": [0.0, 0.0, -1.0]}
 BOX = BALL | {"shape": "box", "size": [0.2, 0.15, 0.1], "angular_velocity": [5.0, 3.0, 1.0]}
 BOX.pop("radius")
+CRATE = BOX | {"name": "crate", "position": [0.0, 0.0, 0.275], "velocity": [0.0, 0.0, -3.0]}
 SOLID = {key: value for key, value in BOX.items() if key != "size"} | {"shape": "mesh"}
 RUBBING = {"stiffness": 1e5, "friction": 0.3}
 TABLE = {
@@ -67,6 +68,7 @@ EFFECTS = {
     "point mass": {"point_mass": [{"node": "centre", "mass": 1.0}]},
     "contact": {"body": [BALL], "contact": {"stiffness": 1e5}},
     "contact, a box that tumbles": {"body": [BOX], "contact": {"stiffness": 1e5}},
+    "contact, two bodies": {"body": [BALL, CRATE], "contact": {"stiffness": 1e5, "between_bodies": True}},
     "friction": {"body": [BALL], "contact": RUBBING},
     "friction at 1e-6 m/s": {"body": [BALL], "contact": RUBBING | {"slip_velocity": 1e-6}},
     "friction, damping": {"body": [BALL], "contact": RUBBING | {"damping": 0.1}},

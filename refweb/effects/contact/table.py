@@ -65,7 +65,7 @@ def rotations(body):
 
 @table
 class Contact(Table):
-    """Contact of the web with all bodies.
+    """Contact of the web with all bodies, and where asked for of bodies with each other.
 
     A sphere touches a line once. Other shapes touch each of its elements at both ends, and once in between, at ξ of its
     length with the energy W k δ^(p + 1)/(p + 1), W = 4 ξ (1 − ξ), so that nothing jumps as a line slides on. What fades
@@ -89,8 +89,9 @@ class Contact(Table):
         Velocity of slip v_s [m/s] at which friction is 1/√2 of what it comes to; below, it is viscous. Explicit steps
         do not depend on it.
     between_bodies : bool
-        Whether bodies touch each other as well, edges on edges too: all but pairs that are both fixed. Stiffness,
-        damping, friction and slip velocity of a pair are the larger of both bodies'.
+        Whether bodies touch each other as well, edges on edges too: all but pairs that are both fixed. They do so with
+        each corner once, with each edge once between its ends, and with rims; a sphere touches once. Each contact has
+        the push k δ^p. Stiffness, damping, friction and slip velocity of a pair are the larger of both bodies'.
     bodies : dict of str to BodyContact
         What differs for a body.
 
