@@ -187,7 +187,11 @@ def arcs(depth):
     @kernel()
     def touched(start, end, centre, one, other, pair):
         power, most, best = pair.exponent, -math.inf, 0
-        size, nearest = (end - start) * math.sqrt(dot(one, one)), -math.inf
+        radius, nearest = math.sqrt(dot(one, one)), -math.inf
+        size, reach = (end - start) * radius, 2.0 * STEEPEST * radius * math.sin(0.25 * (end - start))
+        _, deep, _, _, _ = on_arc(0.5, start, end, centre, one, other, pair)
+        if deep + reach <= 0.0:
+            return 0.0, 0.0, centre, 0.0, centre
         for n in range(SAMPLES + 1):
             _, deep, _, _, _ = on_arc(n / SAMPLES, start, end, centre, one, other, pair)
             nearest = max(nearest, deep)
