@@ -39,6 +39,8 @@ from .pressing import (
 
 STEP = 1e-6
 """Step of differences, over the size of the smaller body, and for quaternions."""
+FARTHEST = 1e6
+"""Largest way that is looked ahead [m]: what is nearer may touch, no deeper than half of a body."""
 INWARD = 1.6
 """Bound on the largest eigenvalue of the stiffness of a contact whose place moves, over that where it is held."""
 CURVED = 1.2
@@ -206,8 +208,9 @@ def kernels(first, second):
         space = space_of(data)
         for c in range(cells.shape[0]):
             law, steep = law_of(data, c), 0.0
-            for n in range(meet(reach, x, cells, data, c, space)):
-                own = law.stiffness * slope_of_power(law.exponent, space.contacts[n, DEPTH])
+            thick = min(data[c, SIDES + THICK], data[c, SIDES + SIDE + THICK])
+            for n in range(meet(min(reach, FARTHEST), x, cells, data, c, space)):
+                own = law.stiffness * slope_of_power(law.exponent, min(space.contacts[n, DEPTH], thick))
                 steep += CURVED * own * (INWARD if space.contacts[n, INNER] != 0.0 else 1.0)
             steep *= 1.0 + law.friction + SHALLOW * law.damping * speed * (1.0 + law.friction)
             if steep > 0.0:

@@ -1,7 +1,8 @@
 """Bodies that lie in each other where they do not touch: a reader of the results is told.
 
-It is looked at with every block of rows. Where the spheres around two bodies meet, places on the skeleton of each are
-held against the depth in the other: so it costs next to nothing, and a short overlap may be missed.
+It is looked at with every block of rows, for all shapes but rings, which have no ends along their normal. Where the
+spheres around two bodies meet, places on the skeleton of each are held against the depth in the other: so it costs next
+to nothing, and a short overlap may be missed.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ MOST = 3
 
 def silent_of(system):
     """The `Silent` of a system whose bodies may meet and do not touch each other, None where they cannot."""
-    bodies = system.net.bodies
+    bodies = [body for body in system.net.bodies if not body.shape.planar]
     if len(bodies) < 2 or all(body.fixed for body in bodies) or any(family.pairs for family in system.families):
         return None
-    return Silent(system.net)
+    return Silent(system.net, bodies)
 
 
 class Silent:
@@ -35,11 +36,13 @@ class Silent:
     ----------
     net : refweb.net.net.Net
         With the bodies.
+    bodies : list of refweb.net.rigid_body.RigidBody
+        Those that are looked at.
     """
 
-    def __init__(self, net):
+    def __init__(self, net, bodies):
         self._net, self._found = net, {}
-        pairs = [(a, b) for a, b in itertools.combinations(net.bodies, 2) if not (a.fixed and b.fixed)]
+        pairs = [(a, b) for a, b in itertools.combinations(bodies, 2) if not (a.fixed and b.fixed)]
         self._pairs = pairs
         self._rows = np.array([(a.row, b.row) for a, b in pairs])
         self._reach = np.array([a.extent + b.extent for a, b in pairs])
