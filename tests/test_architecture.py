@@ -33,7 +33,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "effects.contact",
         "*",
-        "Contact of lines with bodies: where they touch, how deep, and the forces of penalty, damping and friction.",
+        "Contact of lines with bodies, and of bodies with each other: where, how deep, the forces of penalty and losses.",
     ),
     (
         "effects.self_contact",
