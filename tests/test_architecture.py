@@ -33,7 +33,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "effects.contact",
         "*",
-        "Contact of lines with bodies, and of bodies with each other: where, how deep, the forces of penalty and losses.",
+        "Contact of lines with bodies, and of bodies with each other: where, how deep, and all its forces.",
     ),
     (
         "effects.self_contact",

@@ -1,1 +1,1 @@
-"""Contact of lines with bodies, and of bodies with each other: where, how deep, the forces of penalty and losses."""
+"""Contact of lines with bodies, and of bodies with each other: where, how deep, and all its forces."""
