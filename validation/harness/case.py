@@ -73,7 +73,7 @@ CASES = {
         "free_net",
         "tumbling",
     ),
-    "missions": ("published_throw", "falling_net", "spun_tight", "spin_deployment"),
+    "missions": ("published_throw", "falling_net", "spun_tight", "spin_deployment", "capture"),
     "methods": ("cross_validation", "coverage", "work_precision", "price_of_modelling"),
     "hard_cases": ("hard_cases",),
 }
