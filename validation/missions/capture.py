@@ -52,6 +52,7 @@ def case(quick):
         scene = refweb.Scene.load(f"capture-{name}", values)
         solution = refweb.run(scene)
         energies = np.array([least_energy(state) for _, state in solution.frames])
+        share = (energies[:, 0] / energies[:, 1]).min()
         solver, throw = solution.solver, solution.throw
         reason = "rounding"
         rows += [
@@ -66,9 +67,9 @@ def case(quick):
             Verdict(
                 f"The {name}: kinetic energy is never below that of the rigid union.",
                 "holds",
-                f"it is at least {(energies[:, 0] / energies[:, 1]).min():.3f} times as large; of {energies[0, 0]:.1f} J "
-                f"at the start, and the work of the reel, {energies[-1, 0]:.1f} J are left at the end, and one rigid body "
-                f"would have {energies[-1, 1]:.1f} J",
+                f"it is at least {share:.3f} times as large; of {energies[0, 0]:.1f} J at "
+                f"first and the work of the reel {energies[-1, 0]:.1f} J are left, and one rigid body would have "
+                f"{energies[-1, 1]:.1f} J",
                 (energies[:, 0] >= energies[:, 1] * (1.0 - 1e-9)).all(),
             )
         )
