@@ -132,7 +132,15 @@ def called(given):
         modules |= {EFFECTS[effect].split(":")[0].removeprefix("refweb.")} | BELOW.get(effect, set())
     for quantity in (observe["quantity"] for observe in given.get("observe", DEFAULT)):
         modules |= {OBSERVABLES[quantity].split(":")[0].removeprefix("refweb.")} | OBSERVED.get(quantity, set())
+    if given["web"].get("path", "").endswith(".csv"):
+        modules.add("net.csv_files")
+    if "fold" in given or "positions" in given["web"]:
+        modules |= {"effects.fold", "net.folding"}
+    modules |= {"system.carried"} if "attach" in given else set()
+    modules |= {"results.throw"} if "throw" in given else set()
     for body in given.get("body", ()):
+        if body.get("shape") == "cylinder" and not body.get("fixed"):
+            modules |= {"net.shapes.rounding", "net.solid"}
         modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
     if "contact" in given:
         modules.add("results.observables.overlap" if solve["kind"] == "dynamic" else "statics.passage")
@@ -197,7 +205,10 @@ def test_a_run_loads_what_its_scene_calls_for(name):
     given = SCENES[name]
     modules, outside = called(given)
     assert modules <= MODULES
-    loaded = run("import refweb", f"refweb.run(refweb.Scene.from_dict(json.loads({json.dumps(given)!r})))")
+    loaded = run(
+        "import refweb",
+        f"refweb.run(refweb.Scene.from_dict(json.loads({json.dumps(given)!r}), {str(SHIPPED_SCENES)!r}))",
+    )
     own = {m.removeprefix("refweb.") for m in loaded if m.startswith("refweb.")}
     assert own == modules, f"not called for: {sorted(own - modules)}, not seen: {sorted(modules - own)}"
     assert libraries(loaded) <= brought(*outside), sorted(libraries(loaded) - brought(*outside))
