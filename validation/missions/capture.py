@@ -57,27 +57,24 @@ def case(quick):
         Row("angular momentum, drift", solver["angular_momentum_drift"], 0.0, outside, 1e-9, reason, scale=1.0),
         Row("kinetic energy at the start", started, first, "sum over nodes and stage", 1e-12, reason, "J"),
     ]
+    covered = f"{throw['covered']['value']:.2f}"
+    if (error := throw["covered"].get("error")) is not None:
+        covered += f" ± {error:.2f}"
     verdicts = [
         Verdict(
             "Kinetic energy is never below that of the rigid union.",
             "holds",
-            f"it is at least {(energies[:, 0] / energies[:, 1]).min():.2f} times as large; of {first:.0f} J and the work "
-            f"of the reel {last:.0f} J are left, and one rigid body would have {union:.0f} J",
+            f"it is at least {(energies[:, 0] / energies[:, 1]).min():.2f} times as large; of {first:.0f} J and the "
+            f"work of the reel {last:.0f} J are left, and one rigid body would have {union:.0f} J",
             (energies[:, 0] >= energies[:, 1] * (1.0 - 1e-9)).all(),
         ),
         Verdict(
             "The net holds the stage.",
             "holds",
-            f"the centre of the stage is inside, the mouth is closed, the net covers {_shown(throw['covered'])} of all "
-            f"directions, and the largest stress is {solution.utilisation[0]:.2f} of the strength; these are numbers of "
-            "one motion of many",
+            f"the centre of the stage is inside, the mouth is closed, the net covers {covered} of all directions, and the "
+            f"largest stress is {solution.utilisation[0]:.2f} of the strength: numbers of one motion of many",
             throw["inside"]["value"] and throw["closed"]["value"],
         ),
     ]
     figures = [Figure("The stage at the end.", lambda: plots.picture(solution, "tension"))]
     return Case(rows=rows, verdicts=verdicts, figures=figures)
-
-
-def _shown(one):
-    """A number of a throw in words."""
-    return f"{one['value']:.2f}" + (f" ± {one['error']:.2f}" if one.get("error") is not None else "")
