@@ -71,7 +71,7 @@ def case(quick):
         Verdict(
             "The net holds the stage.",
             "holds",
-            f"the centre of the stage is inside, the mouth is closed, the net covers {covered} of all directions, and the "
+            f"the centre of the stage is inside, the mouth is closed, the net covers {covered} of all directions, the "
             f"largest stress is {solution.utilisation[0]:.2f} of the strength: numbers of one motion of many",
             throw["inside"]["value"] and throw["closed"]["value"],
         ),
