@@ -175,8 +175,8 @@ def called(given):
         outside.append("sksundae")
     if web == "cable":
         outside.append("scipy.optimize")  # a root
-    if '"corners"' in json.dumps(given):
-        outside.append("scipy.spatial")  # a hull
+    if '"corners"' in json.dumps(given) or "effects.fold" in modules:
+        outside.append("scipy.spatial")  # a hull, or lines near each other
     return modules, outside
 
 
