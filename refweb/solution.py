@@ -295,7 +295,7 @@ def load(folder) -> Solution:
         for key in ("status", "message", "web", "events", "solver", "cost", "versions", "warnings"):
             setattr(found, key, summary[key])
         found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
-        found.pairs, found.passage = summary.get("pairs", {}), summary.get("passage", {})
+        found.pairs, found.lines, found.passage = (summary.get(key, {}) for key in ("pairs", "lines", "passage"))
         found.breaks, found.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             found.utilisation = used["value"], used["line"]

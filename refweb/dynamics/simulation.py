@@ -260,7 +260,7 @@ class Simulation:
                 watch.note_way(course, pairs, self.integrator)
                 solution.pairs, solution.passage = pairs.plain(), {"bodies": pairs.passage()}
         if self._lines is not None:
-            solution.passage = {**solution.passage, "lines": self._lines.told()}
+            solution.passage, solution.lines = {**solution.passage, "lines": self._lines.told()}, self._lines.plain()
         if np.isfinite(course.x).all():
             solution.state = self._state(course)
         if course.breaks is not None:

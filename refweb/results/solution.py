@@ -111,6 +111,9 @@ class SolutionData:
     pairs : dict
         Of each two bodies that have touched each other, by names: the deepest ``overlap`` [m], its ``time``, the
         overlap ``allowed`` and the ``stiffness`` of their contact.
+    lines : dict
+        Of lines that touch lines the deepest ``overlap`` [m], their ``radius`` [m] and the ``stiffness`` [N/m];
+        empty without ``[self_contact]``.
     passage : dict
         By what may have passed through what: "certified" where nothing can have, or why that is not certain.
     reduced : dict
@@ -152,6 +155,7 @@ class SolutionData:
     utilisation: tuple | None = None
     bodies: dict = field(default_factory=dict)
     pairs: dict = field(default_factory=dict)
+    lines: dict = field(default_factory=dict)
     passage: dict = field(default_factory=dict)
 
     @property
@@ -195,6 +199,7 @@ class SolutionData:
             **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
             **({"pairs": self.pairs} if self.pairs else {}),
+            **({"lines": self.lines} if self.lines else {}),
             **({"passage": self.passage} if self.passage else {}),
             **({"throw": self.throw} if self.throw else {}),
             **({"horizon": self.horizon} if self.horizon else {}),

@@ -103,6 +103,11 @@ def on_run(summary):
     for name, pair in summary.get("pairs", {}).items():
         text = f"bodies {name} at most {readable(pair['overlap'], None, 'm')} deep in each other"
         yield "contact", f"{text}, stiffness {pair['stiffness']:g}"
+    if lines := summary.get("lines"):
+        text = (
+            f"lines at most {readable(lines['overlap'], None, 'm')} deep in each other, of radius {lines['radius']:g}"
+        )
+        yield "contact", f"{text} m, stiffness {lines['stiffness']:.3g}"
     for name, shown in summary.get("passage", {}).items():
         yield "passage", f"{name}: {'nothing can have passed: certified' if shown == 'certified' else shown}"
     if (breaks := summary.get("breaks")) is not None:

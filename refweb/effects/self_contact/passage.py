@@ -47,14 +47,20 @@ class Passage:
         self.touch, self._elements = float(family.data[0, TOUCH]), family.elements
         self._stiffness = float(family.data[:, SCALE].max()) * math.sqrt(12.0) * self.touch**3
         self._since: float | None = None
+        self._deepest = 0.0
 
     def note(self, overlap, way, time):
         """Note the deepest overlap and the longest way of a step [m] until a time [s]."""
+        self._deepest = max(self._deepest, overlap)
         if self._since is None and not overlap + way < self.touch:
             self._since = time
 
+    def plain(self):
+        """Overlap, radius and stiffness as ``run.json`` has them."""
+        return {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
+
     def told(self):
-        """As ``run.json`` has it."""
+        """Whether nothing can have passed, as ``run.json`` has it."""
         if not self._followed:
             return f"not certified: {self._method} does not follow what moves between its steps"
         if self._since is None:
