@@ -94,7 +94,15 @@ def test_both_faces_agree(name):
             assert value[1] == where, observe
 
 
-UNKNOWN = ("kinetic_energy", "dissipated_energy", "frame_energy", "orbit_energy", "rupture_energy")
+UNKNOWN = (
+    "kinetic_energy",
+    "dissipated_energy",
+    "frame_energy",
+    "orbit_energy",
+    "rupture_energy",
+    "body_contact_energy",
+    "self_contact_energy",
+)
 """Energies that a state of these scenes does not know."""
 
 
