@@ -421,14 +421,15 @@ def test_a_stack_rests():
     boxes = [
         dict(name=f"b{i}", shape="box", size=[0.4] * 3, mass=1.0, position=[0, 0, 0.2 + 0.4 * i]) for i in range(3)
     ]
-    s = run([FLOOR, *boxes], 1.5, dict(stiffness=k, damping=30.0, friction=0.3), gravity=True)
+    s = run([FLOOR, *boxes], 2.7, dict(stiffness=k, damping=30.0, friction=0.3), gravity=True)
     assert s.solver["nsteps"] >= 100_000
     at = [rows(s, f"b{i}") for i in range(3)]
     assert max(np.abs(s.state.v[list(r)]).max() for r in at) <= 1e-12
     sunk = [s.state.x[row, 2] for row, _ in at]
     # On the floor four corners, each of one edge, and four edges bear a box; on a box so do those of that one.
     bearing = np.cumsum([3 / 8, 2 / 16, 1 / 16]) * G / k
-    np.testing.assert_allclose(sunk, -bearing, rtol=1e-6)
+    # The place in between of an edge that lies flat is found 1e-5 of its length from an end, and bears 4e-5 of that.
+    np.testing.assert_allclose(sunk, -bearing, rtol=1e-4)
     assert max(np.abs(s.state.x[row, :2]).max() for row, _ in at) <= 1e-12
 
 
