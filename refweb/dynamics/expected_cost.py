@@ -101,8 +101,9 @@ def expected_cost(scene, system):
         texts = [f"{_seconds(rule.step)}{', where all is touched' * n}, by {rule.by}" for n, rule in enumerate(rules)]
         least = solve.duration / scene.output.interval
         steps = [max(solve.duration / rule.step, least) for rule in rules]
-    price = len(integrator.drifts) * step_price(system) * steps_with_twin(scene)
-    counts = " to ".join(f"{n:.2g}" for n in dict.fromkeys(steps))
-    seconds = " to ".join(f"{n * price:.2g}" for n in dict.fromkeys(steps))
+    each = len(integrator.drifts) * steps_with_twin(scene)
+    prices = [steps[0] * each * step_price(system), steps[-1] * each * step_price(system, touched=True)]
+    counts = " to ".join(dict.fromkeys(f"{n:.2g}" for n in steps))
+    seconds = " to ".join(dict.fromkeys(f"{price:.2g}" for price in prices))
     twin = " with the twin" if scene.accuracy.error == "twin" else ""
     return f"{'; '.join(texts)}; {counts} steps, some {seconds} s of CPU time{twin}"

@@ -38,6 +38,8 @@ DIGITS_OF_ADAMS = 8
 take √10 times the steps for each, on webs whose load has a factor 0.01 s for 6 where Adams methods take 0.3 s for 9."""
 PER_STEP, PER_ELEMENT, PER_CELL = 1e-6, 12e-9, 8e-9
 """CPU time of a compiled explicit step, of each element in it, and of each cell of what acts besides [s]."""
+PER_TOUCH, PER_RUB = 5e-8, 3e-7
+"""CPU time of an element that touches a body in a step, and of one that rubs on it as well [s]."""
 STEP_OF_CVODE = 100.0
 """Explicit steps that cost as much as one of CVODE, which takes one at least to each corner of a table."""
 QUICK_RUN = 0.5
@@ -99,13 +101,15 @@ def _undamped(system):
     return calm
 
 
-def step_price(system):
-    """Estimate of the CPU time of an explicit step of one evaluation of forces [s].
+def step_price(system, touched=False):
+    """Estimate of the CPU time of an explicit step of one evaluation of forces [s]; ``touched``, where all is.
 
     Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
     """
     others = sum(len(family.cells) for family in system.families if not family.lines)
     price = PER_STEP + PER_ELEMENT * len(system.net.cells) + PER_CELL * others
+    if touched:
+        price += sum(len(f.cells) * (PER_TOUCH if f.rubbing is None else PER_RUB) for f in system.families if f.contact)
     damped = any(family.damping is not None and family.rubbing is None for family in system.families)
     if damped and not _losing(system):
         price *= 1.0 + min(_damped(system, _bound(system)), 7.0)

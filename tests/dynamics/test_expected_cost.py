@@ -1,5 +1,7 @@
 """What a run is expected to cost: its step by Gershgorin's bound by hand, and what is named to set it."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -55,5 +57,11 @@ def test_in_words():
     alone = scene(step_size=1e-5).replace(accuracy=refweb.Accuracy(error="none"))
     assert expected_cost(alone, alone.build()).startswith("10 µs as given, of ")
     assert "at most by elasticity of line 1; 1e+05 steps, some " in expected_cost(alone, alone.build())
+    seconds = {}
+    for friction in (0.0, 0.3):  # where all is touched, friction is what a step takes longest for
+        rubbed = scene(ball(), refweb.Contact(stiffness=1.0, friction=friction))
+        least, most = re.search(r"some (\S+) to (\S+) s of CPU", expected_cost(rubbed, rubbed.build())).groups()
+        seconds[friction] = float(least), float(most)
+    assert seconds[0.3][1] > seconds[0.0][1] > seconds[0.0][0]
     implicit = scene(method="cvode")
     assert expected_cost(implicit, implicit.build()) is None
