@@ -75,10 +75,10 @@ MIRRORS = {
     "dynamics/accuracy_loop": "test_faults.py dynamics/test_accuracy.py",
     "dynamics/twin_error": "dynamics/test_by_chance.py dynamics/test_one_row.py "
     "dynamics/test_events.py dynamics/test_dynamics.py",
-    "dynamics/history": "dynamics/test_by_chance.py dynamics/test_dynamics.py",
+    "dynamics/history": "dynamics/test_by_chance.py dynamics/test_dynamics.py results/test_remarks.py",
     "dynamics/initial_state": "dynamics/test_starts.py",
     "dynamics/schedule": "dynamics/test_one_row.py dynamics/test_dynamics.py",
-    "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py",
+    "dynamics/simulation": "test_faults.py dynamics/test_dynamics.py dynamics/test_starts.py",
     "dynamics/integrators/central_difference": "dynamics/test_dynamics.py",
     "dynamics/integrators/explicit_loop": "dynamics/test_dynamics.py dynamics/test_impact.py",
     "dynamics/integrators/energy_book": "test_readme.py dynamics/test_impact.py",
@@ -86,6 +86,8 @@ MIRRORS = {
     "dynamics/integrators/averages": "dynamics/test_averages.py",
     "dynamics/integrators": "dynamics/integrators/test_cvode.py dynamics/test_dynamics.py",
     "dynamics": "dynamics/test_dynamics.py",
+    "results/observables/observable": "statics/test_held_lines.py results/test_observable_contract.py "
+    "dynamics/test_accuracy.py statics/test_statics.py",
     "results/observables/apart": "results/test_apart.py",
     "results/observables": "results/test_observable_contract.py dynamics/test_accuracy.py statics/test_statics.py",
     "results/comparison": "results/test_comparison.py",

@@ -3,6 +3,7 @@
 import json
 import zipfile
 
+import nets
 import numpy as np
 import pytest
 import tomli_w
@@ -403,6 +404,14 @@ def test_errors_go_on_with_the_state(keys, tmp_path):
         assert off <= error < 20.0 * off and solution.warnings == []
     own = refweb.run(swing(second, **keys)).results["x"].error
     assert went_on.results["x"].error > 5.0 * own
+
+
+def test_errors_go_on_where_the_second_leg_is_resumed(tmp_path):
+    """They are those of a leg that was not interrupted, which what the first leg is off by is most of."""
+    refweb.run(swing(0.95), out=tmp_path / "first")
+    whole, resumed = nets.whole_and_resumed(swing(0.01, start=str(tmp_path / "first")), tmp_path)
+    assert resumed.results == whole.results
+    assert resumed.results["x"].error > 5.0 * refweb.run(swing(0.01)).results["x"].error
 
 
 def test_a_state_without_errors_says_so(tmp_path):

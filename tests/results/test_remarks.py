@@ -1,5 +1,7 @@
 """Runs in which nothing happens, or nonsense: each is named by a warning, and its neighbour that makes sense is not."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -130,3 +132,17 @@ def test_a_body_that_never_touches():
     still = refweb.Body(name="still", radius=0.1, fixed=True, position=(0.0, 0.0, -9.0))
     solution = solved(still, refweb.Contact(stiffness=1e5), pull((0.0, 0.0, 1.0)))
     assert told(solution, "never touches") == ['body "still" never touches the web, though there is a [contact]']
+
+
+# The floor of the smooth law
+
+
+def test_the_stress_that_a_floor_is_held_against_is_the_largest_of_the_run():
+    """In dynamics of all steps, whatever is observed: by an observable of a run of the same scene."""
+    keys = dict(law="smooth", smoothing=1e-2, area=3e-4, solve=refweb.Dynamic(duration=0.05))
+    peak = refweb.Observe(name="peak", quantity="stress", reduce="max")
+    place = refweb.Observe(name="place", quantity="displacement")
+    found = {one.name: solved(pull((0.0, 0.0, 0.1)), observe=[one], **keys) for one in (peak, place)}
+    (text,) = told(found["place"], "of the largest stress")
+    stress = float(re.search(r"largest stress (\S+) Pa", text)[1])
+    assert stress == float(f"{found['peak'].results['peak'].value:.4g}") > 0.0
