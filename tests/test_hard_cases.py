@@ -46,6 +46,11 @@ def test_a_central_path_that_leads_away_ends_at_its_best():
     assert outcome(random_net(997)) == "solved"
 
 
+def test_a_step_to_what_is_no_number_is_one_that_finds_nothing():
+    """Newton's method ends there, and the way by the interior point follows."""
+    assert outcome(random_net(643)) == "solved"
+
+
 def test_relaxation_does_not_chatter():
     """An end that hangs from a cable, and triangles from a corner: a few thousand steps, not rest after rest."""
     for name in ("dangling end", "triangles hung from one corner", "hung from one corner"):

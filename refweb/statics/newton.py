@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import SolverError
 from ..net.net import AXIAL_STIFFNESS
 from ..system import conjugate_gradients
 from ..system.factorization import Factor, Lu
@@ -126,7 +125,11 @@ class Newton:
             error = residual(system, here.force, scale)
             if not np.isfinite(error):
                 node = np.argmax(~np.isfinite(here.force).all(axis=1))
-                raise SolverError(f"non-finite force at step {t:g}, node {node}")
+                raise NotFound(
+                    f"non-finite force at step {t:g}, node {node}: Newton's method went too far; raise the load in smaller "
+                    'load_steps, or method = "relaxation"',
+                    stats,
+                )
             if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
                 break
             best = min(best, error)
