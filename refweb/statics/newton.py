@@ -126,8 +126,8 @@ class Newton:
             if not np.isfinite(error):
                 node = np.argmax(~np.isfinite(here.force).all(axis=1))
                 raise NotFound(
-                    f"non-finite force at step {t:g}, node {node}: Newton's method went too far; raise the load in smaller "
-                    'load_steps, or method = "relaxation"',
+                    f"non-finite force at step {t:g}, node {node}: Newton's method went too far; raise the load in "
+                    'smaller load_steps, or method = "relaxation"',
                     stats,
                 )
             if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
