@@ -674,3 +674,20 @@ def test_a_fixed_body_presses_a_slack_web():
         assert found["push"] > 1.0 and abs(found["push"] - found["held"]) <= 1e-8 * found["push"]
         values.append(found["push"])
     np.testing.assert_allclose(values[0], values[1], rtol=1e-8)
+
+
+def test_the_bound_of_a_strain_is_that_of_its_tension_over_ea():
+    """Proven by duality for a line that is taut: strain is tension over EA, so is what it may be off by."""
+    solution = refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(points=[[-1, 0, 0], [0, 0, 0], [1, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+            cable=refweb.Cable(law="tension-only", modulus=1e6, area=1e-4, density=1.0),
+            effects=[refweb.Load(node=1, force=(0.0, 0.0, 1.0))],
+            solve=refweb.Static(),
+            observe=[refweb.Observe(name=q, quantity=q, line=0) for q in ("tension", "strain")],
+        )
+    )
+    tension, strain = solution.results["tension"], solution.results["strain"]
+    np.testing.assert_allclose(
+        [strain.value, strain.error], np.array([tension.value, tension.error]) / 100.0, rtol=1e-6
+    )
