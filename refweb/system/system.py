@@ -257,9 +257,9 @@ class System:
 
     def force_to(self, per_cell, t, x, v):
         """Force on every row [N]; what families show is written to the arrays of ``per_cell``."""
-        f = np.zeros((self.rows, 3))
+        f, lines = np.zeros((self.rows, 3)), self.line_data(t)
         for family, out in zip(self.families, per_cell, strict=True):
-            family.force(t, x, v, f, family.cells, self._data(family, t), out)
+            family.force(t, x, v, f, family.cells, lines if family.lines else family.data, out)
         if self.carriers:
             self.carriers.hand_on(x, f)
         return f

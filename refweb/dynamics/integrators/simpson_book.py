@@ -54,21 +54,18 @@ class Rates(NamedTuple):
 
     Attributes
     ----------
-    power : ndarray, shape (families + 1,)
-        Power of each family and, last, of motion [W].
-    reaction, push : ndarray, shape (3,)
-        Force of the supports [N], and of what acts from outside without a formula of its impulse.
-    lengths : ndarray
+    flow : ndarray, shape (families + 7,)
+        Power of each family and of motion [W]; the force of the supports, and of what acts from outside without a
+        formula of its impulse [N].
+    lengths : ndarray or None
         Natural lengths [m]; none where nothing changes them.
-    length_force : ndarray
+    length_force : ndarray or None
         ∂E/∂L of each of them [N].
     """
 
-    power: np.ndarray
-    reaction: np.ndarray
-    push: np.ndarray
-    lengths: np.ndarray
-    length_force: np.ndarray
+    flow: np.ndarray
+    lengths: np.ndarray | None
+    length_force: np.ndarray | None
 
 
 class Booked(NamedTuple):
@@ -121,11 +118,13 @@ class Piece(NamedTuple):
         width = self.end.time - self.begin
         s = (t - self.begin) / width
         a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
-        start, _, last = self.rates
-        mean = Rates(*(a * p + b * q + c * r for p, q, r in zip(*self.rates, strict=True)))
-        more = Booked(mean.power, mean.reaction, mean.push)
-        work, impulse, pushed = (past + width * rate for past, rate in zip(self.before, more, strict=True))
-        work[-1] += mean.length_force @ (last.lengths - start.lengths)
+        start, middle, last = self.rates
+        more = width * (a * start.flow + b * middle.flow + c * last.flow)
+        work, impulse, pushed = self.before
+        work, impulse, pushed = work + more[:-6], impulse + more[-6:-3], pushed + more[-3:]
+        if start.lengths is not None:
+            pull = a * start.length_force + b * middle.length_force + c * last.length_force
+            work[-1] += pull @ (last.lengths - start.lengths)
         if self.jump and t == self.end.time:
             work[-1], impulse = work[-1] + self.jump.energy, impulse + self.jump.momentum
         return Booked(work, impulse, pushed)
@@ -133,7 +132,7 @@ class Piece(NamedTuple):
     @property
     def unevenness(self):
         """Difference of the work between Simpson's and the trapezoidal rule [J]."""
-        start, middle, last = (rates.power for rates in self.rates)
+        start, middle, last = (rates.flow[:-6] for rates in self.rates)
         return (self.end.time - self.begin) * np.abs(start - 2.0 * middle + last).sum() / 12.0
 
 
@@ -189,19 +188,16 @@ class SimpsonBook:
 
     def rates(self, sample):
         """The `Rates` of a sample."""
-        system, lengths = self.system, (np.zeros(0), np.zeros(0))
-        if system.line_drives:
-            lengths = system.natural_length(sample.time), system.length_force(sample.time, sample.x)
-        reaction = np.bincount(self._fixed % 3, sample.force.ravel()[self._fixed], 3)
-        return Rates(sample.power, -reaction, self._push(sample), *lengths)
-
-    def _push(self, sample):
-        """Force from outside that has no formula of its impulse [N], shape (3,)."""
-        total = np.zeros(3)
+        system, flow = self.system, np.zeros(len(sample.power) + 6)
+        flow[:-6] = sample.power
+        if len(self._fixed):
+            flow[-6:-3] = -np.bincount(self._fixed % 3, sample.force.ravel()[self._fixed], 3)
         for family in self._pushing:
-            rows = self.system.force_of(family, sample.time, sample.x, sample.v)
-            total += rows[: self._linear].sum(axis=0)
-        return total
+            rows = system.force_of(family, sample.time, sample.x, sample.v)
+            flow[-3:] += rows[: self._linear].sum(axis=0)
+        if not system.line_drives:
+            return Rates(flow, None, None)
+        return Rates(flow, system.natural_length(sample.time), system.length_force(sample.time, sample.x))
 
     def piece(self, course, middle, end):
         """The `Piece` from where a course is, by the samples in its middle and at its end.

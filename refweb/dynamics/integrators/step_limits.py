@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from ...kernels import kernel
 from .integrator import SAME
 
 TRAVEL = 0.2
@@ -29,6 +32,7 @@ class StepLimits:
         bodies = system.net.bodies
         self._thickness = min((body.thickness for body in bodies), default=np.inf)
         self._outreach = np.array([body.extent for body in bodies])
+        self._rows = np.array([body.row for body in bodies], dtype=np.int64)
 
     def at_corner(self, t):
         """Whether a table has a corner at a time [s]."""
@@ -40,18 +44,35 @@ class StepLimits:
         ahead = np.searchsorted(self._corners, t * (1.0 + SAME), side="right")
         stop = self._corners[ahead] if ahead < len(self._corners) else np.inf
         if np.isfinite(self._thickness):
-            speed = 2.0 * np.sqrt((v[: self._moving] ** 2).sum(axis=1).max())
+            speed, gap = speed_and_gap(
+                self._net.points, x, v[: self._moving], self._net.nodes, self._rows, self._outreach
+            )
             if self._rotations:
-                speed = max(speed, 2.0 * self._rotations.speed(v))
-            way = max(TRAVEL * self._thickness, 0.5 * self._gap(x))
+                speed = max(speed, self._rotations.speed(v))
+            speed, way = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
             stop = min(stop, t + way / speed) if speed > 0.0 else stop
         return t + SAME * end if stop - t < SAME * end else stop
 
-    def _gap(self, x):
-        """At most the least distance between a body and a node [m]: that of balls around and a box around."""
-        net = self._net
-        place = net.points + x
-        low, high = place[: net.nodes].min(axis=0), place[: net.nodes].max(axis=0)
-        middles = place[[body.row for body in net.bodies]]
-        apart = np.maximum(np.maximum(low - middles, middles - high), 0.0)
-        return (np.linalg.norm(apart, axis=1) - self._outreach).min()
+
+@kernel()
+def speed_and_gap(points, x, v, nodes, rows, outreach):
+    """Largest speed of rows [m/s], and at most the least distance between a body and a node [m].
+
+    The distance is that of a box around the nodes and balls around the bodies at ``rows``, which reach out so far.
+    """
+    fastest = 0.0
+    for r in range(v.shape[0]):
+        fastest = max(fastest, v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for n in range(nodes):
+        for k in range(3):
+            place = points[n, k] + x[n, k]
+            low[k], high[k] = min(low[k], place), max(high[k], place)
+    gap = np.inf
+    for b, row in enumerate(rows):
+        apart = 0.0
+        for k in range(3):
+            place = points[row, k] + x[row, k]
+            apart += max(low[k] - place, place - high[k], 0.0) ** 2
+        gap = min(gap, math.sqrt(apart) - outreach[b])
+    return math.sqrt(fastest), gap

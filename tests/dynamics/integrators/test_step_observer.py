@@ -23,7 +23,7 @@ def piece(power, push=lambda t: np.zeros(3), length=lambda t: 0.0, pull=lambda t
     """A piece whose rates are functions of time."""
     middle = 0.5 * (BEGIN + END)
     rates = tuple(
-        Rates(np.array([power(t), 0.0]), push(t), 2.0 * push(t), np.array([length(t)]), np.array([pull(t)]))
+        Rates(np.array([power(t), 0.0, *push(t), *(2.0 * push(t))]), np.array([length(t)]), np.array([pull(t)]))
         for t in (BEGIN, middle, END)
     )
     before = Booked(np.array([2.0, 5.0]), np.ones(3), np.zeros(3))
