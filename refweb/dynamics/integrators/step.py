@@ -120,8 +120,10 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
         change = fastest = 0.0
         for q in range(flat_v.size):
             speed = flat_half[q] + 0.5 * h * flat_inverse[q] * (flat_f[q] + flat_extra[q])
-            change, fastest = max(change, abs(speed - flat_v[q])), max(fastest, abs(speed))
-            flat_v[q] = speed if share == 1.0 else flat_v[q] + share * (speed - flat_v[q])
+            fastest = max(fastest, abs(speed))
+            if flat_inverse[q] > 0.0:  # nodes that bodies carry go with these, and would never come to rest
+                change = max(change, abs(speed - flat_v[q]))
+                flat_v[q] = speed if share == 1.0 else flat_v[q] + share * (speed - flat_v[q])
         if not change > 1e-14 * fastest:
             break
         if change > 0.75 * before_that and share > 0.02:  # damping that has grown since the last bound
