@@ -139,9 +139,12 @@ def called(given):
     modules |= {"system.carried"} if "attach" in given else set()
     modules |= {"results.throw"} if "throw" in given else set()
     for body in given.get("body", ()):
-        if body.get("shape") == "cylinder" and not body.get("fixed"):
+        if body.get("shape") in ("cylinder", "box") and not body.get("fixed"):
             modules |= {"net.shapes.rounding", "net.solid"}
+            modules |= {"effects.turning_bodies", *VECTORS} if {"frame", "orbit"} & given.keys() else set()
         modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
+    if len(given.get("body", ())) > 1 and not given.get("contact", {}).get("between_bodies"):
+        modules |= {"effects.contact", "effects.contact.silent", "net.skeleton"}  # bodies that overlap in silence
     if "contact" in given:
         modules.add("results.observables.overlap" if solve["kind"] == "dynamic" else "statics.passage")
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}

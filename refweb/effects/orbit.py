@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..tables import Table, real, table
+from ..tables import Several, Table, real, rows, table
 from .turning_axes import families
 
 GRAVITATION = 3.986004418e14
@@ -28,7 +28,8 @@ EARTH = 6378136.6
 class Orbit(Table):
     """A circular orbit of the Earth; everything else in the scene is given in axes that go round with it.
 
-    The origin of the scene goes round; x points away from the Earth, y along the track, z along the angular velocity.
+    The origin of the scene goes round; x points away from the Earth, y along the track, z along the angular velocity,
+    or other directions of the scene do that `axes` names.
     Velocities are relative to these axes: what keeps its place in them has the velocity 0, and a web that does not turn
     as seen from the stars has the spin −n about z. Spheres whose rotation is followed turn by the same rule.
 
@@ -42,11 +43,14 @@ class Orbit(Table):
         n [rad/s], 2π over the period.
     altitude : float, optional
         Height above the equator [m], in place of ``mean_motion``.
+    axes : list of 2 vectors, optional
+        Directions away from the Earth and along the track, at right angles; by default x and y.
 
     Raises
     ------
     InputError
-        For a number out of bounds, or where not exactly one is given; and beside ``[frame]`` or ``[gravity]``, which
+        For a number out of bounds, or where not exactly one is given; for axes that are not two at right angles; and
+        beside ``[frame]`` or ``[gravity]``, which
         it has itself.
 
     References
@@ -64,12 +68,22 @@ class Orbit(Table):
 
     mean_motion: float | None = real(default=None, above=0, unit="rad/s")
     altitude: float | None = real(default=None, at_least=0, unit="m")
+    axes: Several = rows(3, default=None)
 
     def check(self):
-        """Refuse an orbit that is not given, or twice."""
+        """Refuse an orbit that is not given, or twice, and axes that are none."""
         if (self.mean_motion is None) == (self.altitude is None):
             given = "both are given" if self.altitude is not None else "none is"
             raise InputError(f"give mean_motion [rad/s] or altitude [m]: {given}")
+        self._frame()
+
+    def _frame(self):
+        """Unit vectors away from the Earth, along the track and across it, shape (3, 3)."""
+        if self.axes is None:
+            return np.eye(3)
+        from ..net.rigid_body import axes_of
+
+        return axes_of(self.axes)
 
     @property
     def radius(self):
@@ -81,5 +95,6 @@ class Orbit(Table):
     def on(self, net):
         """The families of all rows with mass."""
         n = np.sqrt(GRAVITATION / self.radius) / self.radius if self.mean_motion is None else self.mean_motion
-        pull = n**2 * np.diag([3.0, 0.0, -1.0])
-        return families(net, (0.0, 0.0, float(n)), pull, name="orbit", book="orbit_energy", orbit_radius=self.radius)
+        own = self._frame()
+        pull, speed = n**2 * own.T @ np.diag([3.0, 0.0, -1.0]) @ own, n * own[2]
+        return families(net, speed.tolist(), pull, name="orbit", book="orbit_energy", orbit_radius=self.radius)

@@ -65,7 +65,8 @@ def on_spread(entry):
     """Sentences on results whose ± is not small beside their spread."""
     for name, one in entry["results"].items():
         spread = one.get("deviation", one["largest"] - one["least"])
-        if one["error"] is not None and one["count"] > 1 and one["error"] > 0.5 * spread:
+        rounding = 1e-14 * max(abs(one["largest"]), abs(one["least"]))
+        if one["error"] is not None and one["count"] > 1 and one["error"] > max(0.5 * spread, rounding):
             told = readable(one["error"], None, one["unit"])
             more = "exceeds" if one["error"] > spread else "is not small beside"
             spread = readable(spread, None, one["unit"])

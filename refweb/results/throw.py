@@ -28,8 +28,9 @@ class Throw(Table):
     and else Ω/4π: the net seen through its outline.
 
     ± holds what differs in the twin run and what a history of half the rows would make of the same motion; where run
-    and twin disagree on what is inside or closed it is not known. Behind the time at which lines break in another order
-    in the twin, or an event ends only one of them, nothing is.
+    and twin disagree on what is inside or closed it is not known, and ``drawn`` is what one run of many has. Behind the
+    time at which lines break in another order in the twin, or an event ends only one of them, nothing is. Studies have
+    these numbers among their results, 1 and 0 for what is so and what is not, see `refweb.sweeps.case.cells_of`.
 
     Parameters
     ----------
@@ -62,6 +63,13 @@ class Throw(Table):
     share: float = real(default=0.8, above=0, at_most=1)
     target: str | None = text(default=None)
     closed: float = real(default=0.05, at_least=0, at_most=1)
+
+    @property
+    def numbers(self):
+        """Names of what it finds."""
+        of_target = ["inside", "closed", "covered"] if self.target is not None else []
+        travelled = ["travelled"] if self.travel is not None else []
+        return ["largest_area", "deployment_time", *travelled, "effective_period", *of_target]
 
     def on(self, observables, system, solve):
         """Refuse what the scene does not have."""
@@ -161,7 +169,7 @@ def _told(name, value, half, other, factor, own, known):
     """A number with its ±, or whether something is so, for ``run.json``."""
     if isinstance(value, bool):
         same = known == np.inf if other is None else other[name] == value
-        return {"value": value if same else None}
+        return {"value": value if same else None, "drawn": value}
     error = None
     if other is not None:
         error = factor * abs(value - other[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value)

@@ -83,7 +83,7 @@ def check_supported(system, t):
             remedy = "support one of them"
             if system.rotating:
                 kind = system.rotating[0].name
-                balanced = {"frame": "the axis", "orbit": "the y axis"}[kind]
+                balanced = {"frame": "the axis", "orbit": "the track"}[kind]
                 remedy += f", or move the web so that its centre of mass is on {balanced} of [{kind}]"
             raise SolverError(
                 f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "

@@ -166,7 +166,10 @@ def unpacked(content, folder):
 
 
 def cells_of(summary):
-    """Cells of a row from the content of a ``run.json``."""
+    """Cells of a row from the content of a ``run.json``: results and, where none has their names, those of a throw.
+
+    What the twin does not agree on, or tells nothing of, is one draw of many, as are results behind the horizon.
+    """
     cells = {"status": summary["status"], "message": summary["message"]}
     horizon = summary.get("horizon") or {}
     statistical, ensemble = horizon.get("statistical", []), horizon.get("ensemble", {})
@@ -179,6 +182,16 @@ def cells_of(summary):
             cells[f"{name} most"] = float("inf") if most is None else most
         if name in statistical and name in ensemble:
             cells[f"{name} mean"], cells[f"{name} deviation"] = ensemble[name]["mean"], ensemble[name]["deviation"]
+    of_throw = {n: one for n, one in summary.get("throw", {}).items() if n not in summary["results"]}
+    for name, one in of_throw.items():
+        value, error = one["value"], one.get("error")
+        if "drawn" in one:
+            value, error = float(one["drawn"]), 0.0 if value == one["drawn"] else None
+        cells[f"{name} [{one.get('unit', '1')}]"], cells[f"{name} ±"] = value, error
+        if one.get("at_least"):
+            cells[f"{name} least"], cells[f"{name} most"] = value, float("inf")
+        elif error is None:
+            statistical = [*statistical, name]
     cells["statistical"] = " ".join(statistical)
     return cells
 

@@ -149,9 +149,10 @@ def _check(study, base, cases):
         raise InputError(f"skip = {shown(study.skip)} leaves no case of {len(cases)}")
     _, scene = base.scene(first.values)
     scene.build()
+    of_throw = [] if scene.throw is None else scene.throw.numbers
     for name, text in study.conditions.items():
         with in_file(f"conditions: {short(name)}:"):
-            Expression(text, [*study.parameters, *(one.name for one in scene.observables)])
+            Expression(text, [*study.parameters, *(one.name for one in scene.observables), *of_throw])
 
 
 def _run(found, base, kept, workers, tell):

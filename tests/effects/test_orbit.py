@@ -36,12 +36,12 @@ def transition(t):
     return np.block([[np.array(of_place), np.array(of_speed)], [np.array(place_to_speed), np.array(speed_to_speed)]])
 
 
-def free_masses(places):
+def free_masses(places, **orbit):
     """Masses at places near each other that lines far too long do not hold: a system."""
     count = len(places)
     web = Web(places, [[i, i + 1] for i in range(count - 1)], natural_length=np.full(count - 1, 1e5))
     net = discretisation.build(web, refweb.Cable(law="tension-only", modulus=1.0, area=1e-4, density=0.0))
-    effects = [Elasticity(), refweb.PointMass(node="all", mass=2.0), refweb.Orbit(mean_motion=N)]
+    effects = [Elasticity(), refweb.PointMass(node="all", mass=2.0), refweb.Orbit(mean_motion=N, **orbit)]
     return System(net, effects, np.zeros((count, 3), dtype=bool))
 
 
@@ -103,6 +103,19 @@ def test_ellipse_of_two_to_one():
         # Errors of 1e-11 in some hundred steps of 200 m.
         np.testing.assert_allclose(place[0], [100 * np.cos(angle), -200 * np.sin(angle), 0.0], rtol=0, atol=1e-6)
         assert not place[1].any()
+
+
+def test_ellipse_about_other_axes():
+    """Away from the Earth along (0, 0.6, 0.8), along the track along −x: the ellipse stands there."""
+    away, along = np.array([0.0, 0.6, 0.8]), np.array([-1.0, 0.0, 0.0])
+    system = free_masses([(100.0 * away).tolist(), [0.0, 0.0, 0.0]], axes=(tuple(away), tuple(2.0 * along)))
+    method = Cvode(system, family="adams", rtol=1e-11)
+    run = method.start(None, np.array([-2.0 * N * 100.0 * along, [0.0] * 3]))
+    method.advance(run, [0.3 * ROUND])
+    angle = 0.6 * np.pi
+    expected = 100.0 * np.cos(angle) * away - 200.0 * np.sin(angle) * along
+    # Errors of 1e-11 in some hundred steps of 200 m.
+    np.testing.assert_allclose((system.net.points + run.x)[0], expected, rtol=0, atol=1e-6)
 
 
 def dumbbell(direction, law="linear", modulus=1e6, effects=(), **parts):
@@ -244,6 +257,8 @@ def test_what_does_not_go_together(effects, message):
 @pytest.mark.parametrize(
     "given, message",
     [
+        ({"mean_motion": 1e-3, "axes": [[1, 0, 0]]}, "must be two vectors, not 1"),
+        ({"mean_motion": 1e-3, "axes": [[1, 0, 0], [1, 1, 0]]}, "must be at right angles"),
         ({}, r"give mean_motion \[rad/s\] or altitude \[m\]: none is"),
         ({"mean_motion": N, "altitude": 4e5}, "both are given"),
         ({"mean_motion": 0.0}, r"mean_motion = 0(.0)? must be > 0 \[rad/s\]"),
@@ -256,7 +271,7 @@ def test_bad_orbits(given, message):
 
 
 def test_statics_refuses_what_is_carried_off_and_what_nothing_holds():
-    with pytest.raises(refweb.SolverError, match=r"carried off along x .* on the y axis of \[orbit\]"):
+    with pytest.raises(refweb.SolverError, match=r"carried off along x .* on the track of \[orbit\]"):
         scene = dumbbell([1, 0, 0])
         refweb.run(scene.replace(web=refweb.Inline(points=[[1, 0, 0], [9, 0, 0]], lines=[[0, 1]])))
     fast = [refweb.PointMass(node="all", mass=MASS), refweb.Orbit(mean_motion=1.0)]

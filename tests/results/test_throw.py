@@ -6,6 +6,7 @@ import pytest
 import refweb
 from refweb.net.web import Web
 from refweb.results.throw import Throw, covered, in_hull, solid_angle
+from refweb.sweeps.case import cells_of
 
 METHODS = ["central-difference", "cvode", "ida"]
 CORNERS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
@@ -122,6 +123,28 @@ def test_a_target_in_a_net():
         assert found["inside"]["value"] is inside and found["closed"]["value"] is False
         assert found["covered"]["value"] == pytest.approx(1.0 - angle if inside else angle, rel=1e-12)
         assert found["covered"]["error"] < 1e-9
+        assert scene.throw.numbers == list(found)
+        cells = cells_of(solution.summary())
+        assert cells["inside [1]"] == inside and cells["inside ±"] == 0.0 and cells["statistical"] == ""
+        assert cells["covered [1]"] == found["covered"]["value"]
+
+
+def test_cells_of_what_is_not_known():
+    """What twins do not agree on is one draw; a result of the same name goes first."""
+    mine = {"value": 3.0, "error": 0.5, "unit": "m", "time": 0.0, "where": None}
+    throw = {
+        "inside": {"value": None, "drawn": True},
+        "closed": {"value": False, "drawn": False},
+        "covered": {"value": 0.25, "error": None, "unit": "1"},
+        "travelled": {"value": 7.0, "error": 0.1, "unit": "m"},
+        "effective_period": {"value": 2.0, "error": None, "unit": "s", "at_least": True},
+    }
+    cells = cells_of({"status": "solved", "message": "", "results": {"travelled": mine}, "throw": throw})
+    assert cells["inside [1]"] == 1.0 and cells["inside ±"] is None
+    assert cells["closed [1]"] == 0.0 and cells["closed ±"] == 0.0
+    assert cells["covered [1]"] == 0.25 and cells["travelled [m]"] == 3.0 and cells["travelled ±"] == 0.5
+    assert cells["effective_period least"] == 2.0 and cells["effective_period most"] == np.inf
+    assert cells["statistical"] == "inside covered"
 
 
 def test_what_run_and_twin_disagree_on_is_not_known():
@@ -135,9 +158,10 @@ def test_what_run_and_twin_disagree_on_is_not_known():
 
     observables = [refweb.Observe(name="mouth", quantity="mouth_area", node=[0, 1, 2])]
     throw = Twin(area="mouth", target="one")
-    assert throw.found(observables, rows, True, (rows, False), 3.0)["inside"] == {"value": None}
-    assert throw.found(observables, rows, True, (rows, True), 3.0, rows[-1, 0])["inside"] == {"value": None}
-    assert throw.found(observables, rows, True, (rows, True), 3.0)["inside"] == {"value": True}
+    undecided = {"value": None, "drawn": True}
+    assert throw.found(observables, rows, True, (rows, False), 3.0)["inside"] == undecided
+    assert throw.found(observables, rows, True, (rows, True), 3.0, rows[-1, 0])["inside"] == undecided
+    assert throw.found(observables, rows, True, (rows, True), 3.0)["inside"] == {"value": True, "drawn": True}
     for known, told in ((0.7, True), (0.5, False)):  # the largest area is at t = π/6, between rows at 0.4 and 0.6
         found = throw.found(observables, rows, True, (rows, True), 3.0, known)
         assert (found["deployment_time"]["error"] is not None) == told == (found["largest_area"]["error"] is not None)

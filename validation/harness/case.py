@@ -73,7 +73,16 @@ CASES = {
         "free_net",
         "tumbling",
     ),
-    "missions": ("published_throw", "falling_net", "spun_tight", "spin_deployment", "capture"),
+    "missions": (
+        "published_throw",
+        "falling_net",
+        "spun_tight",
+        "spin_deployment",
+        "capture",
+        "tethered_web",
+        "capture_in_orbit",
+        "odds_of_capture",
+    ),
     "methods": ("cross_validation", "coverage", "work_precision", "price_of_modelling"),
     "hard_cases": ("hard_cases",),
 }
