@@ -26,6 +26,13 @@ all its digits, which it loses when positions are the unknowns.
                the power of each cell to ``out`` [W]
 `NEAR`         ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come nearer
                by ``skin`` [m] to ``chosen``; their number
+`MEETS`        ``(room, way, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come nearer
+               than ``room`` [m] in a drift behind a kick, in which rows come nearer by ``way`` [m] at most, with
+               ``inverse`` as in `MEET`; its rows are written to ``met``
+`WATCH`        ``(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells that are
+               looked at when their turn comes: ``due`` has the way of all drifts after which that is, behind them that
+               way itself and what it may come to with those that are ``chosen``, the last of which is their number
+`SOON`         ``(x, v, cells, data)``: time in which no cell comes much nearer [s]
 =============  ==========================================================================================
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
@@ -92,6 +99,10 @@ MEET = types.int64(
 SWEEP = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
 KEPT = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
 GIVE = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
+_drift = (_f, _f, _f, _f, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, MATRIX)
+MEETS = types.boolean(*_drift, INTEGERS)
+WATCH = types.boolean(*_drift, VECTOR, INTEGERS, INTEGERS)
+SOON = types.float64(MATRIX, MATRIX, INDICES, MATRIX)
 NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 

@@ -313,7 +313,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/simpson_book", "s - 1.5 * s**2 + s**3 / 1.5", "s - 1.5 * s**2 + s**3 / 3.0"),
     Mutant("dynamics/integrators/simpson_book", "np.bincount(self._fixed % 3,", "np.bincount(self._fixed // 3 % 3,"),
     Mutant(
-        "dynamics/integrators/explicit_loop",
+        "dynamics/integrators/rows",
         "if inertia.inverse[r, k] > 0.0:\n                p[r, k]",
         "if inertia.mass[r] > 0.0:\n                p[r, k]",
     ),

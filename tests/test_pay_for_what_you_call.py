@@ -68,9 +68,10 @@ NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.f
 NEWTON |= {"system.conjugate_gradients"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
-DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book")}
+DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
-LOOP = ("central_difference", "explicit_loop", "between_steps", "nearby", "records", "rubbed", "step", "step_bound")
+LOOP = ("central_difference", "explicit_loop", "between_steps", "rows", "step", "step_bound")
+LOOP += ("records", "rubbed", "nearby", "guard")
 EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP}
 AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
 SUNDIALS = TANGENT | {"system.mass"} | {f"dynamics.integrators.{name}" for name in ("sundials", *AROUND_STEPS)}
@@ -88,7 +89,7 @@ BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", 
 VECTORS = {"effects.vectors"}
 BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
 BELOW["contact"] |= VECTORS | {"net.rotation"}
-LINES_ON_LINES = ("", ".pair", ".passage", ".press", ".search", ".smeared")
+LINES_ON_LINES = ("", ".crossing", ".pair", ".passage", ".press", ".search", ".smeared")
 BELOW["self_contact"] = VECTORS | {f"effects.self_contact{name}" for name in LINES_ON_LINES}
 BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
 BELOW |= {"bending": VECTORS, "drag": VECTORS | {f"effects.drag{name}" for name in ("", ".force", ".kick")}}
@@ -136,6 +137,8 @@ def called(given):
         modules.add("net.csv_files")
     if "fold" in given or "positions" in given["web"]:
         modules |= {"effects.fold", "net.folding"}
+    if "self_contact" in given and method in ("cvode", "ida"):
+        modules.add("dynamics.integrators.followed_lines")
     modules |= {"system.carried"} if "attach" in given else set()
     modules |= {"results.throw"} if "throw" in given else set()
     for body in given.get("body", ()):
@@ -265,11 +268,12 @@ TABLES = {
 }
 SOLVED = ("what touches", "forces before", "sweep", "power")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "probe")
+LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "meets", "watch", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
 KERNELS |= {name: {**FAMILY, "near": 1} for name in ("contact", "self_contact")}
+KERNELS["self_contact"] |= {"meets": 1, "watch": 1}
 KERNELS["attach"] = {"motion": 1}  # to a body that is fixed
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis

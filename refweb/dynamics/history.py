@@ -50,11 +50,9 @@ def _probes_of_warnings(system, followed):
         from ..results.observables.overlap import probe_of
 
         found |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
-    if (
-        pressed := next((i for i, f in enumerate(system.families) if f.book == "self_contact_energy"), None)
-    ) is not None:
-        cells = len(system.families[pressed].cells)
-        found["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=pressed)
+    for i in (i for i, family in enumerate(system.families) if family.crossing is not None):
+        cells = len(system.families[i].cells)
+        found["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
     if pairs_of(system):
         from ..results.observables.overlap import probes_between
 

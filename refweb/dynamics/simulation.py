@@ -243,9 +243,18 @@ class Simulation:
             if self._lines is None:
                 from ..effects.self_contact.passage import Passage
 
-                self._lines = Passage(self.system, self.scene.solve.method, hasattr(course, "way"))
-            self._lines.note(deepest[0], getattr(course, "way", np.inf), course.time)
+                self._lines = Passage(self.system, self._unfollowed())
+            self._lines.note(deepest[0], course.crossings)
             self._lines.refuse(*deepest)
+
+    def _unfollowed(self):
+        """Why lines that touch lines are not followed, None where they are."""
+        method = self.scene.solve.method
+        if not getattr(self.integrator, "follows_lines", False):
+            return f"{method} does not follow lines in its steps"
+        if self.system.carried.any() and INTEGRATORS[method].knob == "safety":
+            return "nodes that turn with a body by [[attach]] do not move in straight lines"
+        return None
 
     def _note(self, course):
         """Take the state of a run over into the solution."""
@@ -307,6 +316,8 @@ class Simulation:
         yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()
+        if self._lines is not None:
+            yield from self._lines.remarks()
         if self._silent is not None:
             yield from self._silent.remarks()
         for name in self._unfilled:

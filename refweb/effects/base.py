@@ -51,6 +51,32 @@ class Rubbing(NamedTuple):
     memory: int
 
 
+class Crossing(NamedTuple):
+    """What tells whether cells of a family, each of two lines, can have passed through themselves.
+
+    Attributes
+    ----------
+    meets, watch, soon : kernel
+        Whether lines of a cell meet in a drift, the same for the neighbours, and for how long none can; signatures are
+        in `refweb.kernels`.
+    touch : float
+        Distance at which lines touch [m].
+    stiffness : float
+        k of their push [N/m].
+    rows, data, elements : ndarray
+        Rows, numbers and elements of neighbours: pairs of lines that do not push each other.
+    """
+
+    meets: Callable
+    watch: Callable
+    soon: Callable
+    touch: float
+    stiffness: float
+    rows: np.ndarray
+    data: np.ndarray
+    elements: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class Family:
     """Cells of one kind with their kernels, whose signatures are in `refweb.kernels`.
@@ -104,6 +130,8 @@ class Family:
         where cells are what acts.
     rubbing : Rubbing, optional
         How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
+    crossing : Crossing, optional
+        What tells whether lines have passed through lines, where those of its cells push each other.
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
     impulse : kernel, optional
@@ -144,6 +172,7 @@ class Family:
     near: Callable | None = None
     finder: Callable | None = None
     rubbing: Rubbing | None = None
+    crossing: Crossing | None = None
     internal: bool = False
     impulse: Callable | None = None
     moment_free: bool = False

@@ -110,8 +110,7 @@ def on_run(summary):
         yield "contact", f"{text} m, stiffness {lines['stiffness']:.3g}"
     for name, shown in summary.get("passage", {}).items():
         text = "nothing can have passed: certified" if shown == "certified" else shown
-        but = ", but for neighbours along the net" if name == "lines" and shown == "certified" else ""
-        yield "passage", f"{name}: {text}{but}"
+        yield "passage", f"{name}: {text}"
     if (breaks := summary.get("breaks")) is not None:
         yield from _breaks(breaks)
     if worst := summary.get("utilisation"):

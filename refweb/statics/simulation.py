@@ -14,6 +14,8 @@ from ..results.solution import SOLVER, Result
 from ..results.state import State
 from .remarks import Remarks, open_rows, remarks_on
 
+UNFOLLOWED = "what moves between load steps is not followed"
+
 
 class Simulation:
     """Follows the load steps of a static scene.
@@ -72,6 +74,8 @@ class Simulation:
         yield from self.system.remarks()
         if self._passage is not None and self.rows:
             yield from self._passage.overlaps.remarks()
+        if "lines" in self.solution.passage:
+            yield f"lines may have passed through lines: {UNFOLLOWED}"
 
     def _smoothing(self):
         """What finds the error of smoothing, None where there is none to be found."""
@@ -92,11 +96,8 @@ class Simulation:
             self._passage.note(state)
             solution.bodies = self._passage.overlaps.plain()
             self._passage.overlaps.refuse()
-        if any(family.book == "self_contact_energy" for family in self.system.families):
-            solution.passage = {
-                **solution.passage,
-                "lines": "not certified: what moves between load steps is not followed",
-            }
+        if any(family.crossing is not None for family in self.system.families):
+            solution.passage = {**solution.passage, "lines": f"not certified: {UNFOLLOWED}"}
         results = self._results(found, state, smoothing)
         row = [found.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():

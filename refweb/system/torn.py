@@ -72,15 +72,22 @@ def _severed(family, broken, numbers):
         return replace(family, data=numbers)
     if family.elements is None or family.sever is None:
         return family
-    ends = broken[family.elements]
+    left = replace(family, data=_without(family, family.data, broken[family.elements]))
+    if family.crossing is None:
+        return left
+    beside = _without(family, family.crossing.data, broken[family.crossing.elements])
+    return replace(left, crossing=family.crossing._replace(data=beside))
+
+
+def _without(family, data, ends):
+    """Numbers of cells that do nothing where an element of theirs ``ends``."""
     ends = ends if ends.ndim == 1 else ends.any(axis=1)
     if not ends.any():
-        return family
-    data = family.data.copy()
-    own = data[ends]
+        return data
+    data, own = data.copy(), data[ends]
     family.sever(own)
     data[ends] = own
-    return replace(family, data=data)
+    return data
 
 
 def tear(system, t, x, v, elements):

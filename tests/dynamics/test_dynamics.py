@@ -23,6 +23,7 @@ from refweb.dynamics.history import SPREAD, Watch
 from refweb.dynamics.integrators import central_difference
 from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
 from refweb.dynamics.integrators.integrator import History
+from refweb.errors import SolverError
 from refweb.results.state import State
 
 MODULUS, AREA, DENSITY = 7e7, 1e-4, 200.0
@@ -939,3 +940,25 @@ def test_histories_do_not_depend_on_the_clock(monkeypatch):
     some.values[:] = np.random.default_rng(0).normal(size=some.values.shape)
     for first, last in ((0, 1), (1, 4), (4, 100)):
         np.testing.assert_array_equal(watch.table(some[first:last]), watch.table(some)[first:last])
+
+
+def test_a_drift_is_laid_to_what_leaves_energy_open(monkeypatch):
+    """A ball hits line 1 in some five steps, while line 0, far away and soft, takes up ten times that energy."""
+    monkeypatch.setattr(central_difference, "DRIFT", 1e-9)
+    web = refweb.Inline(
+        points=[(0, 9, 0), (1, 9, 0), (-0.5, 0, 0), (0, 0, 0), (0.5, 0, 0)],
+        lines=[(0, 1), (2, 3), (3, 4)],
+        supports=[0, 2, 3, 4],
+    )
+    cable = refweb.Cable(law="tension-only", modulus=1e7, area=1e-6, density=1e5)
+    ball = refweb.Body(name="ball", radius=0.1, mass=0.01, position=(-0.2, 0, 0.1005), velocity=(0, 0, -1.0))
+    scene = refweb.Scene(
+        web=web,
+        cable=cable,
+        effects=[ball, refweb.Contact(stiffness=1e3), refweb.Velocity(node=1, value=(15.0, 0, 0))],
+        solve=refweb.Dynamic(duration=8e-3),
+        output=refweb.Output(interval=8e-3),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    with pytest.raises(SolverError, match=r"energy came in with contact at line 1; use a smaller safety"):
+        refweb.run(scene, progress=False)

@@ -17,13 +17,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import InputError, NoEnd, OpenBook
+from ...errors import InputError, NoEnd, OpenBook, SolverError
 from .averages import begin_averages
 from .between_steps import LOOKS
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
-from .explicit_loop import BREATH, advance_rows, begin, take_steps
+from .explicit_loop import BREATH, HELD, advance_rows, begin, take_steps
 from .extremes import Extremes
+from .guard import look_anew
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
 from .nearby import look_at_all
@@ -32,7 +33,7 @@ from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
-SHARED = tuple(CLOCK.names or ())[:-4]
+SHARED = tuple(CLOCK.names or ())[: (CLOCK.names or ()).index("least")]
 """Numbers that a course and the loop's clock have in common."""
 
 
@@ -91,7 +92,7 @@ class CentralDifference(Integrator):
     """
 
     method, order, stretch = "central-difference", 2, 1.0
-    knob, retry, beside = "safety", 0.5, True
+    knob, retry, beside, follows_lines = "safety", 0.5, True, True
     breathe = staticmethod(lambda t: None)
     variants = {"central-difference": Variant(kind="splitting")}
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
@@ -242,7 +243,7 @@ class CentralDifference(Integrator):
         clock["least"] = self._least
         changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
-        carried = course.power, np.zeros((2, changing))
+        carried = course.power, np.zeros((2, changing)), course.crossings
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
     def advance(self, course: ExplicitCourse, times):
@@ -257,10 +258,13 @@ class CentralDifference(Integrator):
         done, breath = 0, max(BREATH // max(work, 1), 1)
         records = self._scheme, self._model, self._observed, self._running(course)
         clock = records[-1].clock
+        look_anew(self._model.guard)
         try:
             while True:
                 more = advance_rows(times[done:], breath, DRIFT, *records, history.values[done:])
                 now = clock[0]
+                if more == HELD:
+                    self._refuse_passing(course, now)
                 if more < 0:
                     raise NoEnd(
                         f"the step at t = {now['time']:.6g} s is {now['step']:.3g} s, more than {MAX_STEPS_PER_ROW:g} "
@@ -288,23 +292,29 @@ class CentralDifference(Integrator):
             since = float(clock[0]["since"])
             if not np.isfinite(history.values[done]).all():
                 self._name_blow_up(course, since, records[-1])
-            self._name_drift(course, since)
+            self._name_drift(course, since, records[-1])
         return history
 
-    def _name_blow_up(self, course, before, running):
-        """Take the steps from ``before`` [s] again and name the first number that is not finite."""
-        net, planned = self.system.net, int(running.clock[0]["planned"])
+    def _again(self, course, before, running):
+        """What takes steps from ``before`` [s] again: ``after(state, begun, count)``.
+
+        That is the state (3, rows, 3) which is ``count`` steps behind one that ``begun`` steps have led to.
+        """
         running.clock["time"], total = before, np.zeros(running.work.size + 2)
         model = self._model._replace(nearby=self._model.nearby.without())  # its lists hold for steps in a row
 
         def after(state, begun, count):
-            """The state ``count`` steps behind one that ``begun`` steps have led to."""
             state, running.clock["begun"] = state.copy(), begun
             copy = running._replace(x=state[0], v=state[1], f=state[2], events=course.events[:0])
             changing = self._model.reels.lengths.size > 0
             take_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, total)
             return state
 
+        return after
+
+    def _name_blow_up(self, course, before, running):
+        """Take the steps from ``before`` [s] again and name the first number that is not finite."""
+        net, planned, after = self.system.net, int(running.clock[0]["planned"]), self._again(course, before, running)
         sound, done, ahead = course.before.copy(), 0, planned
         if np.isfinite(after(sound, 0, planned)).all():
             raise NoEnd(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
@@ -323,24 +333,29 @@ class CentralDifference(Integrator):
         t = before + (done + 1) * course.step
         raise NoEnd(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
-    def _name_drift(self, course, before):
-        """Say where energy came in: the effect and cell whose energy grew most from ``before`` [s] on."""
-        system, most, of, cell = self.system, -np.inf, self.system.families[0], 0
-        for family in system.families:
-            if family.energy is not None and family.book != "work":
-                now = system.energy_of(family, course.time, course.x)
-                change = now - system.energy_of(family, before, course.before[0])
-                if change.max(initial=-np.inf) > most:
-                    most, of, cell = change.max(), family, int(change.argmax())
-        if of.pairs:
-            place = " and ".join(f'body "{body.name}"' for body in of.pairs[cell])
-        elif of.cells.shape[1] > 1:
-            place = f"line {system.net.line[np.isin(system.net.cells, of.cells[cell]).sum(axis=1).argmax()]}"
-        else:
-            place = self.system.row_name(of.cells[cell, 0])
+    def _refuse_passing(self, course, now):
+        """Say which lines would pass through each other in any step that is not far below the stable one."""
+        from ...effects.self_contact.passage import would_pass
+
+        told = would_pass(self.system, course.v, self._model.guard.met)
+        at = now["time"] + now["begun"] * now["step"]
+        raise SolverError(
+            f"at t = {at:.6g} s, in a step of {now['cut']:.3g} s where {now['stable']:.3g} is stable, {told}"
+        )
+
+    def _name_drift(self, course, before, running):
+        """Say where energy came in, by the steps from ``before`` [s] on."""
+        from .drift_source import name_of, source_of
+
+        system, after, state = self.system, self._again(course, before, running), course.before.copy()
+        places = [(before, state[0])]
+        for n in range(round((course.time - before) / course.step) if course.step > 0.0 else 0):
+            state = after(state, n, 1)
+            places.append((before + (n + 1) * course.step, state[0]))
+        of, cell = source_of(system, places)
         raise OpenBook(
             f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and {course.time:.6g} s, "
-            f"limit {DRIFT:g}: energy came in with {of.name} at {place}; {self._remedy}",
+            f"limit {DRIFT:g}: energy came in with {of.name} at {name_of(system, of, cell)}; {self._remedy}",
             course.drift,
         )
 

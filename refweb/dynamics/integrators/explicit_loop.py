@@ -15,7 +15,7 @@ import numpy as np
 from ...kernels import copy_rows, kernel
 from ...net.rotation import hand_on, sizes
 from ...results.probes import PLACE
-from .averages import average, look_for_means, write_means
+from .averages import average, look_for_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
 from .energy_book import (
     begin_powers,
@@ -26,13 +26,14 @@ from .energy_book import (
     book_powers,
     drifts_away,
     note_motion,
-    own_energy,
 )
 from .events import ended_by, note_events
 from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
+from .guard import LEAST, SHORTER, comes_through
 from .integrator import MAX_STEPS_PER_ROW, SAME
-from .momentum_book import add_half_steps, note_momentum, push_on, set_push
+from .momentum_book import add_half_steps, push_on, set_push
 from .nearby import bits_of, covers, exchange, follow_near, reach_all, show_near, spread_of
+from .rows import energies_now, write_row
 from .step import (
     add_forces,
     give_impulse,
@@ -51,6 +52,8 @@ from .step import (
 )
 from .step_bound import safe_step
 
+HELD = -2
+"""What the loop returns where lines would pass through lines whatever the step."""
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
 
@@ -72,6 +75,8 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         give_impulse(kick, reaction, running.impulse)
         give_impulse(kick, push, running.ledger.pushed)
         book_potential(1.0, kicked, x, families, running.work)
+        if model.guard.families.size:
+            comes_through(now - h, kick, drift, False, model, running)
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
@@ -134,15 +139,14 @@ def change_lengths(t, x, reels, was, lines, length_force, work):
 
 @kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
-    """``count`` steps of size h, behind those that are taken of the row; where ``changing`` natural lengths change.
+    """Take ``count`` steps of size h behind those taken of the row, and return how many; the first is looked at inside.
 
-    It returns the steps taken: fewer where an event ends the run. The first one, and longer ones, are looked at inside.
-    """
+    They are fewer where an event ends the run, or lines would pass. Natural lengths may be ``changing``."""
     clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
-    x, v, f, work, impulse = running.x, running.v, running.f, running.work, running.impulse
+    x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    power, length_force, moved = running.power, running.length_force, driven.size > 0
+    guarded, pushing, length_force = model.guard.families.size, model.outside.pushing.size > 0, running.length_force
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
@@ -151,15 +155,14 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
-    pushing, push, pushed = model.outside.pushing.size > 0, np.zeros(3), running.ledger.pushed
+    awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
     extra = np.zeros((rows if powers.shape[0] + viscous.size + rubbing.size or pushing else 0, 3))
     half, was = np.empty_like(extra), np.empty(reels.lengths.size if changing else 0)
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
-    awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
-    nearby, bits = model.nearby, bits_of(flat_v, model, stages > 0)
-    inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if moved else 0, 3))
+    push, pushed, nearby, bits = np.zeros(3), running.ledger.pushed, model.nearby, bits_of(flat_v, model, stages > 0)
+    inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if driven.size else 0, 3))
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -167,6 +170,8 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_state(x, v, f, inverse, inside.before)
         if stages:
             inner_stages(now, h, scheme, model, running, reaction, push, extra)
+        if guarded and comes_through(now - h, kicks[stages], drifts[stages], stages == 0, model, running):
+            return step - 1
         note_motion(driven, mass, x, v, f, before)
         move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, model.inertia.turns)
         if stages:
@@ -249,50 +254,6 @@ def steps_until(end, changing, scheme, model, running):
 
 
 @kernel()
-def energies_now(model, running, total):
-    """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
-    clock, families = running.clock[0], model.families
-    book_energies(
-        clock.time, running.x, running.v, model.inertia.mass, model.inertia.turns, families.cells, families.data,
-        families.energies, families.stored, running.work, families.working, total,
-    )  # fmt: skip
-    stored = 0.0
-    for i in range(total.size - 2):
-        if i >= families.working.size or families.working[i] <= 0:
-            stored += abs(total[i])
-    return own_energy(total, families.working), stored
-
-
-@kernel()
-def write_row(row, model, observed, running, total):
-    """Write time, probes, energies, work, step size, momentum and impulses; hold momentum against these.
-
-    Returns the energy, and the sum of all energies without regard to sign [J].
-    """
-    clock, families, inertia, v = running.clock[0], model.families, model.inertia, running.v
-    where, at = np.zeros(2, dtype=np.int64), 1
-    row[0] = clock.time
-    for i in range(len(observed.probes)):
-        row[at] = observed.probes[i](
-            clock.time, running.x, v, running.f, families.outs[0], observed.rows[i], observed.data[i], where
-        )  # fmt: skip
-        at += 1
-    write_means(row, observed.windows, running.averages, running.extremes)
-    energy, stored = energies_now(model, running, total)
-    total[-1] = clock.step
-    for i in range(total.size):
-        row[at] = total[i]
-        at += 1
-    p = np.zeros_like(v)
-    for r in range(v.shape[0]):
-        for k in range(3):
-            if inertia.inverse[r, k] > 0.0:
-                p[r, k] = inertia.mass[r] * v[r, k]
-    note_momentum(clock.time, running.x, p, running.impulse, model.outside, running.ledger, 0.0, row[at:])
-    return energy, stored
-
-
-@kernel()
 def plan(end, changing, scheme, model, running):
     """Begin the way to ``end``: note the state there, and plan its steps; whether they are few enough."""
     clock, before, span = running.clock[0], running.before, end - running.clock[0].time
@@ -300,6 +261,9 @@ def plan(end, changing, scheme, model, running):
     copy_rows(running.v, before[1])
     copy_rows(running.f, before[2])
     steps = steps_until(end, changing, scheme, model, running)
+    clock.stable = span / steps if steps > 0.0 else span
+    if clock.cut > 0.0:
+        steps = max(steps, span / clock.cut)
     if steps > MAX_STEPS_PER_ROW:
         clock.step = span / steps
         return False
@@ -332,7 +296,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
     and does not fall; then ``before`` holds x, v and f at the last corner or row before, of the time ``since``; −1
     where it takes more than `MAX_STEPS_PER_ROW` steps from there. Where an event ends the run, that row is the last,
     and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is felt, and goes
-    on in that row.
+    on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.guard`.
     """
     clock, events, reels, left = running.clock[0], running.events, model.reels, breath
     total, stopped = np.zeros(running.work.size + 2), ended_by(events)
@@ -355,8 +319,14 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
-            if clock.begun < clock.planned and not stopped:
+            if clock.held:
+                clock.held, clock.cut = 0, SHORTER * clock.step
+                if clock.cut < LEAST * clock.stable:
+                    return HELD
+            elif clock.begun < clock.planned and not stopped:
                 return n
+            else:
+                clock.cut = 0.0
             clock.time = end if clock.begun == clock.planned else clock.time + clock.begun * clock.step
             clock.begun = 0
             if halved > 0.0:

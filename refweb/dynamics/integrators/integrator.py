@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 import numpy as np
 
 from .averages import Averages
+from .crossings import none_met
 from .events import ended_by
 from .extremes import Extremes
 from .momentum_book import Ledger
@@ -87,6 +88,9 @@ class Course:
         Largest |ΔE − work| of the rows [J].
     share : float
         |ΔE − work| at the last row over ``largest`` there [1], infinite before the first.
+    crossings : ndarray, shape (2, 5)
+        Where lines may touch lines, the first two that may have passed through each other, and the first two neighbours
+        along the net: time [s], infinite where there are none, and the four nodes of both.
     breaks : refweb.system.torn.Breaks, optional
         What has broken, where anything may.
     """
@@ -106,6 +110,7 @@ class Course:
     largest: float = 0.0
     worst: float = 0.0
     share: float = np.inf
+    crossings: np.ndarray = field(default_factory=none_met)
     breaks: Breaks | None = field(default=None, metadata={"saved": False})
 
     @property
@@ -265,7 +270,8 @@ class Integrator(Protocol):
 
     Notes
     -----
-    What it has to say besides, it may: ``takes_links = True`` where it holds the lengths of ``[[link]]``; ``variants``,
+    What it has to say besides, it may: ``takes_links = True`` where it holds the lengths of ``[[link]]``;
+    ``follows_lines = True`` where it notes in the course which lines may have passed through each other; ``variants``,
     a dict of `Variant` s by name, where ``refweb cost`` is to compare several of them or in other settings;
     ``tolerances``, a dict of absolute ones by unit, "m" and "m/s", of which ± is no less than a multiple; and where
     that is known before a run, a method ``evaluations(duration)``, how many evaluations of forces a time [s] takes, and

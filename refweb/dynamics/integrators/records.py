@@ -18,6 +18,7 @@ from ...results.probes import PROBE, plain_of
 from .averages import Averages, Windows
 from .energy_book import no_energy
 from .extremes import Extremes
+from .guard import Guard
 from .momentum_book import Ledger, Outside
 from .nearby import Nearby, near_of
 from .rubbed import Rubbed
@@ -36,11 +37,15 @@ CLOCK = np.dtype(
         ("since", float),
         ("begun", np.int64),
         ("planned", np.int64),
+        ("stable", float),
+        ("cut", float),
+        ("held", np.int64),
     ]
 )
 """Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.Course` by their names, then the
 energy that a drift is held against at least, the time from which steps are equal, how many of these are taken, 0 where
-none are, and how many they are."""
+none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not pass, 0
+where it is not, and whether it is to be cut."""
 
 
 @record
@@ -251,13 +256,16 @@ class Model(NamedTuple):
     corners: np.ndarray
     outside: Outside
     nearby: Nearby
+    guard: Guard
 
     @classmethod
     def of(cls, system, outs):
         """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
         inertia, families, rubbed = Inertia.of(system), Families.of(system, outs), Rubbed.of(system)
         motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
-        return cls(inertia, families, rubbed, motions, reels, system.corners, outside, Nearby.of(system))
+        return cls(
+            inertia, families, rubbed, motions, reels, system.corners, outside, Nearby.of(system), Guard.of(system)
+        )
 
 
 @record
@@ -344,6 +352,8 @@ class Running(NamedTuple):
         Power of each family at the last step [W].
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
+    crossings : ndarray, shape (2, 5)
+        Lines that have met, see `refweb.dynamics.integrators.integrator.Course`.
     """
 
     clock: np.ndarray
@@ -359,3 +369,4 @@ class Running(NamedTuple):
     averages: Averages
     power: np.ndarray
     length_force: np.ndarray
+    crossings: np.ndarray

@@ -1,4 +1,4 @@
-"""How far a step may go: to the next corner of a table, and not so far that a body passes through something."""
+"""How far a step may go: to the next corner of a table, and not so far that bodies or lines pass through something."""
 
 from __future__ import annotations
 
@@ -23,9 +23,19 @@ class StepLimits:
         Its tables of time, and its bodies.
     rotations : refweb.dynamics.integrators.rotations.Rotations, optional
         Bodies that turn.
+
+    Attributes
+    ----------
+    lines : refweb.dynamics.integrators.followed_lines.FollowedLines, optional
+        Lines that touch lines, where any do.
     """
 
     def __init__(self, system, rotations=None):
+        self.lines = None
+        if any(family.crossing is not None for family in system.families):
+            from .followed_lines import FollowedLines
+
+            self.lines = FollowedLines(system)
         self._rotations = rotations
         self._net, self._moving = system.net, system.rows - system.net.spins
         self._corners = system.corners
@@ -51,6 +61,8 @@ class StepLimits:
                 speed = max(speed, self._rotations.speed(v))
             speed, way = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
             stop = min(stop, t + way / speed) if speed > 0.0 else stop
+        if self.lines is not None:
+            stop = min(stop, t + self.lines.soon(x, v))
         return t + SAME * end if stop - t < SAME * end else stop
 
 

@@ -90,7 +90,7 @@ class StepObserver(Integrator):
     """
 
     method, order = "", 2
-    knob, retry, beside = "rtol", 0.1, False
+    knob, retry, beside, follows_lines = "rtol", 0.1, False, True
     breathe = staticmethod(lambda t: None)
     course_type = ObservedCourse
     _made_of: tuple
@@ -340,6 +340,8 @@ class StepObserver(Integrator):
             if stop < end:
                 piece = self._piece(course, stop)
         self._look(course, piece)
+        if self._limits.lines is not None:
+            self._limits.lines.look(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
         course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind
@@ -392,7 +394,6 @@ class StepObserver(Integrator):
             row = int(np.argmax(np.linalg.norm(force, axis=1)))
             raise NoEnd(
                 f"{self.method} stopped at t = {course.reached:.6g} s with steps of {course.step:.3g} s: "
-                f"{str(stop).rstrip('.')}; "
-                f"the largest force that moves anything is at {system.row_name(row)}: raise rtol = {self.rtol:g}, "
-                "or lower the stiffness that asks for such steps"
+                f"{str(stop).rstrip('.')}; the largest force that moves anything is at {system.row_name(row)}: raise "
+                f"rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
             ) from None

@@ -1,10 +1,13 @@
 """Whether lines can have passed through lines, and which stiffness would hold them.
 
-Between two explicit steps nodes move in straight lines. Two centre lines that meet on the way are, at the end of the
-step, no further apart than their ways: so nothing has passed in a step at whose end every distance is above the way
-that two rows may have come towards each other in it. Elements that show no overlap are at least 2r apart. So nothing
-can have passed in a run whose deepest overlap and longest way together are less than 2r; both are those of all steps.
-Elements that do not touch, since they are neighbours along the net, are no part of it.
+Lines pass where their centre lines meet. Methods follow the motion of every pair, see
+`refweb.effects.self_contact.crossing`: explicit ones before each drift, in which nodes move in straight lines, and
+those of steps of their own on their interpolants. So it is certain that nothing has passed where no two have met from
+the start of a run on. How the web came from its own position to that start is no part of it.
+
+Two elements that share a node do not push each other, nor do those within two radii of each other along the net. They
+are followed as well: the first two that fold flat onto each other, or meet, are told. What hangs on them cannot have
+passed unseen, for that is met itself.
 
 An overlap above r is refused: from there on the push falls.
 """
@@ -13,19 +16,50 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ...errors import SolverError
-from .pair import SCALE, TOUCH
 
 AIM = 0.8
 """Overlap that a stiffness is named for, over the radius."""
 POWER = 2.5
 """Power of an overlap that the energy of lines that cross goes with."""
+HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
+"""Energy of lines that cross and overlap by `AIM` of the radius, over k r²."""
+APART, BESIDE = 0, 1
+"""Rows of what has met: lines that push each other, and neighbours along the net."""
 
 
 def pressed(system):
     """Number of the family of lines against lines of a system, None where there is none."""
-    found = (i for i, family in enumerate(system.families) if family.book == "self_contact_energy")
+    found = (i for i, family in enumerate(system.families) if family.crossing is not None)
     return next(found, None)
+
+
+def lines_of(net, nodes):
+    """ "lines 1 and 2", those of two elements by the nodes of both, shape (4,)."""
+    found = [net.line[np.isin(net.cells, pair).all(axis=1).argmax()] for pair in np.reshape(nodes, (2, 2))]
+    return f"lines {found[0]} and {found[1]}"
+
+
+def would_pass(system, v, nodes):
+    """That two lines would pass, and which stiffness would hold them; ``nodes (4,)`` are those of both.
+
+    It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v.
+    """
+    held, pairs = system.supported.all(axis=1), np.reshape(nodes, (2, 2))
+    crossing = system.families[pressed(system)].crossing
+    given = f"{lines_of(system.net, nodes)} would pass through each other"
+    heavy = [np.inf if held[pair].all() else system.net.mass[pair[~held[pair]]].sum() for pair in pairs]
+    mass = 1.0 / (1.0 / heavy[0] + 1.0 / heavy[1]) if np.isfinite(heavy).any() else np.inf
+    speed = max(float(np.linalg.norm(v[i] - v[k])) for i in pairs[0] for k in pairs[1])
+    if np.isinf(mass):
+        return f"{given}: the motion of both is prescribed, and no stiffness of [self_contact] holds them"
+    enough = max(0.5 * mass * speed**2 / (HELD * (0.5 * crossing.touch) ** 2), 2.0 * crossing.stiffness)
+    return (
+        f"{given}: [self_contact] stiffness = {float(f'{enough:.2g}'):g} would hold what comes at {speed:.3g} m/s, in "
+        f"place of {crossing.stiffness:.3g}"
+    )
 
 
 class Passage:
@@ -35,25 +69,19 @@ class Passage:
     ----------
     system : refweb.system.system.System
         With a family of lines against lines.
-    method : str
-        What solves it.
-    followed : bool
-        Whether the ways of all steps are known.
+    unfollowed : str, optional
+        What does not follow them, and why; None where they are followed.
     """
 
-    def __init__(self, system, method, followed):
-        self._system, self._method, self._followed = system, method, followed
+    def __init__(self, system, unfollowed=None):
+        self._system, self._unfollowed = system, unfollowed
         family = system.families[pressed(system)]
-        self.touch, self._elements = float(family.data[0, TOUCH]), family.elements
-        self._stiffness = float(family.data[:, SCALE].max()) * math.sqrt(12.0) * self.touch**3
-        self._since: float | None = None
-        self._deepest = 0.0
+        self.touch, self._stiffness, self._elements = family.crossing.touch, family.crossing.stiffness, family.elements
+        self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
 
-    def note(self, overlap, way, time):
-        """Note the deepest overlap and the longest way of a step [m] until a time [s]."""
-        self._deepest = max(self._deepest, overlap)
-        if self._since is None and not overlap + way < self.touch:
-            self._since = time
+    def note(self, overlap, crossings):
+        """Note the deepest overlap [m], and what has met so far, see `Course.crossings`."""
+        self._deepest, self._crossings = max(self._deepest, overlap), crossings
 
     def plain(self):
         """Overlap, radius and stiffness as ``run.json`` has them."""
@@ -61,11 +89,25 @@ class Passage:
 
     def told(self):
         """Whether nothing can have passed, as ``run.json`` has it."""
-        if not self._followed:
-            return f"not certified: {self._method} does not follow what moves between its steps"
-        if self._since is None:
-            return "certified"
-        return f"not certified at t = {self._since:.6g} s: overlap and way of a step are not below {self.touch:g} m"
+        if self._unfollowed is not None:
+            return f"not certified: {self._unfollowed}"
+        (time, *nodes), (folded, *beside) = self._crossings
+        if np.isfinite(time):
+            return f"not certified: {self._lines(nodes)} may have passed through each other at t = {time:.6g} s"
+        if np.isfinite(folded):
+            return (
+                f"certified but for neighbours along the net: {self._lines(beside)} came to lie on each other at "
+                f"t = {folded:.6g} s"
+            )
+        return "certified"
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        if (told := self.told()) != "certified":
+            yield f"lines may have passed through lines, {told}"
+
+    def _lines(self, nodes):
+        return lines_of(self._system.net, np.asarray(nodes, dtype=np.int64))
 
     def refuse(self, overlap, time, cell):
         """Refuse an overlap above the radius [m] of a cell, at a time [s]; `SolverError`."""

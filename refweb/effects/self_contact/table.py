@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from ...tables import Table, real, table
-from ..base import Family, without
+from ..base import Crossing, Family, without
 from .pair import APART, DAMPING, ENDS, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
 from .search import found, near, paired
@@ -28,8 +28,13 @@ class SelfContact(Table):
     Lines are round, and touch where their centre lines are less than two radii apart. Two elements push each other over
     the length on which they do, as a smooth function of their four nodes whatever their angle, see
     `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³), which is k r
-    at half the distance of touch, where it is largest: what is pushed harder passes. Elements that share a node do not
-    touch, nor do those that are within two radii of each other along the net.
+    at half the distance of touch, where it is largest: what is pushed harder would pass, and is refused. Elements that
+    share a node do not push each other, nor do those that are within two radii of each other along the net.
+
+    Every pair of lines is followed from the start of a run on, and ``passage`` of ``run.json`` says "certified" where
+    no two centre lines have met: before each drift of an explicit step, which is cut where two would meet, and in steps
+    of cvode and ida on their interpolants. Neighbours that come to lie on each other are named there with the time, for
+    nothing keeps them apart. Load steps of statics are not followed. What is not certified is a warning as well.
 
     Explicit methods find pairs as they come near. Statics, cvode and ida take all pairs of a small web as one list.
 
@@ -71,7 +76,7 @@ class SelfContact(Table):
                 f"radius = {self.radius:g} needs [cable] order = 1, not {net.order}: lines touch as straight elements; "
                 f"use subdivide = {net.order * net.subdivide}, which has the same nodes"
             )
-        from . import press
+        from . import crossing, press
 
         cells, data = self._elements(net)
         self._refuse_overlap(net, cells, data)
@@ -89,9 +94,12 @@ class SelfContact(Table):
                 )
             common |= dict(cells=cells, data=data, elements=np.arange(len(cells)), near=None, finder=found)
             all_listed = False
+        beside = crossing.neighbours(net, data[:, APART:], 2.0 * self.radius)
+        kernels = crossing.meets, crossing.watch, crossing.soon
+        follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)
         push = Family(
-            name="self_contact", force=press.force, energy=press.energy, bound=press.bound, observed=1,
-            stiffness=press.stiffness if all_listed else None, book="self_contact_energy", **common,
+            crossing=follows, name="self_contact", force=press.force, energy=press.energy, bound=press.bound,
+            stiffness=press.stiffness if all_listed else None, book="self_contact_energy", observed=1, **common,
         )  # fmt: skip
         if self.damping == 0.0:
             return push

@@ -16,7 +16,8 @@ class TotalAngularMomentum(Nodal):
     """Σ m (r − r_c) × (v − v_c), and what bodies turn with, r_c and v_c being those of the centre of mass of all.
 
     That is of web and free bodies together, with ``node`` or ``body`` the part of these: ``node = "all"`` that of the
-    web. What nothing acts on from outside keeps the whole.
+    web. Supported nodes count with their masses, at rest or as they are moved, while fixed bodies do not. What nothing
+    acts on from outside, no support among it, keeps the whole.
     """
 
     unit = "N m s"

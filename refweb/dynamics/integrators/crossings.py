@@ -1,0 +1,26 @@
+"""The first lines of a run that may have passed through each other: when, and which."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import kernel
+
+APART, BESIDE = 0, 1
+"""Rows of what has met: lines that push each other, and neighbours along the net."""
+
+
+def none_met():
+    """Nothing has met: times [s] and four nodes each, shape (2, 5)."""
+    return np.tile([np.inf, -1.0, -1.0, -1.0, -1.0], (2, 1))
+
+
+@kernel()
+def note_met(which, time, met, crossings):
+    """Note the first two lines that have met."""
+    if not crossings[which, 0] < math.inf:
+        crossings[which, 0] = time
+        for n in range(4):
+            crossings[which, 1 + n] = met[n]

@@ -1,0 +1,55 @@
+"""Where the energy of an explicit step does not close: the cell whose energy changes by other than its forces' work.
+
+A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, but for
+what two steps in turn give back. So what a cell leaves open in a step is ΔE + ½ (f₀ + f₁)·Δx, with f = −∂E/∂x its own
+forces. A cell that gains energy because others pull at it leaves nothing open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+SHARE = 1e-3
+"""Part of a drift over which an energy is differentiated, to the square of this."""
+MOST = 3e7
+"""Largest number of cells times steps that are looked at: the last ones of a row."""
+
+
+def source_of(system, places):
+    """(family, number of its cell) that leaves most energy open.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    places : list of (float, ndarray of shape (rows, 3))
+        Time [s] and displacement [m] at the ends of steps in turn.
+    """
+    families = [f for f in system.families if f.energy is not None and f.book != "work"]
+    cells = sum(len(family.cells) for family in families)
+    steps = list(zip(places, places[1:], strict=False))[-max(int(MOST / max(cells, 1)), 1) :]
+    most, source = -1.0, (system.families[0], 0)
+    for family in families:
+        left = np.zeros(len(family.cells))
+        for (t0, x0), (t1, x1) in steps:
+            way = SHARE * (x1 - x0)
+            left += system.energy_of(family, t1, x1) - system.energy_of(family, t0, x0)
+            for t, x in ((t0, x0), (t1, x1)):
+                rise = system.energy_of(family, t, x + way) - system.energy_of(family, t, x - way)
+                left -= 0.25 / SHARE * rise
+        if len(left) and np.abs(left).max() > most:
+            cell = int(np.abs(left).argmax())
+            most, source = abs(left[cell]), (family, cell)
+    return source
+
+
+def name_of(system, family, cell):
+    """What a cell of a family is of."""
+    if family.pairs:
+        return " and ".join(f'body "{body.name}"' for body in family.pairs[cell])
+    if family.lines or family.elements is not None:
+        lines = system.net.line[np.atleast_1d(cell if family.lines else family.elements[cell])].tolist()
+        return f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} and {lines[1]}"
+    if family.cells.shape[1] > 1:
+        return f"line {system.net.line[np.isin(system.net.cells, family.cells[cell]).sum(axis=1).argmax()]}"
+    return system.row_name(family.cells[cell, 0])

@@ -1,0 +1,78 @@
+"""Whether lines have met in a step of any method, on its interpolant.
+
+A piece of a step is known at its start, in its middle and at its end. From each to the next rows are taken to move in
+straight lines, and lines that come nearer than these leave open are not sure not to meet: two rows by as much as they
+are off the straight way from start to end in the middle. A parabola leaves half of that open. Where lines come so near,
+the piece is halved, up to `HALVINGS` times.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .crossings import APART, BESIDE, note_met
+
+HALVINGS = 10
+"""Largest number of times that a piece is halved where it is not certain that nothing meets."""
+
+
+class Place(NamedTuple):
+    """Where all rows are: time [s], and displacement [m], shape (rows, 3)."""
+
+    time: float
+    x: np.ndarray
+
+
+class FollowedLines:
+    """Follows lines that push each other, and their neighbours along the net.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    """
+
+    def __init__(self, system):
+        self._families = [family for family in system.families if family.crossing is not None]
+        self._nodes = system.net.nodes
+        self._still, self._met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
+
+    def soon(self, x, v):
+        """Time in which no line comes through another from displacement x and velocity v [s]."""
+        return min((f.crossing.soon(x, v, f.cells, f.data) for f in self._families), default=np.inf)
+
+    def look(self, course, piece, at):
+        """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
+        begin, crossings = Place(course.time, course.x), course.crossings
+        middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
+        for family in self._families:
+            own, beside = family.crossing, (family.crossing.rows, family.crossing.data)
+            for which, cells in ((APART, (family.cells, family.data)), (BESIDE, beside)):
+                if not np.isfinite(crossings[which, 0]):
+                    time = self._meeting(own.meets, cells, begin, middle, end, at, HALVINGS)
+                    if time is not None:
+                        note_met(which, time, self._met, crossings)
+
+    def _meeting(self, meets, cells, begin, middle, end, at, halvings):
+        """Time from which on two lines may have met [s], None where none have."""
+        bend = middle.x - 0.5 * (begin.x + end.x)
+        room = self._spread(bend)
+        for first, last in ((begin, middle), (middle, end)):
+            way = last.x - first.x
+            if not meets(
+                room, 2.0 * self._spread(way), 0.0, 1.0, first.x, way, self._still, self._still, *cells, self._met
+            ):
+                continue
+            if not halvings:
+                return first.time
+            halfway = 0.5 * (first.time + last.time)
+            time = self._meeting(meets, cells, first, Place(halfway, at(halfway)), last, at, halvings - 1)
+            if time is not None:
+                return time
+        return None
+
+    def _spread(self, way):
+        """By how much nodes are further than the first is, at most [m]."""
+        return float(np.linalg.norm(way[: self._nodes] - way[:1], axis=1).max(initial=0.0))

@@ -1,0 +1,54 @@
+"""History rows of the compiled loop: probes, energies, momentum and impulses at an instant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...kernels import kernel
+from .averages import write_means
+from .energy_book import book_energies, own_energy
+from .momentum_book import note_momentum
+
+
+@kernel()
+def energies_now(model, running, total):
+    """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
+    clock, families = running.clock[0], model.families
+    book_energies(
+        clock.time, running.x, running.v, model.inertia.mass, model.inertia.turns, families.cells, families.data,
+        families.energies, families.stored, running.work, families.working, total,
+    )  # fmt: skip
+    stored = 0.0
+    for i in range(total.size - 2):
+        if i >= families.working.size or families.working[i] <= 0:
+            stored += abs(total[i])
+    return own_energy(total, families.working), stored
+
+
+@kernel()
+def write_row(row, model, observed, running, total):
+    """Write time, probes, energies, work, step size, momentum and impulses; hold momentum against these.
+
+    Returns the energy, and the sum of all energies without regard to sign [J].
+    """
+    clock, families, inertia, v = running.clock[0], model.families, model.inertia, running.v
+    where, at = np.zeros(2, dtype=np.int64), 1
+    row[0] = clock.time
+    for i in range(len(observed.probes)):
+        row[at] = observed.probes[i](
+            clock.time, running.x, v, running.f, families.outs[0], observed.rows[i], observed.data[i], where
+        )  # fmt: skip
+        at += 1
+    write_means(row, observed.windows, running.averages, running.extremes)
+    energy, stored = energies_now(model, running, total)
+    total[-1] = clock.step
+    for i in range(total.size):
+        row[at] = total[i]
+        at += 1
+    p = np.zeros_like(v)
+    for r in range(v.shape[0]):
+        for k in range(3):
+            if inertia.inverse[r, k] > 0.0:
+                p[r, k] = inertia.mass[r] * v[r, k]
+    note_momentum(clock.time, running.x, p, running.impulse, model.outside, running.ledger, 0.0, row[at:])
+    return energy, stored
