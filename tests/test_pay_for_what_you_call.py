@@ -93,6 +93,9 @@ LINES_ON_LINES = ("", ".crossing", ".pair", ".passage", ".press", ".search", ".s
 BELOW["self_contact"] = VECTORS | {f"effects.self_contact{name}" for name in LINES_ON_LINES}
 BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
 BELOW |= {"bending": VECTORS, "drag": VECTORS | {f"effects.drag{name}" for name in ("", ".force", ".kick")}}
+MESH = {"net.boundary", *(f"net.boundary.{name}" for name in ("closed", "crossings", "distances", "field"))}
+MESH |= {"net.boundary.surface_file", "net.mesh_readers", "effects.contact.several"}
+"""What a body from a file of triangles is made of."""
 GENERAL = {"effects.contact.places", "effects.contact.tumbling", "net.grown_core"}
 """What effects are made of besides their own file."""
 OBSERVED = {"reaction": {"results.observables.nodal"}}
@@ -145,6 +148,7 @@ def called(given):
         if body.get("shape") in ("cylinder", "box") and not body.get("fixed"):
             modules |= {"net.shapes.rounding", "net.solid"}
             modules |= {"effects.turning_bodies", *VECTORS} if {"frame", "orbit"} & given.keys() else set()
+        modules |= MESH if body.get("shape") == "mesh" else set()
         modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
     if len(given.get("body", ())) > 1 and not given.get("contact", {}).get("between_bodies"):
         modules |= {"effects.contact", "effects.contact.silent", "net.skeleton"}  # bodies that overlap in silence
@@ -154,6 +158,8 @@ def called(given):
         general = "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"])
         if keys & {"damping", "friction"}:
             modules |= {"effects.contact.friction", "effects.contact.rubbing", "effects.contact.penalty", *GENERAL}
+            if any(body.get("shape") == "mesh" for body in given["body"]):  # which has no core of its own
+                modules -= {"net.grown_core"}
         elif general:
             modules |= {"effects.contact.penalty", *GENERAL}
         if any(body.get("shape", "sphere") == "sphere" for body in given["body"]) and not keys & {"exponent"}:
@@ -179,6 +185,8 @@ def called(given):
             outside.append("rslab")  # of more unknowns than any other
     if method in ("cvode", "ida"):
         outside.append("sksundae")
+    if any(body.get("shape") == "mesh" for body in given.get("body", ())):
+        outside.append("meshio")
     if web == "cable":
         outside.append("scipy.optimize")  # a root
     if '"corners"' in json.dumps(given) or "effects.fold" in modules:

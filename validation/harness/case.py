@@ -79,6 +79,7 @@ CASES = {
         "spun_tight",
         "spin_deployment",
         "capture",
+        "capture_satellite",
         "tethered_web",
         "capture_in_orbit",
         "odds_of_capture",
