@@ -158,6 +158,7 @@ def called(given):
         general = "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"])
         if keys & {"damping", "friction"}:
             modules |= {"effects.contact.friction", "effects.contact.rubbing", "effects.contact.penalty", *GENERAL}
+            modules.add("effects.kicks")
             if any(body.get("shape") == "mesh" for body in given["body"]):  # which has no core of its own
                 modules -= {"net.grown_core"}
         elif general:

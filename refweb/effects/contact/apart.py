@@ -68,6 +68,19 @@ def add_push(f, cells, data, c, contacts, n, size):
 
 
 @functools.cache
+def force_of(space_of, add_forces):
+    """Kernel of the forces of all pairs, see `slopes_of`; each shows what ``add_forces`` returns."""
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        space = space_of(data)
+        for c in range(cells.shape[0]):
+            out[c, 0] = add_forces(x, v, f, cells, data, c, space)
+
+    return force
+
+
+@functools.cache
 def slopes_of(space_of, add_forces):
     """Kernel that writes −∂f/∂x, or −∂f/∂v, of pairs by differences.
 
@@ -167,13 +180,7 @@ def kernels(first, second):
             f[cells[c, 0], 0] = math.nan
         return deepest
 
-    slopes = slopes_of(space_of, add_forces)
-
-    @kernel(FORCE)
-    def force(t, x, v, f, cells, data, out):
-        space = space_of(data)
-        for c in range(cells.shape[0]):
-            out[c, 0] = add_forces(x, v, f, cells, data, c, space)
+    slopes, force = slopes_of(space_of, add_forces), force_of(space_of, add_forces)
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):

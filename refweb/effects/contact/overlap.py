@@ -52,6 +52,16 @@ def rounded_up(value):
     return float(f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.1e}")
 
 
+def too_soft(deepest, where, most, names):
+    """The `TooSoft` of a contact deeper than ``most`` [m], whose stiffness was chosen for bodies of some names."""
+    stiffer = rounded_up(max(deepest.enough, STIFFER * deepest.stiffness))
+    return TooSoft(
+        f"{where} with stiffness = {deepest.stiffness:g}, {most:.3g} m are allowed; repeated with "
+        f"stiffness = {stiffer:g}",
+        dict.fromkeys(names, stiffer),
+    )
+
+
 class Deepest(NamedTuple):
     """The deepest contact of a body.
 
@@ -139,12 +149,7 @@ class Deepest(NamedTuple):
                 f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
             )
         if self.chosen and self.too_deep and self.overlap > DEEPER * self.initial:
-            stiffer = rounded_up(max(self.enough, STIFFER * self.stiffness))
-            raise TooSoft(
-                f"line {self.line} is {self._where()} with stiffness = {self.stiffness:g}, {allowed(self.body):.3g} m "
-                f"are allowed; repeated with stiffness = {stiffer:g}",
-                {self.body.name: stiffer},
-            )
+            raise too_soft(self, f"line {self.line} is {self._where()}", allowed(self.body), [self.body.name])
         if self.in_core:
             raise SolverError(
                 f"line {self.line} passes the core of a body: it is {self._where()}, whose middle is "

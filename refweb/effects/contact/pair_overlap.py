@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...errors import SolverError, TooSoft
+from ...errors import SolverError
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
-from .overlap import AIM, CORE, DEEPER, STIFFER, allowed, first_between, rounded_up, size_of
+from .overlap import AIM, CORE, DEEPER, allowed, first_between, rounded_up, size_of, too_soft
 
 WAY = 0.2
 """Way of two bodies in an explicit step, over the thickness of the smaller and ``safety``: what the bound allows."""
@@ -97,12 +97,7 @@ class DeepestPair(NamedTuple):
         if self.in_core and self.overlap <= self.initial:
             raise SolverError(f"{self._where}, in the core, where they start: move one of them")
         if self.chosen and self.overlap > self.allowed and self.overlap > DEEPER * self.initial:
-            stiffer = rounded_up(max(self.enough, STIFFER * self.stiffness))
-            raise TooSoft(
-                f"{self._where} with stiffness = {self.stiffness:g}, {self.allowed:.3g} m are allowed; repeated with "
-                f"stiffness = {stiffer:g}",
-                dict.fromkeys(self.chosen, stiffer),
-            )
+            raise too_soft(self, self._where, self.allowed, self.chosen)
         if self.in_core:
             raise SolverError(f"{self._where}, in the core, {self.thickness:.3g} m below the surface; {self._remedy}")
 

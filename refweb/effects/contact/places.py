@@ -135,6 +135,22 @@ class Places(NamedTuple):
     found: tuple
 
 
+@kernel(forceinline=True)
+def climb(value, curve, low, high, moved, place):
+    """(low, high, how far it moved, place) of the next place on the way to where a ``value`` falls through zero.
+
+    By Newton's method with the slope ``curve``, and by bisection where it leaves the bracket or comes no nearer.
+    """
+    if value > 0.0:
+        low = place
+    else:
+        high = place
+    step = place - value / curve if curve < 0.0 else -1.0
+    if not low <= step <= high or abs(step - place) > 0.5 * moved:
+        step = 0.5 * (low + high)
+    return low, high, abs(step - place), step
+
+
 @functools.cache
 def places(depth, spins=0):
     """Kernels that find where lines touch.
@@ -170,20 +186,13 @@ def places(depth, spins=0):
                 slope = dot(spot.gradient, spot.d)
                 if (end == 0.0 and slope <= 0.0) or (end == 1.0 and slope >= 0.0):
                     return end, spot.depth
-        for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
+        for _ in range(100):
             spot = within(x, cells, data, c, nodes, functions, place)
             deep, slope = spot.depth, dot(spot.gradient, spot.d)
             if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
                 return place, deep  # concave: nowhere deep enough
             value, curve = rise(pair, place, spot)
-            if value > 0.0:
-                low = place
-            else:
-                high = place
-            step = place - value / curve if curve < 0.0 else -1.0
-            if not low <= step <= high or abs(step - place) > 0.5 * moved:
-                step = 0.5 * (low + high)
-            moved, place = abs(step - place), step
+            low, high, moved, place = climb(value, curve, low, high, moved, place)
             if moved <= 1e-15:
                 break
         return place, within(x, cells, data, c, nodes, functions, place).depth

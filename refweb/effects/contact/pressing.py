@@ -21,7 +21,7 @@ from ...net.rotation import matrix_at, times, times_transposed
 from ...net.skeleton import ARC, COLUMNS, FROM, KIND, OWNS, SEGMENT, THICKNESS, THIRD, TO
 from ..vectors import dot
 from .pair import _DAMPING, _EXPONENT, _FIELD, _FRICTION, _GROWTH, _SLIP, AWAY, PENALTY, pair_of
-from .places import hessian_times, places, window
+from .places import climb, hessian_times, places, window
 from .several import STEEPEST
 
 ROOM, APART, SIDES = 0, 1, 4
@@ -203,17 +203,10 @@ def arcs(depth):
         if nearest + size / SAMPLES <= 0.0:  # gradients are shorter than 2
             return 0.0, 0.0, centre, 0.0, centre
         low, high, place, moved = max(best - 1, 0) / SAMPLES, min(best + 1, SAMPLES) / SAMPLES, best / SAMPLES, math.inf
-        for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
+        for _ in range(100):
             _, deep, _, slope, curve = on_arc(place, start, end, centre, one, other, pair)
             value, curve = rising(power, place, deep, slope, curve)
-            if value > 0.0:
-                low = place
-            else:
-                high = place
-            step = place - value / curve if curve < 0.0 else -1.0
-            if not low <= step <= high or abs(step - place) > 0.5 * moved:
-                step = 0.5 * (low + high)
-            moved, place = abs(step - place), step
+            low, high, moved, place = climb(value, curve, low, high, moved, place)
             if moved <= 1e-15:
                 break
         p, deep, g, _, _ = on_arc(place, start, end, centre, one, other, pair)

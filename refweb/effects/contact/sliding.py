@@ -3,7 +3,7 @@
 The law is that of `refweb.effects.contact.friction`, with the contacts of `refweb.effects.contact.pressing`. u is the
 velocity of the first body relative to the second where they touch: half the depth below the surface of either, so that
 a ball that rolls has none. F acts there on both, and has the moment a × F about the first body's row, a from there.
-What is solved for in a kick is that of `refweb.effects.contact.rubbing`; a contact here moves two rotations.
+What is solved for in a kick is that of `refweb.effects.kicks`; a contact here moves two rotations.
 """
 
 from __future__ import annotations
@@ -11,20 +11,15 @@ from __future__ import annotations
 import functools
 import math
 
-from ...kernels import FORCE, GIVE, KEPT, MEET, STIFFNESS, SWEEP, kernel
+from ...kernels import MEET, STIFFNESS, kernel
 from ...net.rotation import times, times_transposed
 from ..base import Rubbing
-from ..vectors import cross, dot
-from .apart import push, slopes_of
-from .friction import facing, friction_force, turned_by
-from .places import hessian_times
-from .pressing import DOWN, FIRST, NORMAL, SECOND, SHARE, SIDE, SIDES, SPINS, frame_of, law_of, meeting, vector_at
-from .pressing import SLOT as WHICH
-from .rubbing import (
+from ..kicks import (
     ARMS,
     AXES,
     CELL,
     DAMPING,
+    FORCES,
     FRICTION,
     LEVERS,
     MIXED,
@@ -32,24 +27,25 @@ from .rubbing import (
     OWN,
     PUSH,
     ROWS,
-    SETTLING,
     SLIP,
     SLOT,
     START,
     THETA,
     WIDTH,
-    direction,
     fitted,
-    mixture,
-    solve_normal,
-    solve_tangents,
+    remembering,
+    sweeping,
 )  # fmt: skip
-from .rubbing import (
-    FORCE as FORCES,
-)
+from ..vectors import cross, dot
+from .apart import force_of, push, slopes_of
+from .friction import facing, friction_force, turned_by
+from .places import hessian_times
+from .pressing import DOWN, FIRST, NORMAL, SECOND, SHARE, SIDE, SIDES, SPINS, frame_of, law_of, meeting, vector_at
+from .pressing import SLOT as WHICH
+from .rubbing import direction, mixture
 
 LEVERS_OF_SECOND, ARMS_OF_SECOND, WHOLE = WIDTH, WIDTH + 9, WIDTH + 18
-"""Columns of what touches, behind those of `refweb.effects.contact.rubbing`: as there of the second body, whose row of
+"""Columns of what touches, behind those of `refweb.effects.kicks`: as there of the second body, whose row of
 rotation stands last among ``ROWS``; and their number."""
 SLOTS = 3
 """Number of contacts of a part that are remembered."""
@@ -189,61 +185,7 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
     touches[n, SLOT] = contacts[m, WHICH]
 
 
-@kernel(SWEEP)
-def sweep(h, number, f, inverse, touches, count):
-    """As `refweb.effects.contact.rubbing.sweep`."""
-    most = 0.0
-    for m in range(count):
-        n = count - 1 - m if number % 2 else m
-        if not touches[n, PUSH] > 0.0:
-            continue
-        was = touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2]
-        p, normal = 0.0, touches[n, PUSH]
-        if touches[n, DAMPING] > 0.0:
-            own, rate = touches[n, OWN], moved(touches, n, 0, f, inverse)
-            p, normal = solve_normal(touches, n, h, rate - own * was[0])
-            most = max(most, h * own * abs(p - was[0]))
-        q = s = 0.0
-        drag = touches[n, FRICTION] * normal
-        if drag > 0.0:
-            one, other = touches[n, OWN + 1], touches[n, OWN + 2]
-            first = moved(touches, n, 1, f, inverse) + touches[n, MIXED] * (p - was[0]) - one * was[1]
-            last = moved(touches, n, 2, f, inverse) + touches[n, MIXED + 1] * (p - was[0]) - other * was[2]
-            q, s = solve_tangents(touches, n, h, drag, first, last, number < SETTLING)
-            most = max(most, h * one * abs(q - was[1]), h * other * abs(s - was[2]))
-        touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2] = p, q, s
-        push_apart(touches, n, p - was[0], q - was[1], s - was[2], f)
-    return most
-
-
-@kernel(KEPT)
-def recall(number, memory, f, touches, begin, end):
-    """As `refweb.effects.contact.rubbing.recall`."""
-    for n in range(begin, end):
-        c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
-        if memory[c, at] == number - 1:
-            p = q = s = 0.0
-            for k in range(3):
-                p += memory[c, at + 1 + k] * touches[n, AXES + k]
-                q += memory[c, at + 1 + k] * touches[n, AXES + 3 + k]
-                s += memory[c, at + 1 + k] * touches[n, AXES + 6 + k]
-            touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2] = p, q, s
-            push_apart(touches, n, p, q, s, f)
-
-
-@kernel(GIVE)
-def give(number, memory, v, touches, begin, end, out):
-    """As `refweb.effects.contact.rubbing.give`."""
-    out[:, 0] = 0.0
-    for n in range(begin, end):
-        c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
-        memory[c, at] = number
-        for k in range(3):
-            memory[c, at + 1 + k] = 0.0
-            for i in range(3):
-                memory[c, at + 1 + k] += touches[n, FORCES + i] * touches[n, AXES + 3 * i + k]
-        for i in range(3):
-            out[c, 0] += touches[n, FORCES + i] * along(touches, n, i, v)
+sweep, (recall, give) = sweeping(moved, push_apart), remembering(along, push_apart)
 
 
 @functools.cache
@@ -280,13 +222,7 @@ def kernels(first, second):
                         f[cells[c, 2 + 2 * s], k] += sign * moment[k]
         return power
 
-    slopes = slopes_of(space_of, add_forces)
-
-    @kernel(FORCE)
-    def force(t, x, v, f, cells, data, out):
-        space = space_of(data)
-        for c in range(cells.shape[0]):
-            out[c, 0] = add_forces(x, v, f, cells, data, c, space)
+    slopes, force = slopes_of(space_of, add_forces), force_of(space_of, add_forces)
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
