@@ -278,18 +278,26 @@ class Scene:
         return next((effect for effect in self.effects if name_of(EFFECTS, effect) == "contact"), None)
 
     def with_stiffness(self, stiffness):
-        """The scene with another stiffness of contact for some bodies, by name, as refweb's choice."""
-        contact = self.contact
-        effects = tuple(e.with_stiffness(stiffness) if e is contact else e for e in self.effects)
+        """The scene with another stiffness of contact for some bodies, by name, or "self_contact", as its choice."""
+        bodies = {name: value for name, value in stiffness.items() if name != "self_contact"}
+        own = {"contact": bodies, "self_contact": stiffness.get("self_contact")}
+        given = ((own.get(str(name_of(EFFECTS, effect))), effect) for effect in self.effects)
+        effects = tuple(effect.with_stiffness(value) if value else effect for value, effect in given)
         return self.replace(effects=effects, chosen=tuple(dict.fromkeys([*self.chosen, *stiffness])))
 
     def settled(self):
         """The scene with the stiffness of contact that it leaves out; itself where it leaves out none.
 
-        Names of the bodies that it is chosen for stand in ``chosen``.
+        Names of the bodies that it is chosen for, and "self_contact", stand in ``chosen``.
         """
         bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
         missing = self.contact.left_out(bodies) if bodies else ()
+        if any(name_of(EFFECTS, e) == "self_contact" and e.stiffness is None for e in self.effects):
+            from .effects.self_contact.passage import first_stiffness as first_of_lines
+
+            with in_file(self.file):
+                first = first_of_lines(self.with_stiffness({"self_contact": 1.0}).build())
+            return self.with_stiffness({"self_contact": first}).settled()
         if not missing:
             return self
         from .effects.contact.overlap import first_stiffness

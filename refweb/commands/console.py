@@ -105,6 +105,12 @@ def _stiffness(scene, system):
             unit = "N/m" if exponent == 1.0 else f"N/m^{exponent:g}"
             text = f'stiffness {stiffness:g} {unit} for body "{body.name}", chosen for an overlap of at most '
             yield "contact", text + readable(allowed(body), None, "m")
+    if "self_contact" in scene.chosen:
+        from ..effects.self_contact.passage import Passage
+
+        own = Passage(system).plain()
+        text = f"stiffness {own['stiffness']:.3g} N/m for lines on lines, chosen for an overlap of at most "
+        yield "contact", text + readable(own["radius"], None, "m")
 
 
 def _results_of_steps(steps):

@@ -243,7 +243,8 @@ class Simulation:
             if self._lines is None:
                 from ..effects.self_contact.passage import Passage
 
-                self._lines = Passage(self.system, self._unfollowed())
+                chosen = self.scene.settled().chosen
+                self._lines = Passage(self.system, self._unfollowed(), "self_contact" in chosen)
             self._lines.note(deepest[0], course.crossings)
             self._lines.refuse(*deepest)
 

@@ -107,7 +107,7 @@ def on_run(summary):
         text = (
             f"lines at most {readable(lines['overlap'], None, 'm')} deep in each other, of radius {lines['radius']:g}"
         )
-        yield "contact", f"{text} m, stiffness {lines['stiffness']:.3g}"
+        yield "contact", f"{text} m, stiffness {lines['stiffness']:.3g}" + ", chosen" * lines.get("chosen", False)
     for name, shown in summary.get("passage", {}).items():
         text = "nothing can have passed: certified" if shown == "certified" else shown
         yield "passage", f"{name}: {text}"

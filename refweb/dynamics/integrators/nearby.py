@@ -34,8 +34,6 @@ WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
 and at least."""
 PRICE = 16.0
 """Time that it takes to find the pairs of an element, over that to look at one."""
-HALF = 0.5
-"""Share of the reach of a bound by which rows come nearer to each other: it is twice what its speeds make."""
 KEPT_UP_TO = 0.7
 """Share of a skin around pairs that may be used up where a list is kept."""
 COVERED = 3
@@ -236,12 +234,6 @@ def show_near(nearby, families):
 
 
 @kernel()
-def covers(reach, nearby):
-    """Whether pairs that were found, or all cells, are all that can touch within the reach of a bound [m]."""
-    return not nearby.at.shape[0] or nearby.skin[0].used + HALF * reach <= SHARE * nearby.skin[0].depth
-
-
-@kernel()
 def take_pairs(x, nearby, families):
     """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
     copy_rows(x[: nearby.at.shape[0]], nearby.at)
@@ -260,14 +252,12 @@ def take_pairs(x, nearby, families):
 def reach_all(reach, x, nearby, families):
     """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
 
-    Pairs that are found stay, or are found anew within a skin that is as deep, if there are few; else see `exchange`.
+    Pairs that are found stay: bounds look at the elements themselves, see `exchange`, so that steps do not depend on
+    which pairs happen to be listed, as they would where a run is taken row by row.
     """
     skin = nearby.skin[0]
     skin.wished = 2.0 * reach
     if nearby.at.shape[0]:
-        if not covers(reach, nearby) and skin.depth < math.inf and skin.lasts == MANY and reach <= nearby.widest:
-            skin.depth, skin.used = min(2.0 * HALF * reach, nearby.widest), 0.0
-            take_pairs(x, nearby, families)
         return
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf

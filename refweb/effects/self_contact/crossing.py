@@ -197,5 +197,5 @@ def neighbours(net, beside, touch):
     at = np.stack([place[elements, first], place[elements, 1 - first]], axis=2).reshape(-1, 4, 3)
     data = np.zeros((len(pairs), WIDTH))
     data[:, TOUCH], data[:, SCALE] = touch, 1.0
-    data[:, SHAPE:] = (at[:, 1:] - at[:, :1]).reshape(-1, 9)
+    data[:, SHAPE : SHAPE + 9] = (at[:, 1:] - at[:, :1]).reshape(-1, 9)
     return np.ascontiguousarray(rows, dtype=np.int32), data, elements

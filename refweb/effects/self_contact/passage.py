@@ -18,10 +18,13 @@ import math
 
 import numpy as np
 
-from ...errors import SolverError
+from ...errors import SolverError, TooSoft
+from ...net.net import AXIAL_STIFFNESS, LENGTH
 
 AIM = 0.8
 """Overlap that a stiffness is named for, over the radius."""
+STIFFER = 4.0
+"""Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
 POWER = 2.5
 """Power of an overlap that the energy of lines that cross goes with."""
 HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
@@ -62,6 +65,27 @@ def would_pass(system, v, nodes):
     )
 
 
+def first_stiffness(system):
+    """Stiffness of lines that a scene asks for before it is solved [N/m].
+
+    It is EA/L of the stiffest element, or what stores at `AIM` of the radius the energy with which two of the heaviest
+    elements come together at the largest velocity that any two nodes have towards each other.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With any stiffness of lines.
+    """
+    net, touch = system.net, system.families[pressed(system)].crossing.touch
+    lines = float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+    if net.quasi_static:
+        return lines
+    v = system.initial_velocity()[: net.nodes]
+    speed = float(np.linalg.norm(np.ptp(v, axis=0)))
+    mass = 0.5 * float(net.mass[net.cells].sum(axis=1).max())
+    return max(lines, float(f"{0.5 * mass * speed**2 / (HELD * (0.5 * touch) ** 2):.2g}"))
+
+
 class Passage:
     """What is known of lines that may have passed each other.
 
@@ -71,10 +95,12 @@ class Passage:
         With a family of lines against lines.
     unfollowed : str, optional
         What does not follow them, and why; None where they are followed.
+    chosen : bool
+        Whether the stiffness is refweb's choice.
     """
 
-    def __init__(self, system, unfollowed=None):
-        self._system, self._unfollowed = system, unfollowed
+    def __init__(self, system, unfollowed=None, chosen=False):
+        self._system, self._unfollowed, self._chosen = system, unfollowed, chosen
         family = system.families[pressed(system)]
         self.touch, self._stiffness, self._elements = family.crossing.touch, family.crossing.stiffness, family.elements
         self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
@@ -85,7 +111,8 @@ class Passage:
 
     def plain(self):
         """Overlap, radius and stiffness as ``run.json`` has them."""
-        return {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
+        own = {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
+        return {**own, "chosen": self._chosen}
 
     def told(self):
         """Whether nothing can have passed, as ``run.json`` has it."""
@@ -110,7 +137,15 @@ class Passage:
         return lines_of(self._system.net, np.asarray(nodes, dtype=np.int64))
 
     def refuse(self, overlap, time, cell):
-        """Refuse an overlap above the radius [m] of a cell, at a time [s]; `SolverError`."""
+        """Refuse an overlap above the radius [m] of a cell, at a time [s].
+
+        Raises
+        ------
+        TooSoft
+            Where refweb chose the stiffness.
+        SolverError
+            Where it was given.
+        """
         radius = 0.5 * self.touch
         if not overlap > radius:
             return
@@ -118,6 +153,13 @@ class Passage:
         names = " and ".join(str(n) for n in self._system.net.line[own].ravel().tolist()) if own.ndim else None
         names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
         enough = float(f"{self._stiffness * (overlap / (AIM * radius)) ** POWER:.2g}")
+        if self._chosen:
+            enough = max(enough, STIFFER * self._stiffness)
+            raise TooSoft(
+                f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}, with "
+                f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
+                {"self_contact": enough},
+            )
         raise SolverError(
             f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}, where the "
             f"push falls and lines pass: [self_contact] stiffness = {enough:g} or more is enough in place of "

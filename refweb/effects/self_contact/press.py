@@ -35,7 +35,7 @@ MARGIN = 0.75
 """Factor on that of a rigid body: of 4000 pairs at random no row sum is above 0.7 of what it leaves."""
 MOST = 6.0
 """Number of others that lie against an element at one time in bounds, at most: so many equal lines fit around one."""
-FAR = 0.2
+FAR = 4.0
 """Reach over the longest element above which a bound does not look which elements are near each other."""
 OF_REACH = 0.5
 """Share of the reach of a bound that pairs come nearer by: that is twice what two rows may at its speed."""

@@ -12,7 +12,22 @@ import math
 import numpy as np
 
 from ...kernels import NEAR, kernel
-from .pair import APART, DAMPING, ENDS, LENGTH, OTHER, SCALE, SHAPE, TOUCH, WIDTH, nearest, place_of
+from .pair import (
+    APART,
+    DAMPING,
+    ENDS,
+    FRICTION,
+    LENGTH,
+    NAMES,
+    OTHER,
+    RUBBING,
+    SCALE,
+    SHAPE,
+    TOUCH,
+    WIDTH,
+    nearest,
+    place_of,
+)  # fmt: skip
 
 REACH = math.sqrt(2.0)
 """Distance of two segments up to which they may push each other, over that at which lines touch: an element ends
@@ -184,6 +199,8 @@ def paired(chosen, cells, data):
         numbers[c, TOUCH], numbers[c, DAMPING] = data[a, TOUCH], data[a, DAMPING]
         numbers[c, SCALE] = min(data[a, SCALE], data[b, SCALE])
         numbers[c, LENGTH], numbers[c, OTHER] = data[a, LENGTH], data[b, LENGTH]
+        numbers[c, NAMES], numbers[c, NAMES + 1] = a, b
+        numbers[c, FRICTION], numbers[c, FRICTION + 1] = data[a, RUBBING], data[a, RUBBING + 1]
         for k in range(3):
             first = data[a, ENDS + k]
             numbers[c, SHAPE + k] = data[a, ENDS + 3 + k] - first

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from ...tables import Table, real, table
 from ..base import Crossing, Family, without
-from .pair import APART, DAMPING, ENDS, SCALE, TOUCH
+from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
 from .search import found, near, paired
 
@@ -43,31 +43,39 @@ class SelfContact(Table):
     radius : float
         Radius of all lines [m].
     stiffness : float, optional
-        k [N/m], the push of lines that cross at half the distance of touch, over the radius. By default EA/L of the
-        stiffest element.
+        k [N/m], the push of lines that cross at half the distance of touch, over the radius. Where it is left out it is
+        chosen: EA/L of the stiffest element, or what stops two of the heaviest at the largest velocity between nodes at
+        the start; a run whose lines overlap by more than their radius is repeated with a larger one.
     damping : float
         d of Hunt and Crossley [s/m]: a push of 1 + d δ̇ times that of the overlap, never a pull; δ̇ is the rate of the
         overlap.
+    friction : float
+        μ of Coulomb [1]; against it stands the push of the overlap.
+    slip_velocity : float
+        v_s [m/s], of μ N |u|/√(|u|² + v_s²): what sticks creeps below it.
 
     Raises
     ------
     InputError
-        For a radius or a stiffness that is not > 0, or damping < 0; from ``on``, for curved elements, lines that
-        overlap in the web's position, and in statics a web of too many pairs.
+        For a radius, a stiffness or a slip velocity that is not > 0, damping or friction < 0; from ``on``, for curved
+        elements, lines that overlap in the web's position, and in statics a web of too many pairs.
 
     Examples
     --------
         [self_contact]
         radius = 1e-3
         damping = 0.1
+        friction = 0.3
     """
 
     radius: float = real(above=0, unit="m")
     stiffness: float | None = real(default=None, above=0, unit="N/m")
     damping: float = real(default=0.0, at_least=0, unit="s/m")
+    friction: float = real(default=0.0, at_least=0)
+    slip_velocity: float = real(default=1e-3, above=0, unit="m/s")
 
     def on(self, net):
-        """The family of the push, and with damping that of losses.
+        """The family of the push, and those of damping and friction.
 
         ``out`` is how deep a pair or an element overlaps [m], or the power of what is lost [W].
         """
@@ -101,16 +109,32 @@ class SelfContact(Table):
             crossing=follows, name="self_contact", force=press.force, energy=press.energy, bound=press.bound,
             stiffness=press.stiffness if all_listed else None, book="self_contact_energy", observed=1, **common,
         )  # fmt: skip
-        if self.damping == 0.0:
-            return push
+        families = [push]
+        if self.damping > 0.0:
+            families.append(self._losses(all_listed, common))
+        if self.friction > 0.0:
+            families.append(self._friction(all_listed, common))
+        return families if len(families) > 1 else push
+
+    def _losses(self, all_listed, common):
+        """The family of damping."""
         from . import losses
 
-        lost = Family(
+        return Family(
             name="self_contact", force=losses.force, bound=losses.bound,
             stiffness=losses.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
             damping=losses.damping, damping_bound=losses.damping_bound, symmetric=False, at_rest=False, **common,
         )  # fmt: skip
-        return [push, lost]
+
+    def _friction(self, all_listed, common):
+        """The family of friction."""
+        from . import slipping
+
+        return Family(
+            name="self_contact", force=slipping.force, bound=slipping.bound,
+            stiffness=slipping.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
+            damping=slipping.damping, rubbing=slipping.KICKS, symmetric=False, at_rest=False, **common,
+        )  # fmt: skip
 
     def stiffness_on(self, net):
         """Its stiffness [N/m], chosen where it is left out."""
@@ -127,6 +151,7 @@ class SelfContact(Table):
         data[:, OWN_LENGTH] = net.natural_length
         data[:, ENDS : ENDS + 3] = net.points[net.cells[:, 0]]
         data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data[:, REFERENCE : REFERENCE + 3]
+        data[:, RUBBING], data[:, RUBBING + 1] = self.friction, self.slip_velocity
         data[:, APART:] = beside
         return np.ascontiguousarray(net.cells, dtype=np.int32), data
 
