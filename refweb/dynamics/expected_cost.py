@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, LENGTH
-from ..net.rotation import Turns, carry_rates
+from ..net.rotation import Turns
+from ..net.rotation_bounds import carry_rates
 from ..registry import INTEGRATORS
 from ..results.units import prefixed
 from .method_choice import step_price

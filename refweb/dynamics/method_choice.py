@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..effects.base import blind_to_carried
 from ..errors import InputError
 from ..registry import INTEGRATORS, load
 from ..settings import Dynamic
@@ -67,7 +68,7 @@ def decided(scene, system):
     if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
         return Choice(given_to(scene, "cvode", family=family), f"{what} is not for explicit steps")
-    if losing := _losing(system):
+    if losing := blind_to_carried(system):
         why = f"[{losing[0].name}] has losses, and bodies carry nodes, which explicit steps do not take together"
         return Choice(given_to(scene, "cvode", family=family), why)
     bound = _bound(system)
@@ -111,7 +112,7 @@ def step_price(system, touched=False):
     if touched:
         price += sum(len(f.cells) * (PER_TOUCH if f.rubbing is None else PER_RUB) for f in system.families if f.contact)
     damped = any(family.damping is not None and family.rubbing is None for family in system.families)
-    if damped and not _losing(system):
+    if damped:
         price *= 1.0 + min(_damped(system, _bound(system)), 7.0)
     return price
 
@@ -131,11 +132,6 @@ def given_to(scene, method, **keys):
 
 def _digits(scene):
     return scene.accuracy.digits or USUAL_DIGITS
-
-
-def _losing(system):
-    """Families whose losses explicit steps would solve for node by node, where bodies carry nodes."""
-    return [family for family in system.families if family.rubbing is not None and system.carried.any()]
 
 
 def _bound(system):

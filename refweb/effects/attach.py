@@ -53,8 +53,8 @@ class Attach(Table):
     ------
     InputError
         From ``extend``, for a node or a body that there is not, a ring that is free, which keeps its plane, and a node
-        that a body has already; in a scene, for a node that is supported, moved or linked as well, a free body with
-        nodes and a consistent mass, and for losses of contact or drag with such a body by "central-difference".
+        that a body has already; in a scene, for a node that is supported, moved or linked as well, a free body
+        with nodes and a consistent mass, and for friction of lines on each other there by "central-difference".
 
     Examples
     --------

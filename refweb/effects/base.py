@@ -41,6 +41,8 @@ class Rubbing(NamedTuple):
         Number of columns of what touches.
     memory : int
         Number of columns that a cell has in the memory of a step.
+    carried : bool
+        Whether they know of nodes that bodies carry; to others these stand still.
     """
 
     meet: Callable
@@ -49,6 +51,7 @@ class Rubbing(NamedTuple):
     give: Callable
     width: int
     memory: int
+    carried: bool = False
 
 
 class Crossing(NamedTuple):
@@ -186,6 +189,12 @@ class Family:
     def dead(self):
         """Whether it is a load that follows from time alone, with a power and a potential."""
         return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
+
+
+def blind_to_carried(system):
+    """Families of a system with nodes that bodies carry, whose kicks are solved as if these stood still."""
+    solved = [family for family in system.families if family.rubbing is not None and not family.rubbing.carried]
+    return [family for family in solved if system.carried[family.cells].any()]
 
 
 def pairs_of(system):

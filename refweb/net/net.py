@@ -114,6 +114,11 @@ class Net:
         return np.flatnonzero(self.mass[: len(self.mass) - self.spins])
 
     @property
+    def carried(self):
+        """Nodes that free bodies carry, a list."""
+        return [node for body in self.bodies if not body.fixed for node in body.carried]
+
+    @property
     def order(self):
         """Order of the elements."""
         return self.cells.shape[1] - 1

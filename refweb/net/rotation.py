@@ -24,6 +24,7 @@ References
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -107,8 +108,12 @@ class Turns(NamedTuple):
         I [kg m²].
     mobility : ndarray, shape (bodies, 3, 3)
         W, along the axes of space at the start.
-    reach : ndarray, shape (bodies,)
-        Speed of the farthest point of a body about its centre over |L/I|, at most [m].
+    principal : ndarray, shape (bodies, 3, 3)
+        Unit vectors of the principal axes, along the axes of space at the start.
+    faster : ndarray, shape (bodies, 3)
+        I over the moments of inertia about these; 1 about one of them, and not less about the others.
+    reach : ndarray, shape (bodies, 3)
+        Largest distance of a point of a body from each of these axes, at most [m].
     before : ndarray, shape (bodies, 4)
         Space for quaternions.
     room : ndarray, shape (TERMS + 1, 10)
@@ -126,6 +131,8 @@ class Turns(NamedTuple):
     rows: np.ndarray
     moment: np.ndarray
     mobility: np.ndarray
+    principal: np.ndarray
+    faster: np.ndarray
     reach: np.ndarray
     before: np.ndarray
     room: np.ndarray
@@ -140,7 +147,8 @@ class Turns(NamedTuple):
         bodies = [body for body in net.bodies if body.turn is not None]
         count = len(bodies)
         mobility = np.array([b.axes.T @ b.mobility @ b.axes for b in bodies]).reshape(count, 3, 3)
-        fastest = [np.linalg.eigvalsh(b.mobility)[-1] for b in bodies]
+        faster, principal = np.linalg.eigh(mobility)
+        principal = np.ascontiguousarray(principal.swapaxes(1, 2))
         carried = [(node, n) for n, body in enumerate(bodies) for node in body.carried]
         arms = np.array([arm for b in bodies for arm in b.points @ b.axes]).reshape(-1, 3)
         ahead = [net.points[bodies[n].row] - net.points[node] for node, n in carried]
@@ -148,7 +156,9 @@ class Turns(NamedTuple):
             rows=np.array([(b.row, b.spin, b.turn) for b in bodies], dtype=np.int64).reshape(count, 3),
             moment=np.array([b.moment for b in bodies], dtype=float),
             mobility=mobility,
-            reach=np.array([b.extent * fast for b, fast in zip(bodies, fastest, strict=True)], dtype=float),
+            principal=principal,
+            faster=faster,
+            reach=np.array([_reach(b, own) for b, own in zip(bodies, principal, strict=True)]).reshape(count, 3),
             before=np.zeros((count, 4)),
             room=np.zeros((TERMS + 1, 10)),
             carried=np.array(carried, dtype=np.int64).reshape(-1, 2),
@@ -156,6 +166,13 @@ class Turns(NamedTuple):
             ahead=_exact(np.array(ahead).reshape(-1, 3), arms),
             scales=np.array([row for body in bodies for row in _scales(body, net)]).reshape(-1, 3),
         )
+
+
+def _reach(body, axes):
+    """Largest distance of a point of a body from each of some axes through its row, at most [m]: of the box around."""
+    signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+    corners = (signs * (np.array(body.core) + body.radius) + body.offset) @ body.axes
+    return np.minimum(np.linalg.norm(np.cross(corners[:, None], axes), axis=2).max(axis=0), body.extent)
 
 
 def _exact(a, b):
@@ -255,16 +272,43 @@ def series(h, n, v, turns, q):
         q[k] *= size
 
 
+@kernel(forceinline=True)
+def along_principal(n, m, a, turns):
+    """Components of a vector along the principal axes of a body of rotation matrix m."""
+    p, e = times_transposed(m, a), turns.principal[n]
+    return times(((e[0, 0], e[0, 1], e[0, 2]), (e[1, 0], e[1, 1], e[1, 2]), (e[2, 0], e[2, 1], e[2, 2])), p)
+
+
+@kernel()
+def fastest_about(n, u, turns):
+    """Angular velocities about its principal axes that a free body comes to, at most [rad/s], by L/I along these.
+
+    With w = I/J about each axis and e = Σ (w − 1) u², which is (2 T I − L²)/I² of what a free body keeps, they are no
+    more than w |u|, √(w Σ w u²) and w √(e/(w − 1)): a rod that spins about its middle does not about its own line.
+    """
+    w, square, energy, spare = turns.faster[n], 0.0, 0.0, 0.0
+    for k in range(3):
+        square += u[k] * u[k]
+        energy += w[k] * u[k] * u[k]
+        spare += max(w[k] - 1.0, 0.0) * u[k] * u[k]
+    first = min(w[0] * math.sqrt(square), math.sqrt(w[0] * energy))
+    second = min(w[1] * math.sqrt(square), math.sqrt(w[1] * energy))
+    third = min(w[2] * math.sqrt(square), math.sqrt(w[2] * energy))
+    if w[1] > 1.0:
+        second = min(second, w[1] * math.sqrt(spare / (w[1] - 1.0)))
+    if w[2] > 1.0:
+        third = min(third, w[2] * math.sqrt(spare / (w[2] - 1.0)))
+    return first, second, third
+
+
 @kernel()
 def turn_on(h, v, x, turns):
     """Turn free bodies by a time h [s] from the quaternions that are noted, and write them to x."""
     for n in range(turns.moment.size):
         s, q = turns.rows[n, 1], turns.before[n]
-        w, size, fast = turns.mobility[n], 0.0, 0.0
-        for k in range(3):
-            fast += abs(w[k, 0]) + abs(w[k, 1]) + abs(w[k, 2])
-            size += v[s, k] * v[s, k]
-        parts = int(math.ceil(min(abs(h) * fast * math.sqrt(size) / TURN, 1e6)))
+        u = along_principal(n, matrix_of(q[0], q[1], q[2], q[3]), (v[s, 0], v[s, 1], v[s, 2]), turns)
+        a, b, c = fastest_about(n, u, turns)
+        parts = int(math.ceil(min(abs(h) * math.sqrt(a * a + b * b + c * c) / TURN, 1e6)))
         for _ in range(parts):
             series(h / parts, n, v, turns, q)
         x[turns.rows[n, 2], 0] = q[0] - 1.0
@@ -321,36 +365,6 @@ def hand_on(x, f, turns):
         f[s, 0] += arm[1] * f[i, 2] - arm[2] * f[i, 1]
         f[s, 1] += arm[2] * f[i, 0] - arm[0] * f[i, 2]
         f[s, 2] += arm[0] * f[i, 1] - arm[1] * f[i, 0]
-
-
-@kernel()
-def carry_rates(rates, turns):
-    """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
-
-    A node at the arm a moves by δ + θ × a. In place of its displacement there are two unknowns, scaled to be no more
-    than half of it: so rows of other nodes keep their sums, and those of the body are its own over these scales.
-    """
-    for c in range(turns.carried.shape[0]):
-        i, n = turns.carried[c, 0], turns.carried[c, 1]
-        rates[turns.rows[n, 0]] += turns.scales[c, 0] * rates[i]
-        rates[turns.rows[n, 1]] += turns.scales[c, 1] * rates[i]
-
-
-@kernel()
-def pull_rates(rates, f, turns):
-    """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
-    for c in range(turns.carried.shape[0]):
-        i = turns.carried[c, 0]
-        pull = math.sqrt(f[i, 0] ** 2 + f[i, 1] ** 2 + f[i, 2] ** 2)
-        rates[turns.rows[turns.carried[c, 1], 1]] += 2.0 * turns.scales[c, 2] * pull
-
-
-@kernel()
-def sizes(n, a, turns):
-    """Sizes of what the place of a body has of velocities or forces, and its rotation, times its reach."""
-    b, s = turns.rows[n, 0], turns.rows[n, 1]
-    own = math.sqrt(a[b, 0] ** 2 + a[b, 1] ** 2 + a[b, 2] ** 2)
-    return own, turns.reach[n] * math.sqrt(a[s, 0] ** 2 + a[s, 1] ** 2 + a[s, 2] ** 2)
 
 
 def quaternion_of(matrix):

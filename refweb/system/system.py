@@ -81,7 +81,7 @@ class System:
         for drive in self.drives:
             self.supported[drive.cells[:, 0]] = True
         self.carried = np.zeros(self.rows, dtype=bool)
-        self.carried[[node for body in net.bodies if not body.fixed for node in body.carried]] = True
+        self.carried[net.carried] = True
         self.supported[self.carried] = True
         self._factorization = factorization
         if factorization == "rslab":

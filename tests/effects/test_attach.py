@@ -11,12 +11,12 @@ import refweb
 from refweb.dynamics.initial_state import equilibrium
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.rotations import Rotations
-from refweb.dynamics.method_choice import decided
 from refweb.effects.elasticity import Elasticity
 from refweb.net.rotation import quaternion_rate
 from refweb.runner import notices
 from refweb.system.at_rest import at_rest
 from refweb.system.system import System
+from validation.methods.as_constraint import Tied
 
 CHEST = dict(
     name="chest", shape="box", size=(0.6, 0.5, 0.7), rounding=0.2, mass=0.5, position=(0.9, 0.7, -0.2),
@@ -320,6 +320,20 @@ def test_another_program_finds_the_same(exact):
     np.testing.assert_allclose(body.turning(found.x, found.v), turn @ end[10:13], rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("rtol, place, speed", [(1e-6, 1e-6, 1e-4), (1e-9, 2e-9, 5e-8)])
+def test_constraints_in_place_of_elimination_find_the_same(rtol, place, speed):
+    """IDA on nodes with masses of their own and multipliers, `validation.methods.as_constraint`: errors go with its
+    tolerance. They are no more than some ten of its errors a step, of 2 m and 10 m/s."""
+    x, v, off, sliding = Tied(hub()).solve(0.2, rtol)
+    solution = refweb.run(hub(method="explicit", order=6, step_size=0.2 / 400))
+    np.testing.assert_allclose(x[:6], solution.state.x[:6], rtol=0, atol=place)
+    np.testing.assert_allclose(v[:6], solution.state.v[:6], rtol=0, atol=speed)
+    (own,), (other,) = solution.state.system.net.bodies, Tied(hub()).system.net.bodies
+    np.testing.assert_allclose(other.rotation(x), own.rotation(solution.state.x), rtol=0, atol=5.0 * place)
+    np.testing.assert_allclose(other.turning(x, v), own.turning(solution.state.x, solution.state.v), atol=5.0 * speed)
+    assert off < 1e-9 and sliding < 1e-6
+
+
 def bridled(**tables):
     """A box on a bridle of four tethers, which tumbles, wraps itself in them, and is damped."""
     corners = [[0.15, 0.1, 0.1], [-0.15, 0.1, 0.1], [0.15, -0.1, 0.1], [-0.15, -0.1, 0.1]]
@@ -382,18 +396,6 @@ def test_a_resumed_run_is_the_same(tmp_path):
     whole, resumed = nets.whole_and_resumed(bridled(), tmp_path)
     np.testing.assert_array_equal(resumed.state.x, whole.state.x)
     np.testing.assert_array_equal(resumed.state.v, whole.state.v)
-
-
-def test_losses_of_contact_by_implicit_methods():
-    """Friction with the body that carries nodes: momentum closes, explicit steps say no."""
-    rubbed = {"stiffness": 1e4, "friction": 0.3, "damping": 0.1}
-    with pytest.raises(refweb.InputError, match=r"\[contact\] has losses that central-difference .* \[\[attach\]\]"):
-        refweb.run(bridled(contact=rubbed))
-    solution = refweb.run(bridled(contact=rubbed, solve={"kind": "dynamic", "duration": 0.1, "method": "cvode"}))
-    assert solution.solver["energy_drift"] < 1e-2
-    auto = bridled(contact=rubbed, solve={"kind": "dynamic", "duration": 0.1, "method": "auto"})
-    choice = decided(auto, auto.build())
-    assert choice.solve.method == "cvode" and "[contact] has losses, and bodies carry nodes" in choice.reason
 
 
 def test_who_is_not_felt_is_told():

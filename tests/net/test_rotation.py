@@ -9,6 +9,7 @@ from scipy.special import ellipj, ellipk
 
 from refweb.net.rigid_body import Grown, RigidBody, matrix_of
 from refweb.net.rotation import Turns, angular_velocity, more_kinetic, note_turns, quaternion_of, turn_on
+from refweb.net.rotation_bounds import pushes, speeds
 from refweb.net.shapes.box import Box
 from refweb.net.solid import inertia, moments
 
@@ -120,6 +121,46 @@ def test_energy_over_ten_thousand_turns(tensor, omega, period):
         rotor.on(turns / steps, steps // 100)
         worst = max(worst, abs(rotor.energy / energy - 1.0))
     assert worst < 1e-12  # a random walk of 1e6 roundings
+
+
+def test_a_needle_turns_as_a_symmetric_top():
+    """ω = L/J₁ + (1/J₃ − 1/J₁) L₃ e₃: space turns about L, the body about its line; moments of 1 : 1.7e5."""
+    tensor, omega = (1.0, 1.0, 6e-6), np.array([200.0, 0.0, 3.0])
+    rotor = Rotor(tensor, omega)
+    rotor.on(1e-3, 100)
+    L = np.array(tensor) * omega
+    about = Rotation.from_rotvec(0.1 * L)  # J₁ is 1
+    own = Rotation.from_rotvec([0.0, 0.0, 0.1 * (1.0 / 6e-6 - 1.0) * L[2]])
+    # A rounding of L, 200 long in space, is one of 1.7e5 times that in the speed about the line: 4e-9 rad/s, for 0.1 s.
+    np.testing.assert_allclose(rotor.body.rotation(rotor.x), (about * own).as_matrix(), rtol=0, atol=2e-9)
+    own, turning = speeds(0, rotor.x, rotor.v, rotor.turns)
+    middle = np.hypot(0.05, 0.1), np.hypot(0.15, 0.1)  # of corners from the third axis, and the first
+    assert own == 0.0 and turning == pytest.approx(
+        3.0 * middle[0] + 200.0 * (middle[1] + np.hypot(0.05, 0.15)), rel=1e-4
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_point_is_faster_than_its_bound(seed):
+    """All corners of a box of any inertia and axes, on its way, against the bound of the start; and within 4 of it."""
+    rng = np.random.default_rng(seed)
+    big = np.sort(10.0 ** rng.uniform(-4, 0, 3))
+    frame = Rotation.random(random_state=seed).as_matrix()
+    tensor = frame @ np.diag([big[0], big[1], big[1] + 0.9 * big[0]]) @ frame.T
+    rotor = Rotor(tensor, rng.standard_normal(3) * 10.0, Rotation.random(random_state=seed + 50).as_matrix())
+    corners = np.array([[a, b, c] for a in (-0.05, 0.05) for b in (-0.1, 0.1) for c in (-0.15, 0.15)])
+    _, bound = speeds(0, rotor.x, rotor.v, rotor.turns)
+    most = 0.0
+    for _ in range(3000):
+        rotor.on(0.01)
+        most = max(most, np.linalg.norm(np.cross(rotor.own, corners), axis=1).max())
+    assert 0.25 * bound < most <= bound * (1.0 + 1e-12)
+    # A moment changes the velocity of no corner by more than its bound.
+    moment, f = rng.standard_normal(3), np.zeros((3, 3))
+    f[1] = moment
+    axes = rotor.body.axes @ rotor.body.rotation(rotor.x).T
+    rate = np.linalg.norm(np.cross(np.linalg.solve(tensor, axes @ moment), corners), axis=1).max()
+    assert rate <= pushes(0, rotor.x, f, rotor.turns)[1] / rotor.body.moment * (1.0 + 1e-12)
 
 
 def test_quaternions_of_matrices():

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...effects.base import blind_to_carried
 from ...errors import InputError, NoEnd, OpenBook, SolverError
 from .averages import begin_averages
 from .between_steps import LOOKS
@@ -119,12 +120,11 @@ class CentralDifference(Integrator):
             raise InputError(
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
-        for family in system.families if system.carried.any() else []:
-            if family.rubbing is not None:
-                raise InputError(
-                    f"[{family.name}] has losses that {self.method} solves for node by node, which a body that carries "
-                    'nodes by [[attach]] does not allow: use method = "cvode", or leave them out'
-                )
+        for family in blind_to_carried(system):
+            raise InputError(
+                f"[{family.name}] has losses that {self.method} solves for node by node, which a body that carries "
+                'nodes by [[attach]] does not allow: use method = "cvode", or leave them out'
+            )
         self._outs = outs = tuple(system.per_cell())
         self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
         self._events, self._least = event_rows(events), least_energy(net)
@@ -268,7 +268,7 @@ class CentralDifference(Integrator):
                 if more < 0:
                     raise NoEnd(
                         f"the step at t = {now['time']:.6g} s is {now['step']:.3g} s, more than {MAX_STEPS_PER_ROW:g} "
-                        "steps to the next row: ask for shorter rows, or lower the stiffness that asks for the step"
+                        f"steps to the next row: {self._way_out(course.x, float(now['step']))}"
                     )
                 done += more
                 if not now["begun"]:
@@ -294,6 +294,12 @@ class CentralDifference(Integrator):
                 self._name_blow_up(course, since, records[-1])
             self._name_drift(course, since, records[-1])
         return history
+
+    def _way_out(self, x, step):
+        """What to do about too short a step [s]: speeds ask for it where at rest it would be over twice as long."""
+        if self.bound(x) * self.safety * self.stretch > 2.0 * step:
+            return "nothing may pass through a body in one, at the speeds there are; use a thicker body or slower ones"
+        return "ask for shorter rows, or lower the stiffness that asks for the step"
 
     def _again(self, course, before, running):
         """What takes steps from ``before`` [s] again: ``after(state, begun, count)``.

@@ -13,7 +13,8 @@ import math
 import numpy as np
 
 from ...kernels import copy_rows, kernel
-from ...net.rotation import hand_on, sizes
+from ...net.rotation import hand_on
+from ...net.rotation_bounds import pushes, speeds
 from ...results.probes import PLACE
 from .averages import average, look_for_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
@@ -233,7 +234,7 @@ def steps_until(end, changing, scheme, model, running):
         push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
     turns = model.inertia.turns
     for n in range(turns.moment.size):  # of any point of a body
-        (own, turning), (force, moment) = sizes(n, v, turns), sizes(n, f, turns)
+        (own, turning), (force, moment) = speeds(n, running.x, v, turns), pushes(n, running.x, f, turns)
         speed = max(speed, (own + turning) ** 2)
         push = max(push, (inverse[turns.rows[n, 0], 0] * force + inverse[turns.rows[n, 1], 0] * moment) ** 2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other

@@ -18,7 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from ...net.rotation import Turns, quaternion_rate, sizes
+from ...net.rotation import Turns, quaternion_rate
+from ...net.rotation_bounds import speeds
 
 
 class Rotations:
@@ -124,9 +125,9 @@ class Rotations:
         q /= np.linalg.norm(q, axis=1)[:, None]
         x[self._turn, 0], x[self._spin] = q[:, 0] - 1.0, q[:, 1:]
 
-    def speed(self, v):
-        """Largest speed of any point of these bodies [m/s]."""
-        return max(sum(sizes(n, v, self.turns)) for n in range(len(self.turns.moment)))
+    def speed(self, x, v):
+        """Largest speed of any point of these bodies while they move freely [m/s]."""
+        return max(sum(speeds(n, x, v, self.turns)) for n in range(len(self.turns.moment)))
 
     def scale(self, tolerance, angular):
         """Make tolerances of unknown displacements, or of velocities where ``angular``, those of angles."""

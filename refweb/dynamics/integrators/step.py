@@ -155,7 +155,7 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
     the first begins without a memory of another. It writes the power of what rubs, and returns room for what touches.
     """
-    families, rubbed = model.families, model.rubbed
+    families, rubbed, turns = model.families, model.rubbed, model.inertia.turns
     forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
     ends = np.zeros(rubbed.families.size, dtype=np.int64)
     touches = meet_all(h, x, v, inverse, families, rubbed, touches, ends)
@@ -180,8 +180,10 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
             for q in range(flat_f.size):
                 flat_f[q] -= flat_extra[q]
             extra[:] = 0.0
+            carry(x, v, turns)
             for i in viscous:
                 forces[i](t, x, v, extra, cells[i], data[i], outs[i])
+            hand_on(x, extra, turns)
             for q in range(flat_f.size):
                 flat_f[q] += flat_extra[q]
         begin = 0
@@ -190,12 +192,14 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
             begin = ends[m]
         if viscous.size:
             for q in range(flat_v.size):
-                speed = flat_half[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
-                change, flat_v[q] = max(change, abs(speed - flat_v[q])), speed
+                if flat_inverse[q] > 0.0:
+                    speed = flat_half[q] + 0.5 * h * flat_inverse[q] * flat_f[q]
+                    change, flat_v[q] = max(change, abs(speed - flat_v[q])), speed
         if not change > SETTLED * fastest or (n >= patience and change > stalled * before):
             break
     last_kick(0.5 * h, flat_inverse, flat_half, flat_f)
     copy_rows(half, v)
+    carry(x, v, turns)
     begin = 0
     for m in range(rubbed.families.size):
         rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], outs[rubbed.families[m]])

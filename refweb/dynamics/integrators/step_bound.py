@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...kernels import BOUND, kernel
-from ...net.rotation import carry_rates, pull_rates
+from ...net.rotation_bounds import carry_rates, pull_rates
 from .step import set_lengths
 
 

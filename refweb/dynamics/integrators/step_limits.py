@@ -58,7 +58,7 @@ class StepLimits:
                 self._net.points, x, v[: self._moving], self._net.nodes, self._rows, self._outreach
             )
             if self._rotations:
-                speed = max(speed, self._rotations.speed(v))
+                speed = max(speed, self._rotations.speed(x, v))
             speed, way = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
             stop = min(stop, t + way / speed) if speed > 0.0 else stop
         if self.lines is not None:

@@ -10,7 +10,7 @@ F being what is added here to the penalty. F acts on the line at the contact and
 −y × F about its centre, y from the centre to the line's point, so that their momenta and angular momenta are kept; a
 ring turns about its normal only, other bodies as `refweb.net.rotation` says. The power F·u is not positive. With the
 matrices A = ∂F/∂y and B = ∂F/∂u the tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of
-the contact's place as it moves. How explicit kicks solve for F is in `refweb.effects.contact.rubbing`.
+the contact's place as it moves. How explicit kicks solve for F is in `refweb.effects.kicks`.
 
 References
 ----------

@@ -51,14 +51,17 @@ def share(a, nodes, functions, place):
 def lightness(mass, cells, c, nodes):
     """√(lightest node/body), at most 1: scaling the unknowns of a body by it makes its share of a node's row small.
 
-    Nodes without mass are supported and have no row; 0 for a body without one.
+    Nodes without mass are supported and have no row, or are carried by bodies; where all are it is 1. 0 for a body
+    without mass.
     """
     least, body = 0.0, mass[cells[c, nodes]]
     for a in range(nodes):
         own = mass[cells[c, a]]
         if own > 0.0 and (least == 0.0 or own < least):
             least = own
-    return min(math.sqrt(least / body), 1.0) if body > 0.0 else 0.0
+    if not body > 0.0:
+        return 0.0
+    return min(math.sqrt(least / body), 1.0) if least > 0.0 else 1.0
 
 
 @kernel(forceinline=True)

@@ -207,14 +207,21 @@ def set_touch(touches, n, touch, cells, v, inverse, spins, functions):
 sweep, (recall, give) = sweeping(moved, push_apart), remembering(along, push_apart)
 
 
+@kernel()
+def alone(touches, n, x, v, inverse, data):
+    """Nothing is to be added to a contact."""
+
+
 @functools.cache
-def kernels(depth, pieces, functions, spins):
-    """The `Rubbing` of elements with two nodes.
+def meeting(depth, pieces, functions, spins, more=alone):
+    """Kernel that writes what touches, of elements with two nodes, and lets ``more`` see each.
 
     Parameters
     ----------
     depth, pieces, functions, spins
         See `refweb.effects.contact.friction.kernels`.
+    more : kernel
+        Has the arguments of `alone`.
     """
     _, _, contacts, touch_of, (most, columns) = places(depth, spins)
 
@@ -234,9 +241,21 @@ def kernels(depth, pieces, functions, spins):
                             continue
                         at_node[node] = count
                     set_touch(touches, count, touch, cells, v, inverse, spins, functions)
+                    more(touches, count, x, v, inverse, data)
                 count += 1
         for n in range(begin, min(count, touches.shape[0])):
             touches[n, THETA] = fitted(h * touches[n, OWN] * touches[n, PUSH] * touches[n, DAMPING])
         return count
 
-    return Rubbing(meet, recall, sweep, give, WIDTH, SLOTS * NOTED)
+    return meet
+
+
+def kernels(depth, pieces, functions, spins):
+    """The `Rubbing` of elements with two nodes.
+
+    Parameters
+    ----------
+    depth, pieces, functions, spins
+        See `refweb.effects.contact.friction.kernels`.
+    """
+    return Rubbing(meeting(depth, pieces, functions, spins), recall, sweep, give, WIDTH, SLOTS * NOTED)

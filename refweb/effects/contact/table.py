@@ -2,7 +2,7 @@
 
 The kernels of spheres alone are in `refweb.effects.contact.sphere`; other shapes, which touch a line wherever it lies
 on them, and other exponents are in `refweb.effects.contact.penalty`, damping and friction in
-`refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.contact.rubbing`. Bodies
+`refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.kicks`. Bodies
 whose kernels are the same make one family.
 """
 
@@ -230,13 +230,19 @@ class Contact(Table):
         from .friction import kernels
 
         force, stiffness, bound, damping = kernels(depth, *element, spins)
-        rubbing = None
+        pairs, rubbing = self._pairs(net, bodies, spins), None
         if net.order == 1:  # explicit steps take no other elements
-            from . import rubbing as kicks
+            nodes = pairs["cells"][:, :2]
+            if np.isin(nodes, net.carried).any():
+                from ..carried_nodes import columns
+                from . import carrying as kicks
 
+                pairs["data"] = np.hstack([pairs["data"], columns(net, nodes)])
+            else:
+                from . import rubbing as kicks
             rubbing = kicks.kernels(depth, net.subdivide, element[2], spins)
         return Family(
-            **self._pairs(net, bodies, spins),
+            **pairs,
             force=force,
             energy=None,
             stiffness=stiffness,

@@ -114,12 +114,12 @@ class Drag(Table):
         for name in self.bodies:
             if name not in names:
                 raise InputError(f'bodies."{name}" is not a free body, {nearest(name, names)}')
-        families = [self._family(*self._ends(net))]
+        families = [self._family(net, *self._ends(net))]
         if free:
             numbers = np.zeros((len(free), 11))
             numbers[:, 0], numbers[:, 2:5] = [self._of(body) for body in free], self.wind
             numbers[:, 8] = numbers[:, 9] = 1.0
-            families.append(self._family(np.array([[body.row] for body in free], dtype=np.int32), numbers))
+            families.append(self._family(net, np.array([[body.row] for body in free], dtype=np.int32), numbers))
         return families
 
     def _ends(self, net):
@@ -155,8 +155,13 @@ class Drag(Table):
         coefficient = SPHERE if own.coefficient is None else own.coefficient
         return 0.5 * self.density * coefficient * (own.area or math.pi * body.shape.grown().radius ** 2)
 
-    def _family(self, cells, data, elements=None):
-        blows = any(self.wind)
+    def _family(self, net, cells, data, elements=None):
+        blows, kick = any(self.wind), rubbing
+        if np.isin(cells[:, 0], net.carried).any():
+            from ..carried_nodes import columns
+            from .carrying import carrying as kick
+
+            data = np.hstack([data, columns(net, cells[:, :1])])
         force, stiffness, damping, bound = kernels(cells.shape[1])
         return Family(
             name="drag",
@@ -169,7 +174,7 @@ class Drag(Table):
             observed=1,
             power=0,
             damping=damping,
-            rubbing=rubbing(cells.shape[1]),
+            rubbing=kick(cells.shape[1]),
             symmetric=False,
             at_rest=blows,
             elements=elements,

@@ -1,0 +1,58 @@
+"""How fast bodies that turn may move, and how stiff what they carry makes them, at most: for steps of explicit methods.
+
+See `refweb.net.rotation`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..kernels import kernel
+from .rotation import along_principal, fastest_about, matrix_at
+
+
+@kernel()
+def carry_rates(rates, turns):
+    """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
+
+    A node at the arm a moves by δ + θ × a. In place of its displacement there are two unknowns, scaled to be no more
+    than half of it: so rows of other nodes keep their sums, and those of the body are its own over these scales.
+    """
+    for c in range(turns.carried.shape[0]):
+        i, n = turns.carried[c, 0], turns.carried[c, 1]
+        rates[turns.rows[n, 0]] += turns.scales[c, 0] * rates[i]
+        rates[turns.rows[n, 1]] += turns.scales[c, 1] * rates[i]
+
+
+@kernel()
+def pull_rates(rates, f, turns):
+    """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
+    for c in range(turns.carried.shape[0]):
+        i = turns.carried[c, 0]
+        pull = math.sqrt(f[i, 0] ** 2 + f[i, 1] ** 2 + f[i, 2] ** 2)
+        rates[turns.rows[turns.carried[c, 1], 1]] += 2.0 * turns.scales[c, 2] * pull
+
+
+@kernel()
+def speeds(n, x, v, turns):
+    """Speed of the place of a body, and what its rotation adds to that at its surface while it moves freely, at most.
+
+    [m/s].
+    """
+    b, s, far = turns.rows[n, 0], turns.rows[n, 1], turns.reach[n]
+    own = math.sqrt(v[b, 0] ** 2 + v[b, 1] ** 2 + v[b, 2] ** 2)
+    u = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (v[s, 0], v[s, 1], v[s, 2]), turns)
+    fastest = fastest_about(n, u, turns)
+    return own, far[0] * fastest[0] + far[1] * fastest[1] + far[2] * fastest[2]
+
+
+@kernel()
+def pushes(n, x, f, turns):
+    """Force on a body, and I times what the moment on it gives its surface by rotation over time, at most.
+
+    [N], and [N m²] over I [kg m²].
+    """
+    b, s, far, w = turns.rows[n, 0], turns.rows[n, 1], turns.reach[n], turns.faster[n]
+    own = math.sqrt(f[b, 0] ** 2 + f[b, 1] ** 2 + f[b, 2] ** 2)
+    m = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (f[s, 0], f[s, 1], f[s, 2]), turns)
+    return own, far[0] * w[0] * abs(m[0]) + far[1] * w[1] * abs(m[1]) + far[2] * w[2] * abs(m[2])
