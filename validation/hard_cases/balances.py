@@ -88,6 +88,9 @@ def energy_left(solution):
     """Energy of the last state less that of the first and the work, over the largest there was."""
     state, history = solution.state, solution.history
     kinetic = 0.5 * (state.system.net.mass[:, None] * state.v**2).sum()
+    for body in (body for body in state.system.net.bodies if body.turn is not None):  # ½ ω·L in place of ½ |L|²/I
+        turns, own = body.turning(state.x, state.v), state.v[body.spin]
+        kinetic += 0.5 * body.moment * (turns - own) @ own
     stored = tensions(solution)[2]
     others = sum(history.get(name, [0.0])[-1] for name in ("contact_energy", "dissipated_energy", "rupture_energy"))
     for effect in solution.scene.effects:

@@ -3,7 +3,8 @@
 Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of
 1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
 bodies that start inside of the web, edges that lines press deeper than
-they are round, pulses and peaks between steps, hammer blows, tables with more corners than steps.
+they are round, boxes that tumble onto edges and corners, plates at 50 m/s, surfaces with slivers, a body at rest on a
+net for 1e5 steps, pulses and peaks between steps, hammer blows, tables with more corners than steps.
 Each is solved by every method that takes it; a number proves each result:
 
 - statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
@@ -45,6 +46,7 @@ from .balances import energy_left, momentum_left, turning_left, unbalanced
 from .overlaps import outcome as hit_of
 from .overlaps import random_hit
 from .random_scenes import near_the_limit, outcome, random_net
+from .tumbling_hits import HITS, at_rest, bad_surface
 
 STATIC = ("newton", "relaxation")
 DYNAMIC = ("central-difference", "explicit", "cvode", "ida")
@@ -345,6 +347,7 @@ MOTIONS = {
                                         modulus=1e6, area=1e-5),
         "of a drum": free(DRUM, SOFT, FALLING, supports=RIM, duration=0.05, modulus=1e6, area=1e-5),
     },
+    "bodies that turn, on edges and corners, and flat": HITS,
     "impact at v [m/s]": {
         v: hit(ball(velocity=(0.0, 0.0, v), mass=1e-3), stiffness=max(1e4, 0.4 * v * v), duration=2.0 / max(v, 100.0))
         for v in (2.0, 100.0, 1000.0, 7000.0)
@@ -631,7 +634,7 @@ def case(quick):
     rows += more
     tables.append(Table("Dynamics: energy, momentum or angular momentum left", ["case", *DYNAMIC], cells))
     tables.append(Table("Dynamics: reasons of refusals", ["number", "reason"], reasons))
-    rows += [struck(), peaks(), overlaps()]
+    rows += [struck(), peaks(), overlaps(), bad_surface(), *at_rest(1e4 if quick else 1e5)]
     for method in ("central-difference",) if quick else ("central-difference", "cvode", "ida"):
         exact = method == "central-difference"
         within = (0.0, "bit for bit") if exact else (1e-3, "rtol 1e-6, and what slackness adds")

@@ -69,8 +69,9 @@ class Contact(Table):
 
     A sphere touches a line once. Other shapes touch each of its elements at both ends, and once in between, at ξ of its
     length with the energy W k δ^(p + 1)/(p + 1), W = 4 ξ (1 − ξ), so that nothing jumps as a line slides on. What fades
-    pushes along the line as well, by some δ over the length of the element times the push, to which ± is blind: where
-    bodies are much smaller than elements, have lines in pieces, ``subdivide``, or a larger stiffness.
+    pushes along the line as well, forth and back, by some 0.3 (δ²/(L r))^⅓ of the push on average, of an element of
+    length L and a surface of radius r along it, to which ± is blind: where that is above 5 % and friction, a run says
+    so. Lines in pieces, ``subdivide``, and a larger stiffness make it less.
 
     Parameters
     ----------
@@ -124,6 +125,10 @@ class Contact(Table):
     def law_of(self, body):
         """(stiffness, exponent) of a body; the stiffness is None where it is left out."""
         return self._of(body, "stiffness"), self._of(body, "exponent")
+
+    def friction_of(self, body):
+        """Coefficient of friction of a body."""
+        return self._of(body, "friction")
 
     def left_out(self, bodies):
         """Names of those of some bodies whose stiffness is left out."""
