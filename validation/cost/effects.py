@@ -69,6 +69,8 @@ EFFECTS = {
     "contact": {"body": [BALL], "contact": {"stiffness": 1e5}},
     "contact, a box that tumbles": {"body": [BOX], "contact": {"stiffness": 1e5}},
     "contact, two bodies": {"body": [BALL, CRATE], "contact": {"stiffness": 1e5, "between_bodies": True}},
+    "attach": {"body": [BOX], "attach": [{"body": "ball", "node": "centre"}]},
+    "attach, friction": {"body": [BOX], "attach": [{"body": "ball", "node": "centre"}], "contact": RUBBING},
     "friction": {"body": [BALL], "contact": RUBBING},
     "friction at 1e-6 m/s": {"body": [BALL], "contact": RUBBING | {"slip_velocity": 1e-6}},
     "friction, damping": {"body": [BALL], "contact": RUBBING | {"damping": 0.1}},

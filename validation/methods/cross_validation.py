@@ -75,6 +75,13 @@ EFFECTS = {
         "velocity": [{"node": "all", "value": [0.0, 0.0, 0.5]}],
         "observe": [*SMALL["observe"], ANGLE],
     },
+    "a box tied to its middle that rubs on it": {
+        "body": [BOX | {"position": [0.1, 0.05, 0.2]}],
+        "attach": [{"body": "box", "node": "centre"}],
+        "velocity": [{"node": "all", "value": [0.0, 0.0, 0.5]}],
+        "contact": {"stiffness": 300.0, "friction": 0.3, "damping": 0.1, "slip_velocity": 0.1},
+        "observe": [*SMALL["observe"], ANGLE, {"name": "lost", "quantity": "dissipated_energy"}],
+    },
 }
 """The small net, and what it has one at a time."""
 END = 0.03
