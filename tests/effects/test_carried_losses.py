@@ -371,7 +371,7 @@ def test_a_needle_that_spins_is_given_the_steps_that_are_told():
 
 
 def test_friction_of_lines_on_each_other_is_not_for_kicks_there():
-    """Its kicks would take nodes that bodies carry for fixed ones: central differences refuse it, and CVODE is chosen."""
+    """Its kicks would take nodes that bodies carry for fixed ones: they are refused, and CVODE is chosen."""
     given = lambda **keys: bridled(self_contact={"radius": 1e-3, "friction": 0.3}, solve=SHORT | keys)  # noqa: E731
     with pytest.raises(
         refweb.InputError, match=r"\[self_contact\] has losses that central-difference .* \[\[attach\]\]"
