@@ -65,7 +65,7 @@ class Kick:
         self.h = float(10.0 ** rng.uniform(-5, -1))
         self.f = loaded * 10.0 * rng.standard_normal(shown)
         (self.family,) = (one for one in system.families if one.rubbing is not None)
-        meet, _, sweep, give, width, memory = self.family.rubbing
+        meet, _, sweep, give, width, memory, _ = self.family.rubbing
         self.touches, total, self.sweeps = np.zeros((40, width)), self.f.copy(), 0
         where = self.family.cells, self.family.data, self.touches
         self.count = meet(self.h, self.x, self.v, self.inverse, *where, 0)
