@@ -181,6 +181,8 @@ class Damping(Table):
     ----------
     time : float
         τ of the material [s], ≥ 0; a vibration of taut lines along themselves, of period T, has the damping ratio πτ/T.
+        What resists is how fast the ends of a line go apart. Natural lengths L that reels and heat change add nothing:
+        −(l/L²) dL/dt, which a material that stays in the line has as a rate of strain as well, is left out.
     rate : float
         Rate at which velocities fade [1/s], ≥ 0: a force −rate m v on every node, m its lumped mass, with consistent
         mass as well.
