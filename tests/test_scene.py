@@ -642,8 +642,8 @@ def test_not_utf_8(tmp_path):
     [
         ("hexagon-lod", 'did you mean "hexagon-load"?'),
         ("nowhere/at/all.toml", "no such file"),
-        ("", "known: capture-stage"),
-        ("n" * 1000, "known: capture-stage"),
+        ("", "known: capture-satellite"),
+        ("n" * 1000, "known: capture-satellite"),
         ("a\nb\0", "no such file"),
     ],
 )
