@@ -111,29 +111,22 @@ class SelfContact(Table):
         )  # fmt: skip
         families = [push]
         if self.damping > 0.0:
-            families.append(self._losses(all_listed, common))
+            from . import losses
+
+            families.append(self._lossy(losses, all_listed, damping_bound=losses.damping_bound, **common))
         if self.friction > 0.0:
-            families.append(self._friction(all_listed, common))
+            from . import slipping
+
+            families.append(self._lossy(slipping, all_listed, rubbing=slipping.KICKS, **common))
         return families if len(families) > 1 else push
 
-    def _losses(self, all_listed, common):
-        """The family of damping."""
-        from . import losses
-
+    @staticmethod
+    def _lossy(kernels, all_listed, **own):
+        """The family of damping or of friction, by the module of its kernels."""
         return Family(
-            name="self_contact", force=losses.force, bound=losses.bound,
-            stiffness=losses.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
-            damping=losses.damping, damping_bound=losses.damping_bound, symmetric=False, at_rest=False, **common,
-        )  # fmt: skip
-
-    def _friction(self, all_listed, common):
-        """The family of friction."""
-        from . import slipping
-
-        return Family(
-            name="self_contact", force=slipping.force, bound=slipping.bound,
-            stiffness=slipping.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
-            damping=slipping.damping, rubbing=slipping.KICKS, symmetric=False, at_rest=False, **common,
+            name="self_contact", force=kernels.force, bound=kernels.bound,
+            stiffness=kernels.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
+            damping=kernels.damping, symmetric=False, at_rest=False, **own,
         )  # fmt: skip
 
     def stiffness_on(self, net):
