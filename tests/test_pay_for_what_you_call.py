@@ -87,8 +87,10 @@ BELOW = {name: TABLES_OF_TIME | {"effects.outer_load"} for name in ("load", "pre
 BELOW |= {"motion": TABLES_OF_TIME}
 BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
 VECTORS = {"effects.vectors"}
-BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in ("nearest_point", "overlap", "pair"))}}
+CONTACT = "nearest_point", "overlap", "pair", "passing"
+BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in CONTACT)}}
 BELOW["contact"] |= VECTORS | {"net.rotation"}
+FOLLOWED = {"dynamics.integrators.followed_lines", "dynamics.integrators.followed_bodies"}
 LINES_ON_LINES = ("", ".crossing", ".pair", ".passage", ".press", ".search", ".smeared")
 BELOW["self_contact"] = VECTORS | {f"effects.self_contact{name}" for name in LINES_ON_LINES}
 BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
@@ -152,6 +154,9 @@ def called(given):
         modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
     if len(given.get("body", ())) > 1 and not given.get("contact", {}).get("between_bodies"):
         modules |= {"effects.contact", "effects.contact.silent", "net.skeleton"}  # bodies that overlap in silence
+    if "contact" in given and solve["kind"] == "dynamic":
+        modules |= {"effects.contact.passage"}
+        modules |= FOLLOWED if method in ("cvode", "ida") else set()
     if "contact" in given:
         modules.add("results.observables.overlap" if solve["kind"] == "dynamic" else "statics.passage")
         keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
@@ -279,12 +284,13 @@ TABLES = {
 }
 SOLVED = ("what touches", "forces before", "sweep", "power")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "meets", "watch", "probe")
+LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
 KERNELS |= {name: {**FAMILY, "near": 1} for name in ("contact", "self_contact")}
 KERNELS["self_contact"] |= {"meets": 1, "watch": 1}
+KERNELS["contact"] |= {"passing": 1}
 KERNELS["attach"] = {"motion": 1}  # to a body that is fixed
 KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis

@@ -318,7 +318,7 @@ class Watch:
         if overlaps.pairs is not None:
             for i in range(len(overlaps.pairs.found)):
                 at = self._of_warning(("between", i))
-                overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]))
+                overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]), course.time)
 
     def note_way(self, course, pairs, integrator):
         """Note what bounds the way of bodies in a step in `refweb.effects.contact.pair_overlap.PairOverlaps`."""

@@ -86,7 +86,7 @@ class Simulation:
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
-        self._lines = None
+        self._lines, self._through = None, _through_of(system, scene)
         self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self._stand(kept)
@@ -218,6 +218,7 @@ class Simulation:
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
+        self._through = _through_of(self.system, self.scene)
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -268,7 +269,10 @@ class Simulation:
             solution.bodies = self.overlaps.plain()
             if (pairs := self.overlaps.pairs) is not None:
                 watch.note_way(course, pairs, self.integrator)
-                solution.pairs, solution.passage = pairs.plain(), {"bodies": pairs.passage()}
+                solution.pairs, solution.passage = pairs.plain(), {"pairs": pairs.passage()}
+        if self._through is not None:
+            self._through.note(course.crossings)
+            solution.passage = {**solution.passage, "bodies": self._through.told()}
         if self._lines is not None:
             solution.passage, solution.lines = {**solution.passage, "lines": self._lines.told()}, self._lines.plain()
         if np.isfinite(course.x).all():
@@ -317,6 +321,8 @@ class Simulation:
         yield from self.system.remarks()
         if self.overlaps is not None:
             yield from self.overlaps.remarks()
+        if self._through is not None:
+            yield from self._through.remarks()
         if self._lines is not None:
             yield from self._lines.remarks()
         if self._silent is not None:
@@ -351,6 +357,15 @@ def _overlaps_of(scene, system):
 
         pairs = PairOverlaps(settled.contact, settled.chosen, system)
     return Overlaps(settled, system, moving=True, pairs=pairs)
+
+
+def _through_of(system, scene):
+    """The `refweb.effects.contact.passage.BodyPassage` of a scene, None without contact."""
+    if not system.contact:
+        return None
+    from ..effects.contact.passage import BodyPassage
+
+    return BodyPassage(system, scene.solve.method)
 
 
 def _silent_of(system):

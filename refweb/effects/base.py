@@ -135,6 +135,9 @@ class Family:
         How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
     crossing : Crossing, optional
         What tells whether lines have passed through lines, where those of its cells push each other.
+    passing : kernel, optional
+        Whether lines of its cells come as deep in a body as its middle in a drift, by `refweb.kernels.MEETS`, where it
+        is the push of contact with straight lines.
     internal : bool
         True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
     impulse : kernel, optional
@@ -176,6 +179,7 @@ class Family:
     finder: Callable | None = None
     rubbing: Rubbing | None = None
     crossing: Crossing | None = None
+    passing: Callable | None = None
     internal: bool = False
     impulse: Callable | None = None
     moment_free: bool = False

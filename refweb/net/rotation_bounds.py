@@ -56,3 +56,27 @@ def pushes(n, x, f, turns):
     own = math.sqrt(f[b, 0] ** 2 + f[b, 1] ** 2 + f[b, 2] ** 2)
     m = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (f[s, 0], f[s, 1], f[s, 2]), turns)
     return own, far[0] * w[0] * abs(m[0]) + far[1] * w[1] * abs(m[1]) + far[2] * w[2] * abs(m[2])
+
+
+@kernel()
+def beside_places(kick, drift, x, v, f, inverse, turns):
+    """By how much points of bodies come elsewhere than their places do in a drift behind a kick, at most [m].
+
+    Of the surface that is what it turns by; of nodes that bodies carry how far they are off the way that the velocities
+    they have lead them.
+    """
+    most = off = 0.0
+    for n in range(turns.moment.size):
+        (_, turning), (_, moment) = speeds(n, x, v, turns), pushes(n, x, f, turns)
+        most = max(most, abs(drift) * (turning + abs(kick) * inverse[turns.rows[n, 1], 0] * moment))
+    for c in range(turns.carried.shape[0]):
+        n, a = turns.carried[c, 1], turns.arms[c]
+        b, s = turns.rows[n, 0], turns.rows[n, 1]
+        u = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (v[s, 0], v[s, 1], v[s, 2]), turns)
+        w, arm = fastest_about(n, u, turns), math.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+        force = abs(kick) * inverse[b, 0] * math.sqrt(f[b, 0] ** 2 + f[b, 1] ** 2 + f[b, 2] ** 2)
+        more = abs(kick) * inverse[s, 0] * math.sqrt(f[s, 0] ** 2 + f[s, 1] ** 2 + f[s, 2] ** 2)
+        more *= max(turns.faster[n, 0], turns.faster[n, 1], turns.faster[n, 2])
+        angle = abs(drift) * (math.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2) + more)
+        off = max(off, abs(drift) * (force + more * arm) + 0.5 * angle * angle * arm)
+    return most + off

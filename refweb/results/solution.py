@@ -115,7 +115,8 @@ class SolutionData:
         Of lines that touch lines the deepest ``overlap`` [m], their ``radius`` [m] and the ``stiffness`` [N/m];
         empty without ``[self_contact]``.
     passage : dict
-        By what may have passed through what: "certified" where nothing can have, or why that is not certain.
+        "certified" where nothing can have passed, or why that is not certain: of ``lines`` through lines, of lines
+        through ``bodies``, and of ``pairs`` of bodies through each other.
     reduced : dict
         Results of a dynamic run; `results` has those of either kind.
     horizon : dict

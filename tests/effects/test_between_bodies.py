@@ -1,6 +1,7 @@
 """Bodies against bodies: forces from energies, momenta, tangents, bounds, hits, rolling, sliding, what passes."""
 
 import itertools
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -249,7 +250,7 @@ def test_a_box_on_its_edge(solve):
     assert s.pairs["floor, b"]["overlap"] > 1e-3
     assert np.linalg.norm(s.state.v[spin]) > 0.1
     np.testing.assert_allclose(s.state.v[row, :2], 0.0, atol=1e-12)  # the floor is flat there: it pushes upward
-    assert s.passage == {"bodies": "certified"}
+    assert s.passage == {"pairs": "certified", "bodies": "certified"}
 
 
 def test_edges_do_not_pass():
@@ -264,7 +265,7 @@ def test_edges_do_not_pass():
     (a, _), (b, _) = rows(found, "a"), rows(found, "b")
     np.testing.assert_allclose(found.state.v[[a, b], 2], [0.0, -1.0], atol=2e-3)
     assert found.state.position[a, 2] > found.state.position[b, 2]
-    assert found.passage == {"bodies": "certified"}
+    assert found.passage == {"pairs": "certified", "bodies": "certified"}
 
 
 BOXES = [
@@ -308,18 +309,26 @@ def test_what_is_too_deep():
     """A warning names the pair and the stiffness that would do; a body in the core of another ends the run."""
     s = run(BALLS, 0.15, dict(stiffness=2e3))
     assert any('bodies "a" and "b" are' in text and "stiffness = " in text for text in s.warnings)
-    with pytest.raises(refweb.SolverError, match=r'bodies "a" and "b" are .* in the core'):
-        run(BALLS, 0.15, dict(stiffness=50.0))
+    core = (
+        r'bodies "a" and "b" are (\S+) m deep .* in the core, more than 0\.5 of the 0\.1 m .*; stiffness = (\S+) holds'
+    )
+    with pytest.raises(refweb.SolverError, match=core) as refused:
+        run(BALLS, 0.15, dict(stiffness=190.0))
+    deep, enough = map(float, re.search(core, str(refused.value)).groups())
+    assert deep > 0.05
+    # k v²-law: the energy ½ · ½ kg · (1 m/s)² at 0.8 of the allowed 0.01 m, and what two digits round up by
+    assert enough == pytest.approx(0.5 / 0.008**2, rel=0.05)
+    assert run(BALLS, 0.15, dict(stiffness=enough)).pairs["a, b"]["overlap"] == pytest.approx(0.008, rel=0.03)
 
 
 def test_passage():
     """Steps that are given may be too long for that to be certain."""
     quick = [BALLS[0] | dict(velocity=[20.0, 0, 0]), BALLS[1]]
-    assert run(quick, 0.02, dict(stiffness=1e7), step_size=1e-5).passage == {"bodies": "certified"}
+    assert run(quick, 0.02, dict(stiffness=1e7), step_size=1e-5).passage["pairs"] == "certified"
     long = run([BALLS[0] | dict(velocity=[20.0, 0, 0], position=[0, 0.5, 0]), BALLS[1]], 0.02, dict(stiffness=1e4))
-    assert long.passage == {"bodies": "certified"}
+    assert long.passage["pairs"] == "certified"
     by = [BALLS[0] | dict(velocity=[20.0, 0, 0], position=[0, 0.5, 0]), BALLS[1]]
-    found = run(by, 0.04, dict(stiffness=50.0), step_size=4e-3).passage["bodies"]  # 2 · 20 m/s · 4 ms against 0.1 m
+    found = run(by, 0.04, dict(stiffness=50.0), step_size=4e-3).passage["pairs"]  # 2 · 20 m/s · 4 ms against 0.1 m
     assert 'not certified: bodies "a" and "b" may come nearer by 0.16 m in a step' in found
 
 
@@ -545,7 +554,7 @@ def test_nothing_passes(seed):
     law = dict(friction=float(rng.choice([0.0, 0.5])), damping=float(rng.choice([0.0, 0.1])))
     solve = METHODS[1] if seed % 5 == 4 else {}
     s = run(thrown(seed), 0.5, law, frames=200, **solve)
-    assert s.passage["bodies"] == "certified" or solve
+    assert s.passage["pairs"] == "certified" or solve
     assert s.solver["energy_drift"] <= 1e-2
     net, touched = s.state.system.net, 0
     for _, state in s.frames:

@@ -340,10 +340,15 @@ class CentralDifference(Integrator):
         raise NoEnd(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _refuse_passing(self, course, now):
-        """Say which lines would pass through each other in any step that is not far below the stable one."""
-        from ...effects.self_contact.passage import would_pass
+        """Say which lines would pass through what in any step that is not far below the stable one."""
+        if self._model.walls.met[3] == 0:
+            from ...effects.contact.passage import would_pass
 
-        told = would_pass(self.system, course.v, self._model.guard.met)
+            told = would_pass(self.system, self._model.walls.met)
+        else:
+            from ...effects.self_contact.passage import would_pass
+
+            told = would_pass(self.system, course.v, self._model.guard.met)
         at = now["time"] + now["begun"] * now["step"]
         raise SolverError(
             f"at t = {at:.6g} s, in a step of {now['cut']:.3g} s where {now['stable']:.3g} is stable, {told}"

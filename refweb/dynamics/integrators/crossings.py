@@ -1,4 +1,4 @@
-"""The first lines of a run that may have passed through each other: when, and which."""
+"""The first lines of a run that may have passed through each other, or through a body: when, and which."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from ...kernels import kernel
 
-APART, BESIDE = 0, 1
-"""Rows of what has met: lines that push each other, and neighbours along the net."""
+APART, BESIDE, THROUGH = 0, 1, 2
+"""Rows of what has met: lines that push each other, neighbours along the net, and a line and the middle of a body."""
 
 
 def none_met():
-    """Nothing has met: times [s] and four nodes each, shape (2, 5)."""
-    return np.tile([np.inf, -1.0, -1.0, -1.0, -1.0], (2, 1))
+    """Nothing has met: times [s] and four rows each, shape (3, 5)."""
+    return np.tile([np.inf, -1.0, -1.0, -1.0, -1.0], (3, 1))
 
 
 @kernel()

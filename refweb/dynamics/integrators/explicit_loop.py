@@ -30,7 +30,7 @@ from .energy_book import (
 )
 from .events import ended_by, note_events
 from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
-from .guard import LEAST, SHORTER, comes_through
+from .guard import LEAST, SHORTER, comes_through, look_back_at_drift, passes
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, push_on, set_push
 from .nearby import bits_of, exchange, follow_near, reach_all, show_near, spread_of
@@ -54,7 +54,7 @@ from .step import (
 from .step_bound import safe_step
 
 HELD = -2
-"""What the loop returns where lines would pass through lines whatever the step."""
+"""What the loop returns where lines would pass whatever the step."""
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
 
@@ -76,7 +76,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         give_impulse(kick, reaction, running.impulse)
         give_impulse(kick, push, running.ledger.pushed)
         book_potential(1.0, kicked, x, families, running.work)
-        if model.guard.families.size:
+        if model.guard.families.size + model.walls.families.size:
             comes_through(now - h, kick, drift, False, model, running)
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, families, running.work)
@@ -147,18 +147,17 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    guarded, pushing, length_force = model.guard.families.size, model.outside.pushing.size > 0, running.length_force
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
-    plain, scales, known = observed.plain, observed.scales, np.zeros(3)
+    plain, scales, known, pushing = observed.plain, observed.scales, np.zeros(3), model.outside.pushing.size > 0
     signs, followed, sums, touches = observed.signs, observed.followed, observed.sums, np.empty((0, model.rubbed.width))
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
     awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
     extra = np.zeros((rows if powers.shape[0] + viscous.size + rubbing.size or pushing else 0, 3))
-    half, was = np.empty_like(extra), np.empty(reels.lengths.size if changing else 0)
+    half, was, length_force = np.empty_like(extra), np.empty(reels.lengths.size * changing), running.length_force
     stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
     looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
@@ -171,7 +170,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_state(x, v, f, inverse, inside.before)
         if stages:
             inner_stages(now, h, scheme, model, running, reaction, push, extra)
-        if guarded and comes_through(now - h, kicks[stages], drifts[stages], stages == 0, model, running):
+        if passes(now - h, kicks[stages], drifts[stages], stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)
         move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, model.inertia.turns)
@@ -181,6 +180,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         if changing:
             change_lengths(now, x, reels, was, data[0], length_force, work)
         follow_near(drifts[0], x, bits, before, driven, nearby, families)
+        look_back_at_drift(now - h, model, running)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])

@@ -36,7 +36,7 @@ class FollowedLines:
 
     def __init__(self, system):
         self._families = [family for family in system.families if family.crossing is not None]
-        self._nodes = system.net.nodes
+        self._places = system.net.nodes
         self._still, self._met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
 
     def soon(self, x, v):
@@ -45,25 +45,29 @@ class FollowedLines:
 
     def look(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
-        begin, crossings = Place(course.time, course.x), course.crossings
-        middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
         for family in self._families:
             own, beside = family.crossing, (family.crossing.rows, family.crossing.data)
             for which, cells in ((APART, (family.cells, family.data)), (BESIDE, beside)):
-                if not np.isfinite(crossings[which, 0]):
-                    time = self._meeting(own.meets, cells, begin, middle, end, at, HALVINGS)
-                    if time is not None:
-                        note_met(which, time, self._met, crossings)
+                self._note(course, piece, at, which, own.meets, cells)
+
+    def _note(self, course, piece, at, which, meets, cells):
+        """Note in a row of what has met the first that may have in a piece of a step."""
+        if np.isfinite(course.crossings[which, 0]):
+            return
+        begin = Place(course.time, course.x)
+        middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
+        time = self._meeting(meets, cells, begin, middle, end, at, HALVINGS)
+        if time is not None:
+            note_met(which, time, self._met, course.crossings)
 
     def _meeting(self, meets, cells, begin, middle, end, at, halvings):
-        """Time from which on two lines may have met [s], None where none have."""
+        """Time from which on two may have met [s], None where none have."""
         bend = middle.x - 0.5 * (begin.x + end.x)
-        room = self._spread(bend)
+        room = self._spread(bend) + self._turned(bend)
         for first, last in ((begin, middle), (middle, end)):
             way = last.x - first.x
-            if not meets(
-                room, 2.0 * self._spread(way), 0.0, 1.0, first.x, way, self._still, self._still, *cells, self._met
-            ):
+            open_, most = room + self._turned(way), 2.0 * self._spread(way)
+            if not meets(open_, most, 0.0, 1.0, first.x, way, self._still, self._still, *cells, self._met):
                 continue
             if not halvings:
                 return first.time
@@ -74,5 +78,9 @@ class FollowedLines:
         return None
 
     def _spread(self, way):
-        """By how much nodes are further than the first is, at most [m]."""
-        return float(np.linalg.norm(way[: self._nodes] - way[:1], axis=1).max(initial=0.0))
+        """By how much places are further than the first is, at most [m]."""
+        return float(np.linalg.norm(way[: self._places] - way[:1], axis=1).max(initial=0.0))
+
+    def _turned(self, way):
+        """By how much points of what turns move beside that, at most [m]."""
+        return 0.0

@@ -1,4 +1,4 @@
-"""What keeps lines from passing through lines: each drift of an explicit step is looked at before it is taken.
+"""What keeps lines from passing: each drift of an explicit step is looked at before it is taken.
 
 In a drift rows move in straight lines, behind the kick that gives them their velocities. Lines whose overlap and the
 way by which two rows may come nearer are together less than the distance of touch cannot meet. Where they are not, the
@@ -6,6 +6,12 @@ pairs of lines are looked at one by one, see `refweb.effects.self_contact.crossi
 not taken but cut to `SHORTER` of it, until the next row or corner of a table. Where less than `LEAST` of the step that
 is stable is left, the run ends. Steps of higher order are not cut, but told of. Of neighbours along the net, which do
 not push each other, it is told when the first two meet.
+
+Bodies keep lines out of their middle in the same way, see `refweb.effects.contact.passing`: the depth of all contacts
+and the way of a drift are together less than the depth there, or lines near bodies are looked at one by one. A line
+that is in the core of a body already is no matter of the step, and told of. Where twice the way of the last drift
+leaves room, the next is not looked at before, which costs a look at all velocities, but behind it: its way is known for
+other reasons. What has come further in it is told of.
 """
 
 from __future__ import annotations
@@ -17,13 +23,16 @@ import numpy as np
 from numba.typed import List
 
 from ...kernels import INDICES, INTEGERS, MATRIX, MEETS, VECTOR, WATCH, kernel, typed_list
-from .crossings import APART, BESIDE, note_met
+from ...net.rotation_bounds import beside_places
+from .crossings import APART, BESIDE, THROUGH, note_met
 from .nearby import near_of, spread_of
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
 LEAST = 1e-3
 """Share of the stable step below which none is tried."""
+CALM = 2.0
+"""Way of a drift that is not looked at before, over that of the last, at most; above, it is told of."""
 FAR = 0.02
 """Way over the distance of touch above which it is looked at more closely."""
 
@@ -75,14 +84,72 @@ class Guard(NamedTuple):
         )
 
 
+class Walls(NamedTuple):
+    """Bodies that push lines.
+
+    Attributes
+    ----------
+    families, places : ndarray of int
+        As in `Guard`.
+    meets : List
+        Kernels of `refweb.effects.contact.passing`.
+    most : ndarray
+        Depth that nothing comes to of each family, at least [m].
+    shown : ndarray
+        Largest depth over what cells show, infinite where that is not known.
+    met : ndarray of int, shape (4,)
+        Nodes of the last line that would have come to the middle of a body, its row, and whether it was in the core.
+    left : ndarray, shape (1,)
+        Way that is open to a drift which is not looked at before [m], 0 where it is; none where nothing is pushed.
+    """
+
+    families: np.ndarray
+    places: np.ndarray
+    meets: List
+    most: np.ndarray
+    shown: np.ndarray
+    met: np.ndarray
+    left: np.ndarray
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        found = [i for i, family in enumerate(system.families) if family.passing is not None]
+        own, near, limits = [system.families[i] for i in found], near_of(system), np.zeros((0, 2))
+        if found:
+            from ...effects.contact.passing import limits_of
+
+            limits = np.array([limits_of(family, system.net.bodies) for family in own])
+        return cls(
+            families=np.array(found, dtype=np.int64),
+            places=np.array([near.index(i) for i in found], dtype=np.int64),
+            meets=typed_list(MEETS, [family.passing for family in own]),
+            most=np.ascontiguousarray(limits[:, 0]),
+            shown=np.ascontiguousarray(limits[:, 1]),
+            met=np.ones(4, dtype=np.int64),
+            left=np.zeros(1 if found else 0),
+        )
+
+
+@kernel(forceinline=True)
+def _larger(a, b):
+    return b if b > a else a
+
+
 @kernel(fastmath={"contract", "nnan", "nsz"})
-def largest_of(kick, v, f, inverse):
-    """Largest component of velocities behind a kick, and of what that adds to them."""
-    most = more = 0.0
-    for q in range(v.size):
-        gained = kick * inverse[q] * f[q]
-        most, more = max(most, abs(v[q] + gained)), max(more, abs(gained))
-    return most, more
+def largest_of(kick, v, f, inverse, share):
+    """Largest component of velocities, by a ``share`` of 0 or 1, with what a kick adds to them: four maxima at once."""
+    a = b = c = d = 0.0
+    whole = v.size // 4 * 4
+    for q in range(0, whole, 4):
+        m, n, o, p = np.uint64(q), np.uint64(q + 1), np.uint64(q + 2), np.uint64(q + 3)
+        a = _larger(a, abs(share * v[m] + kick * inverse[m] * f[m]))
+        b = _larger(b, abs(share * v[n] + kick * inverse[n] * f[n]))
+        c = _larger(c, abs(share * v[o] + kick * inverse[o] * f[o]))
+        d = _larger(d, abs(share * v[p] + kick * inverse[p] * f[p]))
+    for q in range(whole, v.size):
+        a = _larger(a, abs(share * v[np.uint64(q)] + kick * inverse[np.uint64(q)] * f[np.uint64(q)]))
+    return _larger(_larger(a, b), _larger(c, d))
 
 
 @kernel()
@@ -92,31 +159,97 @@ def look_anew(guard):
         guard.due[m][:] = 0.0
 
 
+@kernel(forceinline=True)
+def near_cells(way, i, place, model):
+    """(Cells, data) of a family that may touch on a way [m]: those that are looked at, or all."""
+    skin, families = model.nearby.skin[0], model.families
+    if way > skin.depth - skin.used:
+        before = place - model.nearby.families.size  # all cells, see `refweb.dynamics.integrators.records`
+        return families.cells[len(families.cells) + before], families.data[len(families.data) + before]
+    return families.cells[i], families.data[i]
+
+
+@kernel(forceinline=True)
+def deepest_of(shown):
+    """Largest of what a family shows, 0 where that is nothing."""
+    deep = 0.0
+    for c in range(shown.shape[0]):
+        deep = max(deep, shown[c, 0])
+    return deep
+
+
+@kernel(forceinline=True)
+def calm(walls, nearby, families):
+    """Whether a drift behind another need not be looked at before, for bodies alone that do not turn."""
+    skin, left = nearby.skin[0], math.inf
+    for m in range(walls.families.size):
+        deep = deepest_of(families.outs[walls.families[m]])
+        left = min(left, walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0))
+    walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
+    return walls.left[0] > 0.0
+
+
+@kernel()
+def look_back_at_bodies(time, model, running):
+    """Note lines that may have come to the middle of a body in a drift that was not looked at before, from its end."""
+    walls, x, v, f, skin = model.walls, running.x, running.v, running.f, model.nearby.skin[0]
+    for m in range(walls.families.size):
+        cells, data = near_cells(math.inf, walls.families[m], walls.places[m], model)
+        if walls.meets[m](skin.last, 0.0, 0.0, 0.0, x, v, f, model.inertia.inverse, cells, data, walls.met):
+            note_met(THROUGH, time, walls.met, running.crossings)
+
+
+@kernel(forceinline=True)
+def look_back_at_drift(time, model, running):
+    """Look back at the drift from a time on where it was not looked at before, and led further than it might."""
+    if model.walls.left.size:
+        if not (model.walls.left[0] == 0.0 or model.nearby.skin[0].last < model.walls.left[0]):
+            look_back_at_bodies(time, model, running)
+
+
+@kernel(forceinline=True)
+def passes(time, kick, drift, stages, model, running):
+    """Whether the last drift of a step, behind a kick and some ``stages``, is not to be taken, see `comes_through`."""
+    if model.guard.families.size + model.walls.families.size == 0:
+        return False
+    if stages + model.guard.families.size + model.inertia.turns.moment.size == 0:
+        if calm(model.walls, model.nearby, model.families):
+            return False
+    return comes_through(time, kick, drift, stages == 0, model, running)
+
+
 @kernel()
 def comes_through(time, kick, drift, whole, model, running):
-    """Whether lines that push each other would meet in a drift behind a kick, from a time on.
+    """Whether lines would pass in a drift behind a kick, from a time on: each other, or the middle of a body.
 
     Where a step is not a ``whole`` drift that is noted, as neighbours that meet are.
     """
-    guard, families, linear = model.guard, model.families, model.inertia.linear
-    x, v, f, inverse, size = running.x, running.v, running.f, model.inertia.inverse, 3 * model.inertia.linear
-    most, more = largest_of(kick, v.reshape(-1)[:size], f.reshape(-1)[:size], inverse.reshape(-1)[:size])
-    way = 2.0 * math.sqrt(3.0) * abs(drift) * most
-    if way > FAR * guard.touch:
-        way = min(way, abs(drift) * (spread_of(v[:linear]) + 2.0 * math.sqrt(3.0) * more))
+    linear, touch = model.inertia.linear, model.guard.touch
+    size = 3 * linear
+    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
+    way = 2.0 * math.sqrt(3.0) * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
+    if touch > 0.0 and way > FAR * touch:
+        more = 2.0 * math.sqrt(3.0) * largest_of(kick, v, f, inverse, 0.0)
+        way = min(way, abs(drift) * (spread_of(running.v[:linear]) + more))
     if not way < math.inf:
         return False
-    came = False
+    came = passes_lines(time, way, kick, drift, whole, model, running) if touch > 0.0 else False
+    if model.walls.families.size:
+        came = passes_bodies(time, way, kick, drift, whole, model, running) or came
+    if came:
+        running.clock[0].held = 1
+    return came
+
+
+@kernel()
+def passes_lines(time, way, kick, drift, whole, model, running):
+    """Whether lines that push each other would meet."""
+    guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
+    inverse = model.inertia.inverse
     for m in range(guard.families.size):
-        i, deep, skin, place = guard.families[m], 0.0, model.nearby.skin[0], guard.places[m]
-        shown, cells, data = families.outs[i], families.cells[i], families.data[i]
-        for c in range(shown.shape[0]):
-            deep = max(deep, shown[c, 0])
-        if not way + deep < guard.touch:
-            if way > guard.touch + skin.depth - skin.used:
-                before = place - model.nearby.families.size  # all cells, see `refweb.dynamics.integrators.records`
-                data = families.data[len(families.data) + before]
-                cells = families.cells[len(families.data) + before]
+        i = guard.families[m]
+        if not way + deepest_of(families.outs[i]) < guard.touch:
+            cells, data = near_cells(way - guard.touch, i, guard.places[m], model)
             if guard.meets[m](0.0, way, kick, drift, x, v, f, inverse, cells, data, guard.met):
                 came = whole
                 if not whole:
@@ -126,6 +259,26 @@ def comes_through(time, kick, drift, whole, model, running):
             guard.met,
         ):  # fmt: skip
             note_met(BESIDE, time, guard.met, running.crossings)
-    if came:
-        running.clock[0].held = 1
+    return came
+
+
+@kernel()
+def passes_bodies(time, way, kick, drift, whole, model, running):
+    """Whether lines would come as deep in a body as its middle."""
+    walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
+    inverse, room = model.inertia.inverse, 0.0
+    if model.inertia.turns.moment.size:
+        room = beside_places(kick, drift, x, v, f, inverse, model.inertia.turns)
+    walls.met[3] = 1
+    for m in range(walls.families.size):
+        i = walls.families[m]
+        deep = deepest_of(families.outs[i])
+        if (walls.shown[m] * deep if deep > 0.0 else 0.0) + way + room < walls.most[m]:
+            continue
+        cells, data = near_cells(way + room, i, walls.places[m], model)
+        if walls.meets[m](room, way, kick, drift, x, v, f, inverse, cells, data, walls.met):
+            if whole and walls.met[3] == 0:
+                came = True
+                break
+            note_met(THROUGH, time, walls.met, running.crossings)
     return came

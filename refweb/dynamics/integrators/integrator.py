@@ -88,9 +88,10 @@ class Course:
         Largest |ΔE − work| of the rows [J].
     share : float
         |ΔE − work| at the last row over ``largest`` there [1], infinite before the first.
-    crossings : ndarray, shape (2, 5)
+    crossings : ndarray, shape (3, 5)
         Where lines may touch lines, the first two that may have passed through each other, and the first two neighbours
-        along the net: time [s], infinite where there are none, and the four nodes of both.
+        along the net: time [s], infinite where there are none, and the four nodes of both; the first line that may have
+        passed through a body: time, its two nodes, the row of the body and a number.
     breaks : refweb.system.torn.Breaks, optional
         What has broken, where anything may.
     """

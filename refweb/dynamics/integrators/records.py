@@ -18,7 +18,7 @@ from ...results.probes import PROBE, plain_of
 from .averages import Averages, Windows
 from .energy_book import no_energy
 from .extremes import Extremes
-from .guard import Guard
+from .guard import Guard, Walls
 from .momentum_book import Ledger, Outside
 from .nearby import Nearby, near_of
 from .rubbed import Rubbed
@@ -257,15 +257,15 @@ class Model(NamedTuple):
     outside: Outside
     nearby: Nearby
     guard: Guard
+    walls: Walls
 
     @classmethod
     def of(cls, system, outs):
         """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
         inertia, families, rubbed = Inertia.of(system), Families.of(system, outs), Rubbed.of(system)
         motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
-        return cls(
-            inertia, families, rubbed, motions, reels, system.corners, outside, Nearby.of(system), Guard.of(system)
-        )
+        kept = Nearby.of(system), Guard.of(system), Walls.of(system)
+        return cls(inertia, families, rubbed, motions, reels, system.corners, outside, *kept)
 
 
 @record
@@ -352,8 +352,8 @@ class Running(NamedTuple):
         Power of each family at the last step [W].
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
-    crossings : ndarray, shape (2, 5)
-        Lines that have met, see `refweb.dynamics.integrators.integrator.Course`.
+    crossings : ndarray, shape (3, 5)
+        What has met, see `refweb.dynamics.integrators.integrator.Course`.
     """
 
     clock: np.ndarray

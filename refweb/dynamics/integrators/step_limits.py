@@ -28,6 +28,8 @@ class StepLimits:
     ----------
     lines : refweb.dynamics.integrators.followed_lines.FollowedLines, optional
         Lines that touch lines, where any do.
+    followed : list of refweb.dynamics.integrators.followed_lines.FollowedLines
+        These, and lines that touch bodies.
     """
 
     def __init__(self, system, rotations=None):
@@ -36,6 +38,11 @@ class StepLimits:
             from .followed_lines import FollowedLines
 
             self.lines = FollowedLines(system)
+        self.followed = [] if self.lines is None else [self.lines]
+        if any(family.passing is not None for family in system.families):
+            from .followed_bodies import FollowedBodies
+
+            self.followed.append(FollowedBodies(system))
         self._rotations = rotations
         self._net, self._moving = system.net, system.rows - system.net.spins
         self._corners = system.corners

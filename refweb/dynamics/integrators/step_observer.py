@@ -340,8 +340,8 @@ class StepObserver(Integrator):
             if stop < end:
                 piece = self._piece(course, stop)
         self._look(course, piece)
-        if self._limits.lines is not None:
-            self._limits.lines.look(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
+        for followed in self._limits.followed:
+            followed.look(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
         course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind

@@ -35,7 +35,7 @@ class DeepestPair(NamedTuple):
     chosen : tuple of str
         Names of those whose stiffness is refweb's choice.
     least : float
-        Stiffness that their energy asks for at the start [N/m^p].
+        Stiffness that their energy asks for at the start [N/m^p], where they are still getting deeper, else 0.
     initial : float
         Overlap at t = 0 [m], which no stiffness changes.
     """
@@ -71,7 +71,7 @@ class DeepestPair(NamedTuple):
 
     @property
     def enough(self):
-        """Stiffness that would do [N/m^p]."""
+        """Stiffness that would do [N/m^p]: of an overlap that is `AIM` of what is allowed."""
         own = self.stiffness * (self.overlap / (AIM * self.allowed)) ** (self.exponent + 1.0)
         return rounded_up(max(own, self.least) if self.in_core else own)
 
@@ -99,7 +99,10 @@ class DeepestPair(NamedTuple):
         if self.chosen and self.overlap > self.allowed and self.overlap > DEEPER * self.initial:
             raise too_soft(self, self._where, self.allowed, self.chosen)
         if self.in_core:
-            raise SolverError(f"{self._where}, in the core, {self.thickness:.3g} m below the surface; {self._remedy}")
+            raise SolverError(
+                f"{self._where}, in the core, more than {CORE:g} of the {self.thickness:.3g} m from the middle of the "
+                f"smaller to its surface; {self._remedy}"
+            )
 
     def remarks(self):
         """What a reader of the results has to know."""
@@ -110,7 +113,10 @@ class DeepestPair(NamedTuple):
 
     @property
     def _remedy(self):
-        return f"stiffness = {self.enough:g} is enough in place of {self.stiffness:g}, or leave it out"
+        return (
+            f"stiffness = {self.enough:g} holds them to {AIM * self.allowed:.3g} m in place of {self.stiffness:g}, or "
+            "leave it out"
+        )
 
 
 class PairOverlaps:
@@ -131,19 +137,22 @@ class PairOverlaps:
         self.found = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
         self._way, self._open = None, []
 
-    def _deepest(self, bodies, overlap, time, initial):
+    def _deepest(self, bodies, overlap, time, initial, deepening=False):
         stiffness, exponent, *_ = self._contact.law_between(*bodies)
         chosen = tuple(body.name for body in bodies if body.name in self._chosen)
         deep = overlap > CORE * min(body.thickness for body in bodies)
-        least = first_between(self._system, bodies, exponent) if deep else 0.0
+        least = first_between(self._system, bodies, exponent) if deep and deepening else 0.0
         return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, least, initial)
 
-    def note(self, i, overlap, time):
-        """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
+    def note(self, i, overlap, time, now):
+        """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before; it is ``now`` [s].
+
+        What is deepest now may get deeper yet.
+        """
         was = self.found[i]
         if overlap > was.overlap:
             initial = overlap if time == 0.0 else was.initial
-            self.found[i] = self._deepest(was.bodies, overlap, time, initial)
+            self.found[i] = self._deepest(was.bodies, overlap, time, initial, time >= now)
 
     def note_way(self, safety=0.0, step=0.0, speed=0.0):
         """Note what bounds the way in a step.

@@ -19,6 +19,7 @@ from ...tables import Table, boolean, field, real, table
 from ..base import Family
 from .nearest_point import near
 from .pair import AWAY, pair_data
+from .passing import passing
 
 KEYS = "stiffness", "exponent", "damping", "friction", "slip_velocity"
 """Keys of the law of a contact."""
@@ -72,6 +73,12 @@ class Contact(Table):
     pushes along the line as well, forth and back, by some 0.3 (δ²/(L r))^⅓ of the push on average, of an element of
     length L and a surface of radius r along it, to which ± is blind: where that is above 5 % and friction, a run says
     so. Lines in pieces, ``subdivide``, and a larger stiffness make it less.
+
+    A line passes a body through its middle, where the push turns over. How deep every line comes is followed from the
+    start of a run on, and ``passage`` of ``run.json`` says "certified" of ``bodies`` where none has come there: before
+    each drift of an explicit step, which is cut where one would, and in steps of cvode and ida on their interpolants.
+    Steps of order 4 and 6 are not cut but told of; load steps of statics and curved elements are not followed. What is
+    not certified is a warning as well. ``pairs`` are bodies that touch each other.
 
     Parameters
     ----------
@@ -221,6 +228,7 @@ class Contact(Table):
             force, energy, stiffness, bound = kernels(depth, *element, spins)
         return Family(
             **pairs,
+            passing=passing(depth, *element[1:], spins) if net.order == 1 and not net.quasi_static else None,
             force=force,
             energy=energy,
             stiffness=stiffness,

@@ -118,7 +118,7 @@ class Passage:
         """Whether nothing can have passed, as ``run.json`` has it."""
         if self._unfollowed is not None:
             return f"not certified: {self._unfollowed}"
-        (time, *nodes), (folded, *beside) = self._crossings
+        (time, *nodes), (folded, *beside) = self._crossings[:2]
         if np.isfinite(time):
             return f"not certified: {self._lines(nodes)} may have passed through each other at t = {time:.6g} s"
         if np.isfinite(folded):

@@ -14,9 +14,10 @@ f takes that away: whatever the angle, at any place that is not at a free end,
     E = (16/15) κ (c² − h²)^(5/2) f/sin,        push = k h (c² − h²)^(3/2)/(√27 r³) · f/sin,
 
 where f/sin is 1 but for (c/L)². For a small overlap δ that is 3.08 k δ^(3/2)/√r, as crossed cylinders push by Hertz; at
-h = r it is k r and largest. Lines that lie along each other push with 2 κ f h (c² − h²)·2 on their length: elements of
-a pair together by up to k r again, over the length that they share. So the stiffness of a pair is of the order of k at
-any angle, and steps need not be shorter for lines that are parallel.
+h = r it is k r and largest. Where what overlaps is further than c from all ends, both integrals are these roots and
+powers to rounding, and no sum is taken. Lines that lie along each other push with 2 κ f h (c² − h²)·2 on their length:
+elements of a pair together by up to k r again, over the length that they share. So the stiffness of a pair is of the
+order of k at any angle, and steps need not be shorter for lines that are parallel.
 """
 
 from __future__ import annotations
@@ -86,14 +87,79 @@ def press(x, f, cells, data, c, nodes, ends):
     return NOT_SEEN if apart(place, data[c, TOUCH]) else add_push(place, f, data, c, nodes, ends)
 
 
+@kernel(forceinline=True)
+def crossed(place, n, data, c):
+    """(J, its slopes by p, u and w, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
+
+    Of a crossing at the places s and t of both infinite lines, a distance h apart, R = c² − h² and N = |u × w|, the
+    overlap is (R/N²)^½ |w| long to either side along the first element, and the same of the other:
+
+        J = (8/15) κ R^(5/2) (L |w| + L' |u|)/N.
+    """
+    (p, u, w), touch, zero = place, data[c, TOUCH], (0.0, 0.0, 0.0)
+    uu, uw, ww, nn, pn = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, n)
+    room = touch * touch * nn - pn * pn
+    if not (room > 0.0 and nn > 0.0):
+        return 0.0, zero, zero, zero, math.inf
+    room /= nn
+    first, other, half = math.sqrt(uu), math.sqrt(ww), math.sqrt(room / nn)
+    d, e = dot(u, p), dot(w, p)
+    s, t, along = (uw * e - ww * d) / nn, (uu * e - uw * d) / nn, half * abs(uw)
+    wide, high = max(half * other, (along + touch) / first), max(half * first, (along + touch) / other)
+    if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
+        return 0.0, zero, zero, zero, math.inf
+    size = data[c, LENGTH] * other + data[c, OTHER] * first
+    j = 8.0 / 15.0 * data[c, SCALE] * room * room * half * size
+    by_p, turn = -5.0 * pn / (room * nn) * j, (5.0 * pn * pn / (room * nn) - 1.0) * j / nn
+    own, more = data[c, OTHER] / (first * size) * j, data[c, LENGTH] / (other * size) * j
+    wp, pu, wn, nu = cross(w, p), cross(p, u), cross(w, n), cross(n, u)
+    return (
+        j,
+        (by_p * n[0], by_p * n[1], by_p * n[2]),
+        (
+            by_p * wp[0] + turn * wn[0] + own * u[0],
+            by_p * wp[1] + turn * wn[1] + own * u[1],
+            by_p * wp[2] + turn * wn[2] + own * u[2],
+        ),
+        (
+            by_p * pu[0] + turn * nu[0] + more * w[0],
+            by_p * pu[1] + turn * nu[1] + more * w[1],
+            by_p * pu[2] + turn * nu[2] + more * w[2],
+        ),
+        pn * pn / nn,
+    )
+
+
+@kernel(forceinline=True)
+def push_apart(place, n, f, data, c, nodes):
+    """As `add_push`, of a pair that overlaps far from its ends; `NOT_SEEN` of all others."""
+    j, by_p, by_u, by_w, square = crossed(place, n, data, c)
+    if j == 0.0:
+        return NOT_SEEN
+    touch = data[c, TOUCH]
+    factor, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
+    turn_u, turn_w = slopes_of_factor(place.u, place.w, n, factor, area)
+    row = min(c, nodes.shape[0] - 1)
+    for k in range(3):
+        along_p, along_u = factor * by_p[k], factor * by_u[k] + j * turn_u[k]
+        along_w = factor * by_w[k] + j * turn_w[k]
+        f[nodes[row, 0], k] -= along_p - along_u
+        f[nodes[row, 1], k] -= along_u
+        f[nodes[row, 2], k] += along_p + along_w
+        f[nodes[row, 3], k] -= along_w
+    return touch - math.sqrt(square)
+
+
 @kernel()
 def add_push(place, f, data, c, nodes, ends):
     """As `press`, where a pair may touch."""
-    touch = data[c, TOUCH]
+    touch, n = data[c, TOUCH], cross(place.u, place.w)
+    deep = push_apart(place, n, f, data, c, nodes)
+    if deep != NOT_SEEN:
+        return deep
     j, g0, g1, g2, g3, least = overlap(place, data, c, ends)
     if least == math.inf:
         return NOT_SEEN
-    n = cross(place.u, place.w)
     factor, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
     by_u, by_w = slopes_of_factor(place.u, place.w, n, factor, area)
     row = min(c, nodes.shape[0] - 1)
