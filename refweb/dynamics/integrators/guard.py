@@ -164,8 +164,8 @@ def near_cells(way, i, place, model):
     """(Cells, data) of a family that may touch on a way [m]: those that are looked at, or all."""
     skin, families = model.nearby.skin[0], model.families
     if way > skin.depth - skin.used:
-        before = place - model.nearby.families.size  # all cells, see `refweb.dynamics.integrators.records`
-        return families.cells[len(families.cells) + before], families.data[len(families.data) + before]
+        whole = len(families.data) - model.nearby.families.size + place  # see `refweb.dynamics.integrators.records`
+        return families.cells[whole], families.data[whole]
     return families.cells[i], families.data[i]
 
 
