@@ -29,6 +29,10 @@ TENSION, STRAIN, POWER = range(3)
 """Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
 
 
+CELL = 0
+"""Column of what touches that has the number of the cell, in all families whose kicks are solved for."""
+
+
 class Rubbing(NamedTuple):
     """Kernels that solve for losses where an explicit method kicks velocities.
 

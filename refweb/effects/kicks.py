@@ -35,10 +35,11 @@ import functools
 import math
 
 from ..kernels import GIVE, KEPT, SWEEP, kernel
+from .base import CELL
 
-CELL, ROWS, SHARES, AXES, LEVERS, START = 0, 1, 5, 7, 16, 25
-"""Columns of what touches: cell; rows of the nodes, the body and its rotation, −1 without; shares of the nodes; the
-normal and two tangents; what the velocity of the rotation adds to u along each; u⁻ along each [m/s]."""
+ROWS, SHARES, AXES, LEVERS, START = 1, 5, 7, 16, 25
+"""Columns of what touches, behind its cell: rows of the nodes, the body and its rotation, −1 without; shares of the
+nodes; the normal and two tangents; what the velocity of the rotation adds to u along each; u⁻ along each [m/s]."""
 OWN, MIXED, PUSH, DAMPING, FRICTION, SLIP = 28, 31, 33, 34, 35, 36
 """J M⁻¹ Jᵀ of each direction [1/kg], and of the normal with each tangent; N₀ [N], d [s/m], μ and v_s [m/s]."""
 FORCES, THETA, SLOT, ARMS, WIDTH = 37, 40, 42, 43, 52

@@ -204,7 +204,7 @@ def digits(quick):
 def tied(quick):
     """Rows that compare the box tied to the net with one that constraints of its own tie, by IDA."""
     scene = Scene.from_dict(SMALL | EFFECTS[TIED])
-    end, keys = (0.05 if quick else 0.1), dict(method="explicit", order=6, safety=0.4)
+    end, keys = (0.05 if quick else 0.1), dict(method="explicit", order=6, safety=0.1)
     solve = refweb.Dynamic(duration=end, **keys)
     own = refweb.run(scene.replace(solve=solve, accuracy=refweb.Accuracy(error="none"))).state
     other = Tied(scene)

@@ -179,7 +179,7 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
             change_lengths(now, x, reels, was, data[0], length_force, work)
-        follow_near(drifts[0], x, bits, before, driven, nearby, families)
+        follow_near(drifts[0], x, v, bits, before, model.inertia, nearby, families)
         look_back_at_drift(now - h, model, running)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:

@@ -24,6 +24,7 @@ from numba import types
 from numba.typed import List
 
 from ...kernels import INDICES, MATRIX, VECTOR, copy_rows, kernel, typed_list
+from ...net.rotation_bounds import speeds
 
 LASTS = 64.0
 """Number of steps that a list is to last at the speed of its first."""
@@ -297,15 +298,16 @@ def spread_since(x, at):
 
 
 @kernel(forceinline=True)
-def follow_near(drift, x, bits, before, driven, nearby, families):
+def follow_near(drift, x, v, bits, before, inertia, nearby, families):
     """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
 
     ``bits`` are the velocities of places as whole numbers, see `bits_of`. Motion that is prescribed is held against the
-    places ``before``. States between the last three steps are covered as well, which is what is looked at for peaks.
+    places ``before``; to that of a body is added what its rotation adds at its surface. States between the last three
+    steps are covered as well, which is what is looked at for peaks.
     """
     if not bits.size:
         return
-    skin, most, pairs = nearby.skin[0], np.int64(0), nearby.at.shape[0] > 0
+    skin, most, pairs, driven = nearby.skin[0], np.int64(0), nearby.at.shape[0] > 0, inertia.driven
     for q in range(bits.size):
         most = max(most, bits[q] & SIGN)
     skin.top = most
@@ -316,6 +318,10 @@ def follow_near(drift, x, bits, before, driven, nearby, families):
     way *= 2.0 * math.sqrt(3.0)
     if pairs and FEWEST * way > nearby.widest and not driven.size:
         way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
+    turned = 0.0
+    for n in range(inertia.turns.moment.size):
+        turned = max(turned, speeds(n, x, v, inertia.turns)[1])
+    way += 2.0 * abs(drift) * turned
     skin.earlier, skin.before, skin.last = skin.before, skin.last, way
     skin.longest = max(skin.longest, way)
     skin.used += way

@@ -9,6 +9,7 @@ import numpy as np
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...net.rotation import carry, hand_on, note_turns, turn_on
+from .rubbed import give_all, meet_all
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -135,20 +136,6 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
 
 
 @kernel()
-def meet_all(h, x, v, inverse, families, rubbed, touches, ends):
-    """Write all that touches, and to ``ends`` the rows that each family's end at; ``touches``, or a larger one."""
-    while True:
-        count = 0
-        for m in range(rubbed.families.size):
-            i = rubbed.families[m]
-            count = rubbed.meets[m](h, x, v, inverse, families.cells[i], families.data[i], touches, count)
-            ends[m] = count
-        if count <= touches.shape[0]:
-            return touches
-        touches = np.empty((2 * count, rubbed.width))
-
-
-@kernel()
 def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
     """As `viscous_kick`, where losses of contact are solved for: they need no bound.
 
@@ -200,10 +187,7 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
     last_kick(0.5 * h, flat_inverse, flat_half, flat_f)
     copy_rows(half, v)
     carry(x, v, turns)
-    begin = 0
-    for m in range(rubbed.families.size):
-        rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], outs[rubbed.families[m]])
-        begin = ends[m]
+    give_all(number, v, touches, ends, families, rubbed)
     return touches
 
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 
 from ...kernels import kernel
-from ..base import Rubbing
+from ..base import CELL, Rubbing
 from ..carried_nodes import COLUMNS, carrier_of, is_carried, turn_by
 from ..kicks import (
     ARMS,
     AXES,
-    CELL,
     LEVERS,
     MIXED,
     NOTED,

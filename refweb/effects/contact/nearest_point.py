@@ -12,8 +12,9 @@ import functools
 import math
 
 from ...kernels import NEAR, kernel
+from ...net.rotation import times
 from ..vectors import dot
-from .pair import AWAY, RADIUS
+from .pair import AWAY, RADIUS, from_shape, pairing
 
 SAMPLES = 8
 """Places on a curved element from which Newton's method may start to its nearest point."""
@@ -128,21 +129,50 @@ def touched(x, cells, data, first, pieces, nodes, functions):
     return (nearest if best < data[first, RADIUS] ** 2 else -1), where, best
 
 
+@kernel(forceinline=True)
+def in_sphere(skin, x, cells, data, c, nodes, functions):
+    """Whether cell c may touch, within a skin, the sphere around its body."""
+    reach = data[c, RADIUS] + skin
+    return not closest(x, cells, data, c, nodes, functions)[1] >= reach * reach
+
+
 @functools.cache
-def near(pieces, nodes, functions):
+def in_box(spins):
+    """The same of the sphere and of the box about the axes of a body, which it fills; spins as in `pairing`."""
+    paired = pairing(spins)
+
+    @kernel(forceinline=True)
+    def in_box(skin, x, cells, data, c, nodes, functions):
+        if not in_sphere(skin, x, cells, data, c, nodes, functions):
+            return False
+        middle, way, _ = point(x, cells, data, c, nodes, functions, 0.5)
+        pair, square, reach = paired(x, cells, data, c, nodes), 0.0, skin + 0.5 * math.sqrt(dot(way, way))
+        middle = times(pair.axes, middle)
+        if spins == 2:
+            middle = from_shape(middle, data, c, nodes)
+        for k in range(3):
+            over = abs(middle[k]) - pair.shape.core[k] - pair.shape.radius
+            square += over * over if over > 0.0 else 0.0
+        return not square >= reach * reach
+
+    return in_box
+
+
+@functools.cache
+def near(pieces, nodes, functions, within=in_sphere):
     """The kernel that finds the lines near bodies, of signature `refweb.kernels.NEAR`.
 
-    A line is taken whole, and held against the sphere around a body. The arguments are those of
-    `refweb.effects.contact.sphere.kernels`.
+    A line is taken whole. ``within`` is `in_sphere` or of `in_box`, for elements with two nodes; the other arguments
+    are those of `refweb.effects.contact.sphere.kernels`.
     """
 
     @kernel(NEAR)
     def near(skin, x, cells, data, chosen):
         count = 0
         for first in range(0, cells.shape[0], pieces):
-            reach, beyond = data[first, RADIUS] + skin, True
+            beyond = True
             for c in range(first, first + pieces):
-                beyond = beyond and closest(x, cells, data, c, nodes, functions)[1] >= reach * reach
+                beyond = beyond and not within(skin, x, cells, data, c, nodes, functions)
             if not beyond:  # what is not a number is near
                 for c in range(first, first + pieces):
                     chosen[count] = c

@@ -16,11 +16,10 @@ import numpy as np
 
 from ...kernels import MEET, kernel
 from ...net.rotation import times, times_transposed
-from ..base import Rubbing
+from ..base import CELL, Rubbing
 from ..kicks import (
     ARMS,
     AXES,
-    CELL,
     DAMPING,
     FORCES,
     FRICTION,

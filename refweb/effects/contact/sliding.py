@@ -13,11 +13,10 @@ import math
 
 from ...kernels import MEET, STIFFNESS, kernel
 from ...net.rotation import times, times_transposed
-from ..base import Rubbing
+from ..base import CELL, Rubbing
 from ..kicks import (
     ARMS,
     AXES,
-    CELL,
     DAMPING,
     FORCES,
     FRICTION,

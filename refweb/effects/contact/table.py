@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...messages import nearest, shown
 from ...tables import Table, boolean, field, real, table
 from ..base import Family
-from .nearest_point import near
+from .nearest_point import in_box, in_sphere, near
 from .pair import AWAY, pair_data
 from .passing import passing
 
@@ -221,11 +221,11 @@ class Contact(Table):
             from .sphere import kernels
 
             pairs["data"] = np.ascontiguousarray(pairs["data"][:, : AWAY + 3 * element[1]])
-            force, energy, stiffness, bound = kernels(*element)
+            (force, energy, stiffness, bound), within = kernels(*element), in_sphere
         else:
             from .penalty import kernels
 
-            force, energy, stiffness, bound = kernels(depth, *element, spins)
+            (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_box(spins)
         return Family(
             **pairs,
             passing=passing(depth, *element[1:], spins) if net.order == 1 and not net.quasi_static else None,
@@ -233,7 +233,7 @@ class Contact(Table):
             energy=energy,
             stiffness=stiffness,
             bound=bound,
-            near=near(*element) if net.order == 1 else None,  # explicit steps take no other elements
+            near=near(*element, within) if net.order == 1 else None,  # explicit steps take no other elements
             book="contact_energy",
             observed=1,
             symmetric=spins == 0,  # moments, and quaternions
@@ -265,6 +265,7 @@ class Contact(Table):
             power=0,
             damping=damping,
             rubbing=rubbing,
+            near=near(*element, in_box(spins)) if rubbing is not None else None,
             symmetric=False,
             at_rest=False,
         )

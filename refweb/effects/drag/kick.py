@@ -17,13 +17,13 @@ import functools
 import numpy as np
 
 from ...kernels import GIVE, KEPT, MEET, SWEEP, kernel
-from ..base import Rubbing
+from ..base import CELL, Rubbing
 from ..line_kernels import direction
 from .force import ALONG, GROUP, NORMAL, SLOPES, TANGENTIAL, add_slope, drag_on, relative
 
-CELL, ROW, COUNT, COEFFICIENTS, DIRECTION, START, FORCE, WIDTH = 0, 1, 2, 3, 5, 8, 11, 14
-"""Columns of what feels drag: its cell and row; how many feel it at this row, at the first of them; c_n and c_t; t; u⁻;
-F."""
+ROW, COUNT, COEFFICIENTS, DIRECTION, START, FORCE, WIDTH = 1, 2, 3, 5, 8, 11, 14
+"""Columns of what feels drag, behind its cell: its row; how many feel it at this row, at the first of them; c_n and
+c_t; t; u⁻; F."""
 MOST, CLOSE = 60, 4e-16
 """Steps of Newton's method, and what they leave of the equations, over velocities, at which they end."""
 

@@ -29,9 +29,8 @@ import math
 import numpy as np
 
 from ...kernels import BOUND, FORCE, GIVE, KEPT, MEET, STIFFNESS, kernel
-from ..base import Rubbing
+from ..base import CELL, Rubbing
 from ..kicks import (
-    CELL,
     DAMPING,
     FORCES,
     MIXED,

@@ -128,17 +128,17 @@ class Mesh(Shape):
         _ = self.solid
 
     def grown(self):
-        """No core: the box that it fills about its centre, and where the numbers of its field stand."""
+        """No core: the box that it fills about its centre, within its error, and where its field's numbers stand."""
         field = self.solid.field
-        size = tuple(np.abs(self.solid.points).max(axis=0).tolist())
+        size = tuple((np.abs(self.solid.points).max(axis=0) + field.error).tolist())
         return Grown(
             0.0, size, fine=math.inf if self.solid.convex else field.spacing, thick=field.thickness, field=field.address
         )
 
     @property
     def extent(self):
-        """Largest distance from its centre to its surface [m]."""
-        return float(np.linalg.norm(self.solid.points, axis=1).max())
+        """Largest distance from its centre to its surface, within its error [m]."""
+        return float(np.linalg.norm(self.solid.points, axis=1).max()) + self.solid.field.error
 
     def frame(self):
         """Unit vectors of the axes of the file."""
