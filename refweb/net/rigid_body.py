@@ -321,9 +321,16 @@ def with_rotations(net):
     )
 
 
+def of_size_one(vector):
+    """A vector over the power of 2 above its largest component: its square is neither 0 nor infinite."""
+    vector = np.asarray(vector, dtype=float)
+    return np.ldexp(vector, -np.frexp(np.abs(vector).max())[1])
+
+
 def matrix_of(quaternion):
     """Rotation matrix of a quaternion (w, x, y, z) of any length but 0."""
-    w, *v = np.asarray(quaternion, dtype=float) / np.linalg.norm(quaternion)
+    quaternion = of_size_one(quaternion)
+    w, *v = quaternion / np.linalg.norm(quaternion)
     a, b, c = v
     across = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
     return np.eye(3) + 2.0 * (w * across + across @ across)
@@ -331,9 +338,10 @@ def matrix_of(quaternion):
 
 def unit(name, axis):
     """The unit vector along a key's value; zero is refused."""
+    given, axis = axis, of_size_one(axis)
     size = np.linalg.norm(axis)
     if not size > 0.0:
-        raise InputError(f"{name} = {list(axis)} must not be zero")
+        raise InputError(f"{name} = {list(given)} must not be zero")
     return np.array(axis) / size
 
 

@@ -120,7 +120,7 @@ REFUSED = {
     "flat": (moved(BOX, 0.0, np.array([1.0, 1.0, 0.0])), r"flat|no triangles|more than two triangles"),
     "large": (moved(BOX, 0.0, 1e8), r"its size is 4e\+07 m with scale = 1, it must be 1e-06 to 1e\+06 m: give scale"),
     "small": (moved(BOX, 0.0, 1e-7), "its size is 4e-08 m"),
-    "not finite": ((np.where(BOX[0] > 0.19, np.inf, BOX[0]), BOX[1]), "corners must be finite|cannot read"),
+    "not finite": ((np.where(BOX[0] > 0.19, np.inf, BOX[0]), BOX[1]), "corners must be numbers ≤ 1e\\+100|cannot read"),
     "few": ((BOX[0], BOX[1][:2]), "holds 2 triangles with an area: a closed surface has at least 4"),
 }  # fmt: skip
 

@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from scipy.spatial import ConvexHull, cKDTree
 
 from ...errors import InputError
+from ...tables import LARGEST
 
 SAME = 1e-7
 """Distance at which corners are one, over the largest coordinate or size: STL holds seven digits."""
@@ -77,8 +78,8 @@ def closed(points, triangles):
     InputError
         For what is not finite, flat, open, not orientable or crosses itself, and for edges of more than two triangles.
     """
-    if not np.isfinite(points).all():
-        raise InputError("corners must be finite numbers")
+    if not (np.abs(points) <= LARGEST).all():
+        raise InputError(f"coordinates of corners must be numbers ≤ {LARGEST:g} [m] in size")
     points, triangles = _joined(points, triangles)
     count = len(triangles)
     a, b, c = triangles.T

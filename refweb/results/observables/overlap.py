@@ -9,7 +9,9 @@ from .observable import Observable, Value
 
 
 class Overlap(Observable):
-    """Depth of the deepest contact of a body, 0 where it touches nothing; it stands at the line.
+    """Depth of the deepest contact of a body with lines, 0 where no line touches it; it stands at the line.
+
+    How deep two bodies overlap stands in ``pairs`` of ``run.json``.
 
     With ``reduce = "max"`` it is the deepest of all steps and between them.
     """

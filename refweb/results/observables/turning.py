@@ -97,7 +97,7 @@ class AngularVelocity(Turning):
 
 
 class AngularMomentum(Turning):
-    """Angular momentum about the centre of the body."""
+    """Angular momentum about the centre of the body; in a frame that turns, by the rotation against it."""
 
     unit = "N m s"
 

@@ -17,7 +17,8 @@ class TotalAngularMomentum(Nodal):
 
     That is of web and free bodies together, with ``node`` or ``body`` the part of these: ``node = "all"`` that of the
     web. Supported nodes count with their masses, at rest or as they are moved, while fixed bodies do not. What nothing
-    acts on from outside, no support among it, keeps the whole.
+    acts on from outside, no support among it, keeps the whole; in ``[frame]`` and ``[orbit]`` velocities are those
+    against the turning axes, and it does not stay.
     """
 
     unit = "N m s"

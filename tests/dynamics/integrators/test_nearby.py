@@ -11,6 +11,10 @@ from refweb.dynamics.simulation import Simulation
 
 BALL = refweb.Body(name="ball", radius=0.08, mass=0.4, position=(0.03, 0.02, -0.1), velocity=(1.5, 0.5, 3.0))
 BOX = refweb.Body(name="box", shape="box", size=(0.1, 0.12, 0.08), fixed=True, position=(0.1, 0.0, 0.035))
+SPUN = refweb.Body(
+    name="rod", shape="cylinder", radius=0.05, length=0.5, axis=(1.0, 0.3, 0.1), mass=0.3, position=(0.0, 0.0, 0.1),
+    velocity=(0.3, 0.0, -1.0), angular_velocity=(3.0, -20.0, 10.0),
+)  # fmt: skip
 AT_REST = refweb.Body(name="post", radius=0.05, fixed=True, position=(0.2, 0.2, 0.051))
 SHAKEN = refweb.Motion(node="rim", displacement=[(0.0, 0.0, 0.0, 0.0), (0.01, 0.02, 0.0, 0.1), (0.03, 0.0, 0.0, -0.1)])
 
@@ -47,8 +51,10 @@ def solver_of(scene, everything):
         case(BALL, BOX, AT_REST, subdivide=3),
         case(BALL, exponent=1.5),
         case(AT_REST, SHAKEN),
+        case(BALL, BOX, AT_REST, friction=0.4),
+        case(SPUN, friction=0.4, damping=0.3),
     ],
-    ids=["ball", "bodies", "exponent", "shaken"],
+    ids=["ball", "bodies", "exponent", "shaken", "rubbing", "tumbling"],
 )
 def test_lists_change_no_bit(scene):
     """Of the last state, the history and all peaks: the same run with every line looked at in every step."""
@@ -66,10 +72,14 @@ def test_lists_change_no_bit(scene):
 
 
 def distances(net, body, x):
-    """From the middle of a body to each line, as segments between its nodes."""
+    """From the sphere around a body to each line, as segments between its nodes, or more: from their box to its box."""
     a, b = ((net.points + x)[net.cells[:, k]] - (net.points + x)[body.row] for k in (0, 1))
     place = np.clip(-((b - a) * a).sum(axis=1) / ((b - a) ** 2).sum(axis=1), 0.0, 1.0)
-    return np.linalg.norm(a + place[:, None] * (b - a), axis=1)
+    nearest = np.linalg.norm(a + place[:, None] * (b - a), axis=1) - body.extent
+    if body.shape.extent == body.radius:
+        return nearest
+    over = np.abs(0.5 * (a + b) @ body.axes.T) - np.array(body.core) - body.radius
+    return np.maximum(nearest, np.linalg.norm(np.maximum(over, 0.0), axis=1) - 0.5 * np.linalg.norm(b - a, axis=1))
 
 
 def test_what_is_near_is_what_is_near():
@@ -82,7 +92,7 @@ def test_what_is_near_is_what_is_near():
         for skin in (0.0, 0.05, 0.3):
             x, chosen = rng.normal(0.0, 0.02, (system.rows, 3)), np.empty(len(family.cells), dtype=np.int64)
             count = family.near(skin, x, family.cells, family.data, chosen)
-            lines = net.line[distances(net, body, x) < body.extent + skin]
+            lines = net.line[distances(net, body, x) < skin]
             np.testing.assert_array_equal(chosen[:count], np.flatnonzero(np.isin(net.line, lines)))
             counts.append(count)
     assert 0 < sorted(counts)[1] and max(counts) < len(net.cells)
