@@ -126,6 +126,18 @@ def swap_for(family):
     return swap_of(family.near) if family.finder is None else swap_pairs_of(family.finder)
 
 
+@kernel()
+def rows_of(chosen, cells, data):
+    """Some rows of cells and of data."""
+    some, some_data = np.empty((chosen.size, cells.shape[1]), dtype=np.int32), np.empty((chosen.size, data.shape[1]))
+    for n in range(chosen.size):
+        for k in range(cells.shape[1]):
+            some[n, k] = cells[chosen[n], k]
+        for k in range(data.shape[1]):
+            some_data[n, k] = data[chosen[n], k]
+    return some, some_data
+
+
 @functools.cache
 def swap_of(near):
     """The kernel that swaps the cells of a family, found by its kernel ``near``, of signature `SWAP`.
@@ -150,15 +162,10 @@ def swap_of(near):
             return
         found = np.empty(all_cells.shape[0], dtype=np.int64)
         count = near(depth, x, all_cells, all_data, found)
-        some, some_data = np.empty((count, all_cells.shape[1]), dtype=np.int32), np.empty((count, all_data.shape[1]))
+        some, some_data = rows_of(found[:count], all_cells, all_data)
         chosen = np.empty((count, 1), dtype=np.int32)
         for n in range(count):
-            c = found[n]
-            chosen[n, 0] = c
-            for k in range(some.shape[1]):
-                some[n, k] = all_cells[c, k]
-            for k in range(some_data.shape[1]):
-                some_data[n, k] = all_data[c, k]
+            chosen[n, 0] = found[n]
         shown[:] = 0.0
         cells[i], data[i], cells[numbers] = some, some_data, chosen
         outs[i], stored[i] = np.zeros((count, shown.shape[1])), np.zeros(count)

@@ -1,4 +1,8 @@
-"""Families whose kicks an explicit step solves for: their record, and what is done for all of them in turn."""
+"""Families whose kicks an explicit step solves for: their record, and what is done for all of them in turn.
+
+Losses of contact act where its push does, and that push has just been found: of lines with a body only those that show
+a depth there are looked at.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,8 @@ from numba.typed import List
 
 from ... import kernels as k
 from ...effects.base import CELL
-from ...kernels import MATRIX, kernel, typed_list
-from .nearby import near_of
+from ...kernels import INTEGERS, MATRIX, kernel, typed_list
+from .nearby import near_of, rows_of
 
 
 class Rubbed(NamedTuple):
@@ -19,10 +23,14 @@ class Rubbed(NamedTuple):
     Attributes
     ----------
     families : ndarray of int
-        Their numbers; ``last`` are the places among these where runs of families with one sweep end, and ``near`` those
-        among what acts only near something, −1 for others.
+        Their numbers; ``last`` are the places among these where runs of families with one sweep end.
     meets, recalls, sweeps, gives, memories : List
         Their kernels, see `refweb.effects.base.Rubbing`, and what is remembered of the step before, within a row.
+    shown, told : ndarray of int, List
+        Which ``outs`` of `refweb.dynamics.integrators.records.Families` has depths, −1 for those that have none, and
+        for each cell the row in it.
+    pieces : int
+        Number of cells of a line, which are looked at together.
     width : int
         Number of columns of what touches.
     """
@@ -34,7 +42,9 @@ class Rubbed(NamedTuple):
     gives: List
     memories: List
     last: np.ndarray
-    near: np.ndarray
+    shown: np.ndarray
+    told: List
+    pieces: int
     width: int
 
     @classmethod
@@ -44,7 +54,7 @@ class Rubbed(NamedTuple):
         rubbing = [system.families[i] for i in families]
         own = [family.rubbing for family in rubbing]
         last = [i for i, one in enumerate(own) if i + 1 == len(own) or own[i + 1].sweep is not one.sweep]
-        near = near_of(system)
+        depths = [depths_of(system, family) for family in rubbing]
         return cls(
             families=np.array(families, dtype=np.int64),
             meets=typed_list(k.MEET, [one.meet for one in own]),
@@ -52,43 +62,59 @@ class Rubbed(NamedTuple):
             sweeps=typed_list(k.SWEEP, [one.sweep for one in own]),
             gives=typed_list(k.GIVE, [one.give for one in own]),
             last=np.array(last, dtype=np.int64),
-            near=np.array([near.index(i) if system.families[i].near else -1 for i in families], dtype=np.int64),
             memories=typed_list(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
+            shown=np.array([shown for shown, _ in depths], dtype=np.int64),
+            told=typed_list(INTEGERS, [told for _, told in depths]),
+            pieces=system.net.subdivide,
             width=max((one.width for one in own), default=0),
         )
 
 
+def depths_of(system, family):
+    """(``shown``, ``told``) of a family, see `Rubbed`: of the push of the same lines on the same bodies."""
+    near = near_of(system)
+    for i in near if family.contact else ():
+        push = system.families[i]
+        if push.contact:
+            own, its = (one.elements * system.rows + one.cells[:, system.net.along.size] for one in (family, push))
+            order = np.argsort(its)
+            place = order[np.minimum(np.searchsorted(its, own, sorter=order), len(its) - 1)]
+            if (its[place] == own).all():
+                return len(system.families) + near.index(i), place
+    return -1, np.zeros(0, dtype=np.int64)
+
+
+@kernel()
+def lines_in_touch(shown, told, pieces):
+    """Numbers of the cells of lines that show a depth."""
+    chosen, count = np.empty(told.size, dtype=np.int64), 0
+    for first in range(0, told.size, pieces):
+        apart = True
+        for c in range(first, first + pieces):
+            apart = apart and shown[told[c], 0] <= 0.0
+        if not apart:  # what is not a number touches
+            for c in range(first, first + pieces):
+                chosen[count] = c
+                count += 1
+    return chosen[:count]
+
+
 @kernel()
 def meet_all(h, x, v, inverse, families, rubbed, touches, ends):
-    """Write all that touches, and to ``ends`` the rows that each family's end at; ``touches``, or a larger one.
-
-    Of a family of which some cells are looked at, what touches has their numbers among all.
-    """
+    """Write all that touches, and to ``ends`` the rows that each family's end at; ``touches``, or a larger one."""
     while True:
         count = 0
         for m in range(rubbed.families.size):
-            i, begin, near = rubbed.families[m], count, rubbed.near[m]
-            count = rubbed.meets[m](h, x, v, inverse, families.cells[i], families.data[i], touches, count)
+            i, begin = rubbed.families[m], count
+            if rubbed.shown[m] < 0:
+                count = rubbed.meets[m](h, x, v, inverse, families.cells[i], families.data[i], touches, count)
+            else:
+                chosen = lines_in_touch(families.outs[rubbed.shown[m]], rubbed.told[m], rubbed.pieces)
+                some, some_data = rows_of(chosen, families.cells[i], families.data[i])
+                count = rubbed.meets[m](h, x, v, inverse, some, some_data, touches, count)
+                for n in range(begin, min(count, touches.shape[0])):
+                    touches[n, CELL] = chosen[int(touches[n, CELL])]
             ends[m] = count
-            if near >= 0:
-                chosen = families.cells[len(families.data) + near]
-                for n in range(begin, min(count, touches.shape[0]) if chosen.shape[0] else begin):
-                    touches[n, CELL] = chosen[int(touches[n, CELL]), 0]
         if count <= touches.shape[0]:
             return touches
         touches = np.empty((2 * count, rubbed.width))
-
-
-@kernel()
-def give_all(number, v, touches, ends, families, rubbed):
-    """Note forces, and write the power of each cell at the velocities v, to where it is looked for."""
-    begin = 0
-    for m in range(rubbed.families.size):
-        i, near = rubbed.families[m], rubbed.near[m]
-        out = families.outs[i if near < 0 else len(families.forces) + near]
-        rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], out)
-        begin = ends[m]
-        if near >= 0:
-            chosen, own = families.cells[len(families.data) + near], families.outs[i]
-            for c in range(chosen.shape[0]):
-                own[c, 0] = out[chosen[c, 0], 0]

@@ -9,7 +9,7 @@ import numpy as np
 from ...kernels import copy_rows, kernel
 from ...net.net import LENGTH
 from ...net.rotation import carry, hand_on, note_turns, turn_on
-from .rubbed import give_all, meet_all
+from .rubbed import meet_all
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -187,7 +187,10 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
     last_kick(0.5 * h, flat_inverse, flat_half, flat_f)
     copy_rows(half, v)
     carry(x, v, turns)
-    give_all(number, v, touches, ends, families, rubbed)
+    begin = 0
+    for m in range(rubbed.families.size):
+        rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], outs[rubbed.families[m]])
+        begin = ends[m]
     return touches
 
 

@@ -21,6 +21,9 @@ from ..vectors import dot
 from .nearest_point import SAMPLES, far, point, share
 from .pair import Pair, from_shape, pair_of, pairing
 
+NOWHERE = -1.0
+"""Place of the contact of an element that touches nowhere, not at its ends either."""
+
 
 class Spot(NamedTuple):
     """A place of an element, as a body sees it: vectors are from its row and along its axes.
@@ -156,8 +159,9 @@ def places(depth, spins=0):
     """Kernels that find where lines touch.
 
     ``within(x, cells, data, c, nodes, functions, place)`` is the `Spot` at a place of cell c, ``deepest`` of all but
-    the place (place, depth) of the contact between the ends of a cell. ``contacts`` finds those of a line, and
-    ``touch_of`` is the `Touch` that is one of them. ``found`` is (rows for each element, columns) of what it finds.
+    the place (place, depth) of the contact between the ends of a cell, or `NOWHERE`. ``contacts`` finds those of a
+    line, and ``touch_of`` is the `Touch` that is one of them. ``found`` is (rows for each element, columns)
+    of what it finds.
 
     Parameters
     ----------
@@ -190,7 +194,7 @@ def places(depth, spins=0):
             spot = within(x, cells, data, c, nodes, functions, place)
             deep, slope = spot.depth, dot(spot.gradient, spot.d)
             if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
-                return place, deep  # concave: nowhere deep enough
+                return (NOWHERE if high - low == 1.0 else place), deep  # concave: nowhere deep enough
             value, curve = rise(pair, place, spot)
             low, high, moved, place = climb(value, curve, low, high, moved, place)
             if moved <= 1e-15:
@@ -229,6 +233,8 @@ def places(depth, spins=0):
             if far(x, cells, data, c, nodes):
                 continue
             place, deep = deepest(x, cells, data, c, nodes, functions)
+            if place == NOWHERE:
+                continue
             inner = 0.0 < place < 1.0
             if pair_of(data, c, nodes).once:
                 if deep > best:

@@ -265,7 +265,6 @@ class Contact(Table):
             power=0,
             damping=damping,
             rubbing=rubbing,
-            near=near(*element, in_box(spins)) if rubbing is not None else None,
             symmetric=False,
             at_rest=False,
         )
