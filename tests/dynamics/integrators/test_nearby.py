@@ -39,7 +39,7 @@ def case(*effects, subdivide=1, **contact):
 def solver_of(scene, everything):
     system = scene.build()
     if everything:
-        system.families = [replace(family, near=None) for family in system.families]
+        system.families = [replace(family, near=None, passing=None) for family in system.families]
     solver = Simulation(scene, scene.build(), refweb.Solution(scene)).integrator
     return CentralDifference(system, *solver.observed)
 
