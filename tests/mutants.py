@@ -43,6 +43,9 @@ MIRRORS = {
     "net/shapes": "effects/test_contact.py",
     "net/grown_core": "effects/test_deep_contact.py",
     "effects/contact/overlap": "effects/test_overlap.py",
+    "effects/contact/passing": "effects/test_passage.py",
+    "dynamics/integrators/followed_bodies": "effects/test_passage.py",
+    "dynamics/integrators/guard": "effects/test_passage.py effects/test_self_contact.py",
     "effects/contact/rubbing": "effects/test_rubbing.py effects/test_contact.py",
     "effects/contact/carrying": "effects/test_carried_losses.py",
     "effects/drag/carrying": "effects/test_carried_losses.py",
@@ -255,6 +258,17 @@ MUTANTS = [
     ),
     Mutant("effects/contact/overlap", "1.0 if body.shape.once or body.shape.planar else 2.0", "1.0"),
     Mutant("effects/contact/sphere", "out[c, 0] = data[c, RADIUS] - distance", "out[c, 0] = distance"),
+    Mutant("effects/contact/passing", "if most < limit:", "if seen < limit:"),
+    Mutant(
+        "effects/contact/passing", "square += (own - v[b, k] - kick * inverse[b, k] * f[b, k]) ** 2", "square += own**2"
+    ),
+    Mutant(
+        "effects/contact/passing", "return abs(drift) * math.sqrt(most)", "return 0.5 * abs(drift) * math.sqrt(most)"
+    ),
+    Mutant("effects/contact/passing", "met[3] = 0 if below", "met[3] = 1 if below"),
+    Mutant("dynamics/integrators/guard", "if whole and walls.met[3] == 0:", "if walls.met[3] == 0 and not whole:"),
+    Mutant("dynamics/integrators/guard", "CALM * skin.last < left", "CALM * skin.last < 20.0 * left"),
+    Mutant("dynamics/integrators/followed_bodies", "2.0 * self._extent * np.hypot", "0.0 * self._extent * np.hypot"),
     Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     Mutant("effects/kicks", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),
     Mutant("effects/kicks", "p, normal = 0.0, touches[n, PUSH]", "p, normal = 0.0, 2.0 * touches[n, PUSH]"),

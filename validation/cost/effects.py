@@ -2,10 +2,14 @@
 
     python -m validation.cost.effects
 
-The tables are of the paper's square web, thrown, alone and with one effect more, and of a web on a table, without
-friction and with it: nanoseconds per element and step of a whole run with its history rows and peaks, without files and
-without a twin. CPU time, minimum of several warm runs that alternate, in this process, one thread. Steps are as each
-scene has them.
+The tables are of the paper's square web, thrown, alone and with one effect more, of a web on a table, without friction
+and with it, and of a net that is folded in two: nanoseconds per element and step of a whole run with its history rows
+and peaks, without files and without a twin. CPU time, minimum of several warm runs that alternate, in this process, one
+thread. Steps are as each scene has them.
+
+Of lines that touch lines there are the nanoseconds of a candidate, a pair that does not touch, and of one that does.
+The folded net is the worst there is: each line of one layer lies across lines of the other, some thousand pairs at
+once, with the lines 20 mm thick that are 100 mm long, and with 2 mm.
 
 What is never executed costs nothing: valgrind counts the instructions of the plain web's steps and rows, once with the
 package as it is and once with a copy of it in which every module that this run has not loaded is deleted, all effects
@@ -71,6 +75,7 @@ EFFECTS = {
     "contact, two bodies": {"body": [BALL, CRATE], "contact": {"stiffness": 1e5, "between_bodies": True}},
     "attach": {"body": [BOX], "attach": [{"body": "ball", "node": "centre"}]},
     "attach, friction": {"body": [BOX], "attach": [{"body": "ball", "node": "centre"}], "contact": RUBBING},
+    "self contact that never touches": {"self_contact": {"radius": 5e-3, "stiffness": 1e3}},
     "friction": {"body": [BALL], "contact": RUBBING},
     "friction at 1e-6 m/s": {"body": [BALL], "contact": RUBBING | {"slip_velocity": 1e-6}},
     "friction, damping": {"body": [BALL], "contact": RUBBING | {"damping": 0.1}},
@@ -153,6 +158,57 @@ def on_a_table():
     return {name: Scene.from_dict(one) for name, one in scene.items()}
 
 
+def folded(folder, radius, size=24, side=0.1):
+    """A net folded in two along a line that is none of its own, the layers 1.6 radii apart, and the same untouched."""
+    points = np.array([(side * i, side * j, 0.0) for i in range(size + 1) for j in range(size + 1)])
+    numbers = np.arange((size + 1) ** 2).reshape(size + 1, size + 1)
+    pairs = ((numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:]))
+    across = np.array([1.0, -0.3, 0.0]) / np.hypot(1.0, 0.3)
+    over = (points - [0.5 * size * side + 0.037, 0.5 * size * side, 0.0]) @ across
+    places = 0.98 * (points - 2.0 * np.outer(np.maximum(over, 0.0), across))
+    places[:, 2] = np.where(over > 0.0, 1.6 * radius, 0.0)
+    path = pathlib.Path(folder) / f"folded_{radius:g}.csv"
+    np.savetxt(path, places, delimiter=",", header="x,y,z", comments="")
+    plain = PLAIN | {
+        "title": f"a net folded in two, radius {1e3 * radius:g} mm",
+        "web": {
+            "kind": "inline",
+            "points": points.tolist(),
+            "lines": np.vstack([np.column_stack([a.ravel(), b.ravel()]) for a, b in pairs]).tolist(),
+            "supports": [],
+        },
+        "cable": {"law": "tension-only", "modulus": 7e7, "area": 1e-6, "density": 1000.0},
+        "fold": {"kind": "positions", "file": str(path), "gap": 0.0},
+        "output": {"interval": 5e-3, "frames": 1000},
+    }
+    touching = plain | {"self_contact": {"radius": radius, "stiffness": 1e-2}}
+    rubbing = plain | {"self_contact": {"radius": radius, "stiffness": 1e-2, "friction": 0.3}}
+    some = {"plain": plain, "self contact": touching, "self contact, friction": rubbing}
+    return {name: Scene.from_dict(one) for name, one in some.items()}
+
+
+def of_pairs(scene, times=200):
+    """(Pairs, those that touch, ns of the push of each, ns of a pair that is apart) of a folded net at its start."""
+    from refweb.effects.self_contact.search import found
+
+    system = scene.build()
+    family = next(family for family in system.families if family.crossing is not None)
+    numbers = []
+    for x, skin in ((system.laid, 0.0), (system.laid * [1.0, 1.0, 8.0], 0.05)):
+        _, rows, data = found(skin, x, family.cells, family.data)
+        out, force = np.zeros((len(rows), 1)), np.zeros_like(x)
+        best = np.inf
+        for _ in range(5):
+            began = time.process_time()
+            for _ in range(times):
+                family.force(0.0, x, force, force, rows, data, out)
+            best = min(best, 1e9 * (time.process_time() - began) / (times * len(rows)))
+        numbers.append((len(rows), int((out > 0.0).sum()), best))
+    (pairs, touching, push), (_, none, apart) = numbers
+    assert none == 0
+    return pairs, touching, push, apart
+
+
 def timed(scene, system):
     """CPU time of a run and its follower per element and step [ns]."""
     simulation = Simulation(scene, system, Solution(scene))
@@ -224,7 +280,15 @@ def counts():
 def main():
     """Print the table and the counts; the status says whether these agree."""
     with tempfile.TemporaryDirectory() as folder:
-        for title, some in {"square web, thrown": scenes(folder), "web on a table": on_a_table()}.items():
+        groups = {"square web, thrown": scenes(folder), "web on a table": on_a_table()}
+        for radius in (1e-2, 1e-3):
+            some = folded(folder, radius)
+            groups |= {some["plain"].title: some}
+            pairs, touching, push, apart = of_pairs(some["self contact"])
+            print(
+                f"{some['plain'].title}: {pairs} pairs, of which {touching} touch, {push:.0f} ns; apart {apart:.0f} ns"
+            )
+        for title, some in groups.items():
             print(f"{title:32}{'per element-step':>18}{'ratio':>8}{'steps':>8}")
             for name, cost, ratio, steps in measure(some):
                 print(f"{name:32}{cost:15.2f} ns{ratio:8.2f}{steps:8d}")
