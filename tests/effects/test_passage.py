@@ -244,3 +244,47 @@ def test_what_is_certified_has_not_passed(kind, chunk):
         except refweb.SolverError:
             continue
         assert not (told == "certified" and went), (seed, told)
+
+
+def test_a_pair_that_passes_is_seen():
+    """Two crossed lines, one above and then below the other; not where it only comes nearer."""
+    edges, places = np.array([[0, 1], [2, 3]]), np.array([[-1.0, 0, 0], [1, 0, 0], [0, -1, 0.1], [0, 1, 0.1]])
+    below, nearer = places.copy(), places.copy()
+    below[2:, 2], nearer[2:, 2] = -0.1, 0.05
+    assert passed(places, below, edges).tolist() == [[0, 1]] and not len(passed(places, nearer, edges))
+
+
+def folded(folder, duration, size=6, side=0.1, radius=4e-3):
+    """A net that is folded along a straight line that is none of its own, the upper layer thrown onto the lower one."""
+    points = np.array([(side * i, side * j, 0.0) for i in range(size + 1) for j in range(size + 1)])
+    numbers = np.arange((size + 1) ** 2).reshape(size + 1, size + 1)
+    pairs = ((numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:]))
+    across = np.array([1.0, -0.3, 0.0]) / np.hypot(1.0, 0.3)
+    over = (points - [(0.5 * size + 0.37) * side, 0.5 * size * side, 0.0]) @ across
+    places = 0.97 * (points - 2.0 * np.outer(np.maximum(over, 0.0), across))
+    places[:, 2] = np.clip(over / side, 0.0, 1.0) * 5.0 * radius
+    np.savetxt(folder / "folded.csv", places, delimiter=",", header="x,y,z", comments="")
+    return refweb.Scene(
+        web=refweb.Inline(
+            points=points.tolist(),
+            lines=np.vstack([np.column_stack([a.ravel(), b.ravel()]) for a, b in pairs]).tolist(),
+            supports=[],
+        ),
+        cable=refweb.Cable(law="tension-only", modulus=1e7, area=1e-6, density=1e4),
+        effects=[
+            refweb.Fold(kind="positions", file=str(folder / "folded.csv"), gap=0.0),
+            refweb.SelfContact(radius=radius, stiffness=1e3, damping=2.0, friction=0.2),
+            refweb.Velocity(node=np.flatnonzero(over > 0.0).tolist(), value=(0.0, 0.0, -0.1)),
+        ],
+        solve=refweb.Dynamic(duration=duration),
+        output=refweb.Output(interval=5e-3, frames=1),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+
+
+@pytest.mark.parametrize("duration", [0.5, pytest.param(5.0, marks=pytest.mark.slow)])
+def test_layers_of_a_folded_net_do_not_pass(duration, tmp_path):
+    """They meet, by a quarter of their thickness, and are never seen through each other from one frame to the next."""
+    solution = refweb.run(folded(tmp_path, duration), progress=False)
+    assert solution.passage["lines"] == "certified" and 1e-4 < solution.lines["overlap"] < 4e-3
+    assert len(solution.frames) >= duration / 5e-3 and not lines_that_passed(solution)
