@@ -194,7 +194,7 @@ def of_pairs(scene, times=200):
     system = scene.build()
     family = next(family for family in system.families if family.crossing is not None)
     numbers = []
-    for x, skin in ((system.laid, 0.0), (system.laid * [1.0, 1.0, 8.0], 0.05)):
+    for x, skin in ((system.laid, 0.0), (system.laid * [1.0, 1.0, 3.0], 0.05)):
         _, rows, data = found(skin, x, family.cells, family.data)
         out, force = np.zeros((len(rows), 1)), np.zeros_like(x)
         best = np.inf
