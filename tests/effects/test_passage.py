@@ -1,10 +1,13 @@
 """Lines that pass through bodies: what is certified, seen by programs of another kind."""
 
+import itertools
+
 import numpy as np
 import pytest
 import solids
 
 import refweb
+from refweb.dynamics.integrators.followed_bodies import FollowedBodies
 from refweb.effects.contact.overlap import CORE
 from refweb.effects.contact.passing import MIDDLE, SHOWN, limits_of
 from refweb.results.words import on_run
@@ -95,6 +98,7 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
         ends, way = rng.standard_normal((2, 3)) * 0.8 * body.extent, 0.3 * rng.standard_normal((2, 3)) * body.thickness
         x, v, f = at(system, ends), still.copy(), still.copy()
         v[:2], f[:2] = way / 0.1 - 2.0 * way, 4.0 * way  # (v + ½ f) · 0.1 is the way
+        v[:3], f[:3] = v[:3] + rng.standard_normal(3), f[:3] + 10.0 * rng.standard_normal(3)  # of line and body alike
         found = family.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, family.cells, family.data, met)
         share, deep = np.linspace(0.0, 1.0, 201)[:, None], -np.inf
         for part in np.linspace(0.0, 1.0, 41):
@@ -107,6 +111,23 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
             assert met.tolist()[:3] == [0, 1, 2] and met[3] == (start >= CORE * body.thickness)
         seen[int(found)] += 1
     assert min(seen) >= 5
+
+
+def test_what_a_body_turns_by_is_followed():
+    """From one quaternion to another no point of a bar moves by more, and its ends by half of it at least."""
+    bar = refweb.Body(name="it", position=(0, 0, 0), mass=1.0, **SHAPES["bar"])
+    system = one_line(bar).build()
+    (body,), followed = system.net.bodies, FollowedBodies(system)
+    places = np.array(list(itertools.product((-0.15, 0.15), (-0.15, 0.15), (-1.0, 1.0))))
+    for angle in (1e-3, 0.1, 1.0):
+        states = []
+        for turn in (0.0, angle):
+            x = np.zeros((system.rows, 3))
+            x[body.spin, 0], x[body.turn, 0] = np.sin(0.5 * turn), np.cos(0.5 * turn) - 1.0
+            states.append(x)
+        moved = [places @ body.rotation(x).T for x in states]
+        most, told = np.linalg.norm(moved[1] - moved[0], axis=1).max(), followed._turned(states[1] - states[0])
+        assert most <= told <= 2.0 * most
 
 
 # Runs
