@@ -18,7 +18,7 @@ from typing import NamedTuple
 from ...kernels import kernel
 from ...net.rotation import times
 from ..vectors import dot
-from .nearest_point import SAMPLES, far, point, share
+from .nearest_point import SAMPLES, far, in_box, point, share
 from .pair import Pair, from_shape, pair_of, pairing
 
 NOWHERE = -1.0
@@ -262,3 +262,24 @@ def places(depth, spins=0):
     from .several import COLUMNS, PLACES, several
 
     return Places(within, *several(within, rise), touch_of, (PLACES, COLUMNS))
+
+
+@functools.cache
+def in_reach(depth, spins):
+    """The kernel that tells whether an element with two nodes may touch its body within a skin.
+
+    Where a body is convex its depth is concave along the element, and nowhere above its tangent in the middle.
+    """
+    boxed = in_box(spins)
+    if not getattr(depth, "convex", True):
+        return boxed
+    within = places(depth, spins).within
+
+    @kernel(forceinline=True)
+    def in_reach(skin, x, cells, data, c, nodes, functions):
+        if not boxed(skin, x, cells, data, c, nodes, functions):
+            return False
+        spot = within(x, cells, data, c, nodes, functions, 0.5)
+        return not spot.depth + 0.5 * abs(dot(spot.gradient, spot.d)) + skin <= 0.0
+
+    return in_reach

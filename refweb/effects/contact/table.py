@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...messages import nearest, shown
 from ...tables import Table, boolean, field, real, table
 from ..base import Family
-from .nearest_point import in_box, in_sphere, near
+from .nearest_point import in_sphere, near
 from .pair import AWAY, pair_data
 from .passing import passing
 
@@ -224,8 +224,9 @@ class Contact(Table):
             (force, energy, stiffness, bound), within = kernels(*element), in_sphere
         else:
             from .penalty import kernels
+            from .places import in_reach
 
-            (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_box(spins)
+            (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_reach(depth, spins)
         return Family(
             **pairs,
             passing=passing(depth, *element[1:], spins) if net.order == 1 and not net.quasi_static else None,

@@ -82,8 +82,16 @@ def distances(net, body, x):
     return np.maximum(nearest, np.linalg.norm(np.maximum(over, 0.0), axis=1) - 0.5 * np.linalg.norm(b - a, axis=1))
 
 
+def depths(net, body, x):
+    """Of the deepest of some points of each line, below 0 outside of the body."""
+    a, b = ((net.points + x)[net.cells[:, k]] - (net.points + x)[body.row] for k in (0, 1))
+    points = (a + np.linspace(0.0, 1.0, 33)[:, None, None] * (b - a)) @ body.axes.T
+    depth, grown = body.shape.depth(), body.shape.grown()
+    return np.array([[depth(tuple(p), grown)[0] for p in of_place] for of_place in points]).max(axis=0)
+
+
 def test_what_is_near_is_what_is_near():
-    """The kernel against distances in numpy, at random displacements: the same lines, and whole ones."""
+    """The kernel at random displacements: lines within the skin are found, whole, and none further than their boxes."""
     scene, rng = case(BALL, BOX, subdivide=3), np.random.default_rng(7)
     system = scene.build()
     net, counts = system.net, []
@@ -92,8 +100,10 @@ def test_what_is_near_is_what_is_near():
         for skin in (0.0, 0.05, 0.3):
             x, chosen = rng.normal(0.0, 0.02, (system.rows, 3)), np.empty(len(family.cells), dtype=np.int64)
             count = family.near(skin, x, family.cells, family.data, chosen)
-            lines = net.line[distances(net, body, x) < skin]
-            np.testing.assert_array_equal(chosen[:count], np.flatnonzero(np.isin(net.line, lines)))
+            may = np.isin(net.line, net.line[distances(net, body, x) < skin])
+            must = np.isin(net.line, net.line[-depths(net, body, x) < skin])
+            np.testing.assert_array_equal(np.isin(net.line, net.line[chosen[:count]]).sum(), count)  # whole lines
+            assert may[chosen[:count]].all() and np.isin(np.flatnonzero(must), chosen[:count]).all()
             counts.append(count)
     assert 0 < sorted(counts)[1] and max(counts) < len(net.cells)
 
