@@ -46,11 +46,11 @@ NOT_SEEN = -1.0
 
 @kernel(forceinline=True)
 def overlap(place, data, c, ends):
-    """(J, its gradients by the nodes, least squared distance), E = f J; the gradients are in the order of the pair."""
+    """(J, its gradients by the nodes), E = f J; the gradients are in the order of the pair."""
     touch, half = data[c, TOUCH], 0.5 * data[c, SCALE]
     p, u, w = place
-    one, a, b, d, least = first(p, u, w, touch, ends)
-    other, e, g, h, nearer = first((-p[0], -p[1], -p[2]), w, u, touch, ends)
+    one, a, b, d = first(p, u, w, touch, ends)
+    other, e, g, h = first((-p[0], -p[1], -p[2]), w, u, touch, ends)
     own, more = half * data[c, LENGTH], half * data[c, OTHER]
     first_node = (
         own * a[0] - more * (e[0] + g[0] + h[0]),
@@ -64,7 +64,7 @@ def overlap(place, data, c, ends):
         more * e[2] - own * (a[2] + b[2] + d[2]),
     )
     last = more * g[0] + own * d[0], more * g[1] + own * d[1], more * g[2] + own * d[2]
-    return own * one + more * other, first_node, second, third, last, min(least, nearer)
+    return own * one + more * other, first_node, second, third, last
 
 
 @kernel(forceinline=True)
@@ -157,8 +157,8 @@ def add_push(place, f, data, c, nodes, ends):
     deep = push_apart(place, n, f, data, c, nodes)
     if deep != NOT_SEEN:
         return deep
-    j, g0, g1, g2, g3, least = overlap(place, data, c, ends)
-    if least == math.inf:
+    j, g0, g1, g2, g3 = overlap(place, data, c, ends)
+    if j == 0.0:
         return NOT_SEEN
     factor, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
     by_u, by_w = slopes_of_factor(place.u, place.w, n, factor, area)
@@ -168,7 +168,7 @@ def add_push(place, f, data, c, nodes, ends):
         f[nodes[row, 1], k] -= factor * g1[k] + j * by_u[k]
         f[nodes[row, 2], k] -= factor * g2[k] - j * by_w[k]
         f[nodes[row, 3], k] -= factor * g3[k] + j * by_w[k]
-    return touch - math.sqrt(max(least, 0.0))
+    return max(touch - math.sqrt(max(nearest(place.p, place.u, place.w)[2], 0.0)), 0.0)
 
 
 @kernel()
@@ -249,7 +249,7 @@ def add_all_second(x, cells, data, c, definite, ends, block):
     add_second(back, w, u, touch, half * data[c, OTHER], definite, (2, 3, 0, 1), ends, block)
     if definite:
         return
-    j, g0, g1, g2, g3, _ = overlap(place, data, c, ends)
+    j, g0, g1, g2, g3 = overlap(place, data, c, ends)
     slopes = np.empty((4, 3))
     for k in range(3):
         slopes[0, k], slopes[1, k], slopes[2, k], slopes[3, k] = g0[k], g1[k], g2[k], g3[k]

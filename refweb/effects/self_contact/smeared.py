@@ -38,7 +38,7 @@ from ..vectors import dot
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 PLACES, WEIGHTS = tuple((0.5 * (1.0 + _POINTS)).tolist()), tuple((0.5 * _WEIGHTS).tolist())
 """Gauss points and weights on [0, 1]."""
-ROOM = 8
+ROOM = 4
 """Numbers of a row of space to work in: ends of pieces."""
 SHORT = 1e-9
 """Length of an element over the distance of touch below which it has no direction."""
@@ -67,10 +67,7 @@ def along(p, u, w):
 
 @kernel()
 def pieces(length, y, rate, across, turn, touch, ends):
-    """Write the ends of the pieces on which the integrand is a polynomial to ``ends``; their number, 0 where it is 0.
-
-    The last number of ``ends`` is the least squared distance there.
-    """
+    """Write the ends of the pieces on which the integrand is a polynomial to ``ends``; the number of pieces."""
     square, half, over = dot(turn, turn), dot(across, turn), dot(across, across) - touch * touch
     root = half * half - square * over
     if root <= 0.0 and over >= 0.0:
@@ -80,9 +77,6 @@ def pieces(length, y, rate, across, turn, touch, ends):
         q = -(half + math.copysign(math.sqrt(max(root, 0.0)), half))
         one, other = q / square, (over / q if q != 0.0 else math.inf)
         low, high = max(low, min(one, other)), min(high, max(one, other))
-        nearest = min(max(-half / square, low), high)
-    else:
-        nearest = 0.0
     if not low < high:
         return 0
     count = 1
@@ -92,7 +86,7 @@ def pieces(length, y, rate, across, turn, touch, ends):
         low, high = max(low, min(first, last)), min(high, max(first, last))
         if not low < high:
             return 0
-        ends[0], nearest = low, min(max(nearest, low), high)
+        ends[0] = low
         one, other = (touch - y) / rate, (length - touch - y) / rate
         for inner in (min(one, other), max(one, other)):
             if low < inner < high:
@@ -101,25 +95,22 @@ def pieces(length, y, rate, across, turn, touch, ends):
     elif not -touch < y < length + touch:
         return 0
     ends[count] = high
-    ends[ROOM - 1] = over + touch * touch + nearest * (2.0 * half + nearest * square)
     return count
 
 
 @kernel()
 def first(p, u, w, touch, ends):
-    """(I, its gradients by the two nodes of the first element and by the second node of the other, least D).
+    """(I, its gradients by the two nodes of the first element and by the second node of the other).
 
     That by the first node of the other is the negative of their sum. p is the first node of the first element from the
     first node of the other.
     """
-    total, least = 0.0, math.inf
+    total = 0.0
     f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
     count = 0
     if dot(w, w) > (SHORT * touch) ** 2:
         length, unit, y0, rate, across, turn = along(p, u, w)
         count = pieces(length, y0, rate, across, turn, touch, ends)
-        if count:
-            least = ends[ROOM - 1]
         for n in range(count):
             low, span = ends[n], ends[n + 1] - ends[n]
             for i in range(4):
@@ -137,7 +128,7 @@ def first(p, u, w, touch, ends):
                 g0, g1, g2 = g0 + s * x0, g1 + s * x1, g2 + s * x2
                 a, b = (tilt - pull * y) / length, energy * far[1] / touch
                 h0, h1, h2 = h0 + a * d0 + b * unit[0], h1 + a * d1 + b * unit[1], h2 + a * d2 + b * unit[2]
-    return total, (f0, f1, f2), (g0, g1, g2), (h0, h1, h2), least
+    return total, (f0, f1, f2), (g0, g1, g2), (h0, h1, h2)
 
 
 @kernel(forceinline=True)
