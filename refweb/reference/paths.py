@@ -2,7 +2,9 @@
 
 A path is what TOML calls a dotted key, from the head of the scene file to the value. A number in it is an index, from
 0; of tables with names, bodies and observables among them, the name will do, ``body.ball.velocity``. Values are put
-where they belong before anything is checked, so that they are refused, or not, as if they stood in the file.
+where they belong before anything is checked, so that they are refused, or not, as if they stood in the file. The
+table of an effect, or the list of its tables, is left out where it is ``false``: ``self_contact = false`` is the scene
+whose lines do not touch each other.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from typing import Any
 
 from ..errors import InputError, refused_at
 from ..messages import nearest, one_line, short, shown
+from ..registry import EFFECTS
 
 LONGEST = 1000
 """Largest number of characters in a path."""
@@ -59,7 +62,7 @@ def with_value(given, path, value) -> dict:
     path : str
         Keys and numbers with dots between. Tables that are missing are made, in a list of tables behind the last one.
     value : object
-        As TOML reads it.
+        As TOML reads it; False for an effect that is left out.
 
     Returns
     -------
@@ -72,6 +75,8 @@ def with_value(given, path, value) -> dict:
         none.
     """
     keys = _keys(path)
+    if value is False and len(keys) == 1 and keys[0] in EFFECTS:
+        return {key: table for key, table in given.items() if key != keys[0]}
     with refused_at(f"{short(path)} = {shown(value)}:"):
         return _put(given, keys, (), value)
 

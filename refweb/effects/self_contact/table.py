@@ -44,8 +44,8 @@ class SelfContact(Table):
         Radius of all lines [m].
     stiffness : float, optional
         k [N/m], the push of lines that cross at half the distance of touch, over the radius. Where it is left out it is
-        chosen: EA/L of the stiffest element, or what stops two of the heaviest at the largest velocity between nodes at
-        the start; a run whose lines overlap by more than their radius is repeated with a larger one.
+        chosen: EA/L of the stiffest element, or what stops two of the heaviest at the largest velocity between nodes or
+        bodies at the start; a run whose lines overlap by more than their radius is repeated with a larger one.
     damping : float
         d of Hunt and Crossley [s/m]: a push of 1 + d δ̇ times that of the overlap, never a pull; δ̇ is the rate of the
         overlap.
