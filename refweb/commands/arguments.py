@@ -10,7 +10,10 @@ def add_scene(parser):
 
 def add_values(parser):
     """Values in place of those of the scene."""
-    text = "a value in place of the scene's, by its path, as solve.duration=0.5 or body.0.velocity=[0,0,2]; repeatable"
+    text = (
+        "a value in place of the scene's, by its path, as solve.duration=0.5 or body.0.velocity=[0,0,2]; an effect is "
+        "left out by false, as contact=false; repeatable"
+    )
     parser.add_argument("--set", dest="values", action="append", default=[], metavar="PATH=VALUE", help=text)
 
 

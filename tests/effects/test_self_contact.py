@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, lsq_linear
 
 import refweb
 from refweb.effects.self_contact import losses, press, search, slipping, table
@@ -175,6 +175,16 @@ def test_push_of_crossed_lines(angle):
         push = STIFFNESS * height * (4.0 * RADIUS**2 - height**2) ** 1.5 / (np.sqrt(27.0) * RADIUS**3) * factor
         np.testing.assert_allclose(force[2:].sum(axis=0), [0.0, 0.0, push], rtol=1e-10, atol=1e-10 * push)
         assert deep == pytest.approx(2.0 * RADIUS - height, rel=1e-12)
+
+
+def test_overlap_is_that_of_centre_lines():
+    """Twice the radius less the distance of both segments, by least squares with bounds, whatever reaches beyond."""
+    pairs = [(Pair(lines(1.3, 0.02, 0.5 + beyond)), REST) for beyond in (0.05, 0.12, 0.25)]  # past the end of the other
+    for pair, x in pairs + [(pair, x) for pair, x, _ in some_pairs(20)]:
+        (a, b), (c, d) = (pair.points + x).reshape(2, 2, 3)
+        nearest = lsq_linear(np.column_stack([b - a, c - d]), c - a, (0.0, 1.0), tol=1e-14)
+        deep = max(2.0 * RADIUS - np.sqrt(2.0 * nearest.cost), 0.0)
+        assert pair.energy(x) > 0.0 and pair.force(x)[1] == pytest.approx(deep, abs=1e-6 * RADIUS)
 
 
 def test_what_slides_along_a_line_feels_no_joint():
@@ -656,6 +666,10 @@ def test_a_stiffness_that_is_left_out_follows_from_the_motion():
     solution = refweb.run(free_lines(speed=3.0, stiffness=None, duration=0.03), progress=False)
     assert solution.lines["chosen"] and solution.lines["stiffness"] == 220.0  # 0.5 · 5e-4 · 9/(0.4037 · 25e-6), rounded
     assert 0.7 < solution.lines["overlap"] / 5e-3 < 0.85 and solution.passage["lines"] == "certified"
+    ball = refweb.Body(name="ball", radius=0.01, mass=1.0, position=(0.0, 0.0, 1.0), velocity=(0.0, 0.0, 3.0))
+    still = free_lines(speed=0.0, stiffness=None)  # what comes at a body folds there as fast
+    thrown = still.replace(effects=(*still.effects, ball, refweb.Contact(stiffness=1.0))).settled()
+    assert thrown.effects[0].stiffness == 220.0 and still.settled().effects[0].stiffness == 70.0  # the latter EA/L
     scene = free_lines(speed=1e-3, stiffness=None, duration=3e-3)
     pulled = refweb.Load(node=[2, 3], force=(0.0, 0.0, -20.0))
     solution = refweb.run(scene.replace(effects=(*scene.effects, pulled)), progress=False)

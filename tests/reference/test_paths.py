@@ -51,6 +51,17 @@ def test_a_value_is_put_where_the_path_says_and_nowhere_else(path):
     assert with_value(changed, path, None) == with_value(given, path, None)
 
 
+def test_an_effect_is_left_out_by_false():
+    """And nothing else is, nor what stands in an effect."""
+    given = GIVEN | {"contact": {"friction": 0.3}}
+    assert with_value(given, "contact", False) == with_value(GIVEN, "gravity", False) == GIVEN
+    assert "body" not in with_value(given, "body", False)
+    assert with_value(given, "contact.friction", False)["contact"] == {"friction": False}
+    assert with_value(given, "cable", False)["cable"] is False
+    scene = refweb.Scene.load("closing-net", {"contact": False, "accuracy.error": "none", "solve.duration": 1e-3})
+    assert scene.contact is None and refweb.Scene.load("closing-net").contact is not None
+
+
 @pytest.mark.parametrize("path", WRONG)
 def test_what_is_no_path(path):
     with pytest.raises(refweb.InputError) as refusal:

@@ -55,7 +55,7 @@ def apart(one, other):
 
 
 def case(quick):
-    values = {"web.layers": 2, "web.cell_area": 11.0, "self_contact.radius": 0.05} if quick else {}
+    values = {"web.layers": 3, "web.cell_area": 4.0, "self_contact": False} if quick else {}
     load = lambda more: refweb.run(refweb.Scene.load("capture-stage", {**values, **more}))  # noqa: E731
     free = load({})
     nearby = load({"velocity.0.value": [0.0, 0.0, 5.0 * (1.0 + 1e-9)]})

@@ -1,9 +1,9 @@
 """How likely does a net hold a tumbling stage?
 
 The capture of ``refweb run capture-stage`` with errors of aim, spin and speed, as the study ``refweb sweep
-odds-of-capture``, but for contact of lines with lines, which takes ten times as long: the stage stands off the line of the throw by a normal distribution of 1 m along its axis and across,
-tumbles about y by 0.05 ± 0.1 rad/s, and the net flies with 5 ± 1 m/s. A net holds it where, at the end, the centre of
-the stage is inside of it and the mouth is closed.
+odds-of-capture``, but for contact of lines with lines, which takes ten times as long: the stage stands off the line of
+the throw by a normal distribution of 1 m along its axis and across, tumbles about y by 0.05 ± 0.1 rad/s, and the net
+flies with 5 ± 1 m/s. A net holds it where, at the end, the centre of the stage is inside of it and the mouth is closed.
 
 One run of a net that folds is one draw of many, and its own ± says how far it is determined. What is told here are
 statistics: the share of the draws that hold, with the interval of Clopper and Pearson (Biometrika 26 (1934) 404–413,
