@@ -101,7 +101,8 @@ def case(quick):
     rows, verdicts = judged(solution, "stage")
     stress, table = solution.results["max_tension"].value / solution.scene.cable.area, []
     values |= {"self_contact": False} if quick else {}
-    for margin in MARGINS[:1] if quick else MARGINS:
+    margins = MARGINS[-1:] if quick else MARGINS
+    for margin in margins:
         weaker = refweb.run(refweb.Scene.load("capture-stage", {**values, "rupture.strength": margin * stress}))
         breaks, found = weaker.breaks or [], weaker.throw
         drift = weaker.solver["angular_momentum_drift"]
@@ -127,7 +128,7 @@ def case(quick):
         Verdict(
             "Lines without margin break.",
             "holds",
-            f"at {MARGINS[0]:g} of the largest stress {table[0][1]} of {len(solution.tension)} lines break, the "
+            f"at {margins[0]:g} of the largest stress {table[0][1]} of {len(solution.tension)} lines break, the "
             f"first at {table[0][2]} s; which breaks first decides what breaks later: one motion of many",
             all(int(row[1]) > 0 for row in table),
         )
