@@ -295,8 +295,9 @@ class Scene:
         if any(name_of(EFFECTS, e) == "self_contact" and e.stiffness is None for e in self.effects):
             from .effects.self_contact.passage import first_stiffness as first_of_lines
 
+            system = self.with_stiffness({"self_contact": 1.0}).build()
             with in_file(self.file):
-                first = first_of_lines(self.with_stiffness({"self_contact": 1.0}).build())
+                first = first_of_lines(system)
             return self.with_stiffness({"self_contact": first}).settled()
         if not missing:
             return self

@@ -658,6 +658,13 @@ def test_a_line_that_crosses_another_holds_up_to_friction(method):
 # Stiffness and rows
 
 
+def test_a_scene_that_cannot_be_built_names_its_file_once():
+    scene = refweb.Scene.load("capture-stage", {"body": False})
+    with pytest.raises(InputError, match=r"there is no \[\[body\]\]") as refusal:
+        scene.settled()
+    assert str(refusal.value).count("capture-stage.toml") == 1
+
+
 def test_a_stiffness_that_is_left_out_follows_from_the_motion():
     """½ μ v² of both lines is stored at 0.8 of the radius: where they come as they start, overlaps are about that.
 
