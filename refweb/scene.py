@@ -296,9 +296,7 @@ class Scene:
             from .effects.self_contact.passage import first_stiffness as first_of_lines
 
             system = self.with_stiffness({"self_contact": 1.0}).build()
-            with in_file(self.file):
-                first = first_of_lines(system)
-            return self.with_stiffness({"self_contact": first}).settled()
+            return self.with_stiffness({"self_contact": first_of_lines(system)}).settled()
         if not missing:
             return self
         from .effects.contact.overlap import first_stiffness
