@@ -296,18 +296,17 @@ class Scene:
             from .effects.self_contact.passage import first_stiffness as first_of_lines
 
             system = self.with_stiffness({"self_contact": 1.0}).build()
-            return self.with_stiffness({"self_contact": first_of_lines(system)}).settled()
+            with in_file(self.file):
+                first = first_of_lines(system)
+            return self.with_stiffness({"self_contact": first}).settled()
         if not missing:
             return self
         from .effects.contact.overlap import first_stiffness
 
         system, steps = self.with_stiffness(dict.fromkeys(missing, 1.0)).build(), getattr(self.solve, "load_steps", ())
         with in_file(self.file), refused_at("[contact]"):
-            return self.with_stiffness({
-                body.name: first_stiffness(system, body, self.contact.law_of(body)[1], steps)
-                for body in system.net.bodies
-                if body.name in missing
-            })  # fmt: skip
+            bodies, law = (body for body in system.net.bodies if body.name in missing), self.contact.law_of
+            return self.with_stiffness({b.name: first_stiffness(system, b, law(b)[1], steps) for b in bodies})
 
     def build(self):
         """The `refweb.system.system.System` of this scene, with the stiffness of contact that it leaves out chosen.

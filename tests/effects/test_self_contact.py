@@ -659,10 +659,10 @@ def test_a_line_that_crosses_another_holds_up_to_friction(method):
 
 
 def test_a_scene_that_cannot_be_built_names_its_file_once():
-    scene = refweb.Scene.load("capture-stage", {"body": False})
-    with pytest.raises(InputError, match=r"there is no \[\[body\]\]") as refusal:
-        scene.settled()
-    assert str(refusal.value).count("capture-stage.toml") == 1
+    for wrong, said in (({"body": False}, "there is no [[body]]"), ({"velocity.0.node": 9999}, "must be 0 … 575")):
+        with pytest.raises(InputError, match=re.escape(said)) as refusal:
+            refweb.Scene.load("capture-stage", wrong).settled()
+        assert str(refusal.value).count("capture-stage.toml") == 1
 
 
 def test_a_stiffness_that_is_left_out_follows_from_the_motion():
