@@ -14,6 +14,7 @@ from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import Standing, follow
 from .history import Watch
 from .initial_state import Start, equilibrium, remarks_on, stored
+from .integrators.crossings import APART, BESIDE, THROUGH
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
 from .schedule import FEW_CORNERS, Schedule, blocks
 
@@ -86,7 +87,7 @@ class Simulation:
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
-        self._lines, self._through = None, _through_of(system, scene)
+        self._lines, self._through = None, _through_of(system)
         self._tables, self._compared, self._kept = [], [], kept
         _check_step(scene)
         self._stand(kept)
@@ -218,7 +219,7 @@ class Simulation:
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
-        self._through = _through_of(self.system, self.scene)
+        self._through = _through_of(self.system)
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -246,7 +247,7 @@ class Simulation:
 
                 chosen = self.scene.settled().chosen
                 self._lines = Passage(self.system, self._unfollowed(), "self_contact" in chosen)
-            self._lines.note(deepest[0], course.crossings)
+            self._lines.note(deepest[0], course.crossings[[APART, BESIDE]])
             self._lines.refuse(*deepest)
 
     def _unfollowed(self):
@@ -271,7 +272,7 @@ class Simulation:
                 watch.note_way(course, pairs, self.integrator)
                 solution.pairs, solution.passage = pairs.plain(), {"pairs": pairs.passage()}
         if self._through is not None:
-            self._through.note(course.crossings)
+            self._through.note(course.crossings[THROUGH])
             solution.passage = {**solution.passage, "bodies": self._through.told()}
         if self._lines is not None:
             solution.passage, solution.lines = {**solution.passage, "lines": self._lines.told()}, self._lines.plain()
@@ -359,13 +360,13 @@ def _overlaps_of(scene, system):
     return Overlaps(settled, system, moving=True, pairs=pairs)
 
 
-def _through_of(system, scene):
-    """The `refweb.effects.contact.passage.BodyPassage` of a scene, None without contact."""
+def _through_of(system):
+    """The `refweb.effects.contact.passage.BodyPassage` of a system, None without contact."""
     if not system.contact:
         return None
     from ..effects.contact.passage import BodyPassage
 
-    return BodyPassage(system, scene.solve.method)
+    return BodyPassage(system)
 
 
 def _silent_of(system):

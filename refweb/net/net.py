@@ -189,6 +189,10 @@ class Net:
         """Places in a cell's nodes from its first end to its second: ``cells[:, along]`` follows the line."""
         return np.argsort(self.places)
 
+    def line_between(self, nodes):
+        """Number of the line that an element between two nodes belongs to."""
+        return int(self.line[np.isin(self.cells, nodes).all(axis=1).argmax()])
+
     def find(self, selection, name="node"):
         """Rows of a selection of nodes; "all" has the nodes that order and subdivision add, see `Web.find`."""
         every = selection == "all" or (isinstance(selection, (list, tuple)) and "all" in selection)

@@ -17,8 +17,7 @@ import numpy as np
 def named(system, met):
     """'line 1 ... body "a"', of what has met: a line by its nodes, and a body by its row."""
     net = system.net
-    element = np.isin(net.cells, np.asarray(met[:2], dtype=np.int64)).all(axis=1).argmax()
-    return int(net.line[element]), next(body for body in net.bodies if body.row == int(met[2]))
+    return net.line_between(met[:2]), next(body for body in net.bodies if body.row == met[2])
 
 
 def would_pass(system, met):
@@ -37,17 +36,15 @@ class BodyPassage:
     ----------
     system : refweb.system.system.System
         With contact.
-    method : str
-        What takes it through time.
     """
 
-    def __init__(self, system, method):
-        self._system, self._method, self._met = system, method, np.full(5, np.inf)
+    def __init__(self, system):
+        self._system, self._met = system, np.full(5, np.inf)
         self._followed = any(family.passing is not None for family in system.families)
 
-    def note(self, crossings):
-        """Note what has met so far, see `refweb.dynamics.integrators.integrator.Course`."""
-        self._met = crossings[2]
+    def note(self, met):
+        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.Course.crossings`."""
+        self._met = met
 
     def told(self):
         """Whether nothing can have passed, as ``run.json`` has it."""

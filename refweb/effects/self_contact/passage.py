@@ -29,8 +29,6 @@ POWER = 2.5
 """Power of an overlap that the energy of lines that cross goes with."""
 HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
 """Energy of lines that cross and overlap by `AIM` of the radius, over k r²."""
-APART, BESIDE = 0, 1
-"""Rows of what has met: lines that push each other, and neighbours along the net."""
 
 
 def pressed(system):
@@ -41,8 +39,8 @@ def pressed(system):
 
 def lines_of(net, nodes):
     """ "lines 1 and 2", those of two elements by the nodes of both, shape (4,)."""
-    found = [net.line[np.isin(net.cells, pair).all(axis=1).argmax()] for pair in np.reshape(nodes, (2, 2))]
-    return f"lines {found[0]} and {found[1]}"
+    one, other = (net.line_between(pair) for pair in np.reshape(nodes, (2, 2)))
+    return f"lines {one} and {other}"
 
 
 def would_pass(system, v, nodes):
@@ -119,12 +117,12 @@ class Passage:
         """Whether nothing can have passed, as ``run.json`` has it."""
         if self._unfollowed is not None:
             return f"not certified: {self._unfollowed}"
-        (time, *nodes), (folded, *beside) = self._crossings[:2]
+        net, ((time, *nodes), (folded, *beside)) = self._system.net, self._crossings
         if np.isfinite(time):
-            return f"not certified: {self._lines(nodes)} may have passed through each other at t = {time:.6g} s"
+            return f"not certified: {lines_of(net, nodes)} may have passed through each other at t = {time:.6g} s"
         if np.isfinite(folded):
             return (
-                f"certified but for neighbours along the net: {self._lines(beside)} came to lie on each other at "
+                f"certified but for neighbours along the net: {lines_of(net, beside)} came to lie on each other at "
                 f"t = {folded:.6g} s"
             )
         return "certified"
@@ -133,9 +131,6 @@ class Passage:
         """What a reader of the results has to know."""
         if (told := self.told()) != "certified":
             yield f"lines may have passed through lines, {told}"
-
-    def _lines(self, nodes):
-        return lines_of(self._system.net, np.asarray(nodes, dtype=np.int64))
 
     def refuse(self, overlap, time, cell):
         """Refuse an overlap above the radius [m] of a cell, at a time [s].

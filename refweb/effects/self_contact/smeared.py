@@ -107,11 +107,9 @@ def first(p, u, w, touch, ends):
     """
     total = 0.0
     f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
-    count = 0
     if dot(w, w) > (SHORT * touch) ** 2:
         length, unit, y0, rate, across, turn = along(p, u, w)
-        count = pieces(length, y0, rate, across, turn, touch, ends)
-        for n in range(count):
+        for n in range(pieces(length, y0, rate, across, turn, touch, ends)):
             low, span = ends[n], ends[n + 1] - ends[n]
             for i in range(4):
                 s = low + span * PLACES[i]
