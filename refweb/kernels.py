@@ -64,6 +64,7 @@ from numba.core import config
 from numba.core.caching import FunctionCache
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime.nrt import rtsys
 from numba.core.typing.templates import Signature
 
 try:
@@ -124,7 +125,21 @@ def _cache_folder():
 _folder = _cache_folder()
 
 
-class _CacheByName(FunctionCache):
+class _Cache(FunctionCache):
+    """Machine code of a function on disk, read without what only compiling needs.
+
+    numba would first look for declarations of functions that have come since it last looked, all that it has at the
+    first time, which takes as long as to read the machine code. Compiling looks by itself.
+    """
+
+    def load_overload(self, sig, target_context):
+        """The machine code of a signature, None where there is none."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
+
+
+class _CacheByName(_Cache):
     """Machine code of a function whose name tells what it captures.
 
     numba's own key is made of what the function captures as bytes, which of kernels and their types differ in every
@@ -197,10 +212,7 @@ class _OfSignature:
 
 def _with_entry(function, options):
     dispatcher: Any = numba.njit(**options)(function)
-    if function.__closure__:
-        dispatcher._cache = _CacheByName(function)
-    else:
-        dispatcher.enable_caching()
+    dispatcher._cache = (_CacheByName if function.__closure__ else _Cache)(function)
     return _compiled_once(dispatcher)
 
 
@@ -296,6 +308,33 @@ def copy_rows(source, target):
     for r in range(source.shape[0]):
         for k in range(3):
             target[r, k] = source[r, k]
+
+
+@kernel()
+def inner(one, other):
+    """Inner product of two vectors; to read a kernel with numba's own, or its sum or ``in``, imports scipy.linalg."""
+    total = 0.0
+    for n in range(one.shape[0]):
+        total += one[n] * other[n]
+    return total
+
+
+@kernel()
+def among(values, value):
+    """Whether a number is among those of a vector."""
+    for n in range(values.shape[0]):
+        if values[n] == value:
+            return True
+    return False
+
+
+@kernel()
+def sum_of(values):
+    """Sum of a vector, one number after another."""
+    total = 0.0
+    for n in range(values.shape[0]):
+        total += values[n]
+    return total
 
 
 @functools.cache

@@ -102,6 +102,7 @@ class Solution(SolutionData):
         InputError
             Where there is no such frame; names the nearest.
         """
+        import meshio
         import pyvista
 
         from .pictures.frames import listed, number_of
@@ -110,7 +111,8 @@ class Solution(SolutionData):
         if self.frames:
             found = dict(self.frames)
             state = found[number_of(frame, list(found))]
-            time, blocks = state.time, {name: pyvista.from_meshio(mesh) for name, mesh in meshes(state).items()}
+            time, found = state.time, meshes(state)
+            blocks = {name: pyvista.from_meshio(meshio.Mesh(*mesh)) for name, mesh in found.items()}
         else:
             found = listed(self.path)
             time, paths = found[number_of(frame, list(found))]

@@ -131,6 +131,24 @@ def test_a_warm_process_compiles_nothing():
     assert json.loads(told) == [0.0, 0.0, 0.0, 0.0, 0]
 
 
+QUICK = """
+import json, sys
+import refweb
+refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 2e-3}), out=sys.argv[1])
+heavy = ("scipy.linalg", "scipy.sparse", "skfem", "numba.typed.typeddict", "meshio", "urllib.request")
+print(json.dumps([name for name in heavy if name in sys.modules]))
+"""
+
+
+def test_a_warm_process_imports_nothing_that_only_compiling_needs(tmp_path):
+    """Reading machine code takes no declarations of functions, and none that it names lies in a module with a BLAS."""
+    for run in ("first", "warm"):
+        told = subprocess.run(
+            [sys.executable, "-c", QUICK, str(tmp_path / run)], capture_output=True, text=True, check=True
+        ).stdout
+    assert json.loads(told) == []
+
+
 WANTED = """
 import sys, time
 import numpy as np

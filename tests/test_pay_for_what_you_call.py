@@ -57,7 +57,7 @@ EVERY |= {
 }
 EVERY |= {
     f"results.{name}"
-    for name in ("state", "solution", "folder", "files", "vtu", "provenance", "progress", "run_status")
+    for name in ("state", "solution", "folder", "files", "vtu", "vtu_file", "provenance", "progress", "run_status")
 }
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
@@ -104,7 +104,7 @@ OBSERVED = {"reaction": {"results.observables.nodal"}}
 """What observables are made of besides their own file."""
 DEFAULT = [{"quantity": quantity} for quantity in ("displacement", "stress", "tension")]
 """What a scene observes that does not say."""
-BASE = ("numpy", "scipy.sparse", "numba", "numba.core.typing.cffi_utils", "skfem")
+BASE = ("numpy", "numba", "numba.core.typing.cffi_utils")
 """Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""
 LOADED = "print(json.dumps(sorted(sys.modules)))"
 
@@ -185,6 +185,11 @@ def called(given):
             modules.add("statics.residual_search")
         elif len(solve.get("load_steps", [1.0])) > 1 and tension_only and not given.keys() & {"body"}:
             modules.add("statics.predictor")
+    if given["cable"].get("order", 1) > 1:
+        modules.add("net.curved")
+        outside.append("skfem")
+    if "mesh" not in given["web"] or "self_contact" in given or rests or modules >= TANGENT:  # parts, neighbours
+        outside.append("scipy.sparse.csgraph")
     if modules >= TANGENT:
         outside.append("qdldl")
         if given["web"].get("mesh") == "hexagon" and importlib.util.find_spec("rslab"):

@@ -4,7 +4,7 @@ A cable is a curve x(s) ∈ R³ over its natural arc length s. scikit-fem knows 
 is the natural length: `NaturalLength` has DF = detDF = L and invDF = 1/L, so that ``grad(u)`` of an
 ``ElementVector(ElementLineP1(), 3)`` is du/ds, and branching, closed and prestressed nets need nothing extra. From the
 `skfem.Basis` only the dofs, the quadrature and the reference derivatives dN/dξ are kept; the compiled kernels do the
-rest.
+rest. Of straight elements, order 1, they are known beforehand, see `refweb.net.elements`.
 
 A line of the web is ``subdivide`` elements of ``order`` 1, 2 or 3, each with as many Gauss points as its order. That is
 the least quadrature with which no motion of an element but a rigid one is free of strain, and it keeps the orders of
@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .elements import gauss, line_element, values
 from .net import Net
 from .tension_laws import NAMES, Law
 
@@ -45,8 +46,6 @@ def basis(points, lines, natural_length, element=None):
     """
     import skfem
     from skfem.mapping import Mapping
-
-    from .elements import gauss
 
     class NaturalLength(Mapping):
         """ξ ∈ [0, 1] to the line's point, with the natural length as metric."""
@@ -122,10 +121,12 @@ class Elements(NamedTuple):
 
 def _elements(web, element, pieces, length):
     """The `Elements` of a web, each line in equal pieces of these natural lengths [m]."""
-    from .elements import values
-
     line = np.repeat(np.arange(len(web.lines), dtype=np.int32), pieces)
     points, ends = _divided(web, pieces)
+    if element.maxdeg == 1:
+        places, weights = gauss(1)
+        cells = np.array(ends, dtype=np.int32, order="C")
+        return Elements(points, cells, line, element.doflocs[:, 0], values(element, places)[1], weights)
     line_basis = basis(points, ends, length, element)
     dofs, places = line_basis.element_dofs.T, element.doflocs[:, 0]
     place = np.tile(np.arange(pieces), len(web.lines))[:, None] + places
@@ -153,8 +154,6 @@ def _line_data(web, line, pieces, length, own):
 
 def _masses(element, cells, share, rows, consistent):
     """Lumped mass of each row, and consistent less lumped mass of each element or None; ``share`` is its mass."""
-    from .elements import gauss, values
-
     at, weights = gauss(element.maxdeg + 1)  # exact for products of two functions
     functions = values(element, at)[0]
     lumped = np.atleast_1d(weights @ functions) if element.maxdeg > 1 else np.array([0.5, 0.5])
@@ -181,8 +180,6 @@ def build(web, cable, quasi_static=False, consistent=False):
     consistent : bool
         Whether mass is consistent, ∫ρA N_a N_b ds, and not lumped to ∫ρA N_a ds.
     """
-    from .elements import line_element
-
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
     laws = np.unique(given["law"])
     own = {name: np.repeat(value, pieces) for name, value in given.items()}

@@ -1,45 +1,33 @@
-"""Reference line elements on [0, 1]: scikit-fem's of order 1 and 2, and the nodal cubic that it does not have."""
+"""Reference line elements on [0, 1] and their quadrature.
+
+The functions of a straight element are 1 − ξ and ξ and its nodes are the ends of the line, so that nothing is left to
+ask scikit-fem for, whose import with that of scipy takes as long as that of numba. Elements of higher order are in
+`refweb.net.curved`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
-import skfem
-from skfem.element import ElementH1
-from skfem.refdom import RefLine
-
-_INNER = 0.5 - 0.1 * np.sqrt(5.0)
-_NODES = np.array([0.0, 1.0, _INNER, 1.0 - _INNER])
-_POWERS = np.linalg.inv(np.vander(_NODES, increasing=True))  # column a: coefficients of node a's function
-_SLOPES = np.arange(1, 4)[:, None] * _POWERS[1:]
 
 
-class ElementLineP3(ElementH1):
-    """Nodal cubic on the four Gauss–Lobatto points 0, (1 ∓ 1/√5)/2, 1.
+class Straight:
+    """What scikit-fem's ``ElementLineP1`` says of itself, as far as a net is made of it."""
 
-    The integrals of its functions are the weights of Gauss–Lobatto quadrature, 1/12 and 5/12, so that its row-sum
-    lumped mass is positive and keeps the order of the frequencies (spectral elements; Cohen, *Higher-Order Numerical
-    Methods for Transient Wave Equations*, 2002, doi:10.1007/978-3-662-04823-8). scikit-fem's own cubic,
-    ``ElementLinePp(3)``, is hierarchical: its inner functions belong to no node and have integrals of no fixed sign.
-    """
-
-    nodal_dofs = 1
-    interior_dofs = 2
-    maxdeg = 3
-    dofnames = ["u", "u", "u"]
-    doflocs = _NODES[:, None]
-    refdom = RefLine
+    maxdeg = 1
+    doflocs = np.array([[0.0], [1.0]])
 
     def lbasis(self, X, i):
         """Function of node i at X, shape (1, points), and its derivative, shape (1, points)."""
-        if not 0 <= i < 4:
-            self._index_error()
-        x = X[0]
-        return np.polyval(_POWERS[::-1, i], x), np.polyval(_SLOPES[::-1, i], x)[None]
+        return (X[0], np.ones_like(X)) if i else (1.0 - X[0], -np.ones_like(X))
 
 
 def line_element(order):
     """The scalar element of an order, 1, 2 or 3; its two ends come first."""
-    return {1: skfem.ElementLineP1, 2: skfem.ElementLineP2, 3: ElementLineP3}[order]()
+    if order == 1:
+        return Straight()
+    from .curved import CURVED
+
+    return CURVED[order]()
 
 
 def gauss(points):

@@ -173,7 +173,7 @@ def frame_of(number, time, meshes, supported):
         Its number.
     time : float
         Its time [s], or load step.
-    meshes : dict of str to meshio.Mesh
+    meshes : dict of str to refweb.results.vtu_file.Mesh
         ``web``, and bodies by name, as `refweb.results.vtu.meshes` makes them.
     supported : ndarray of bool, shape (points,)
         Which points of the web are supported.

@@ -13,7 +13,6 @@ import os
 import pathlib
 import re
 import shutil
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from ..messages import short
 from ..net.rigid_body import row_names
 from .files import as_toml, number, write_atomically, write_text
 from .vtu import meshes, write_mesh
+from .vtu_file import quoted
 
 RESULT_FILES = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif"
@@ -321,8 +321,7 @@ class Folder:
 
     def _list_frames(self):
         rows = "".join(
-            f'    <DataSet timestep="{number(time)}" group="" part="{part}" name={quoteattr(name)} '
-            f"file={quoteattr(path)}/>\n"
+            f'    <DataSet timestep="{number(time)}" group="" part="{part}" name={quoted(name)} file={quoted(path)}/>\n'
             for time, part, name, path in self._listed
         )
         with self._written():

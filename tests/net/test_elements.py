@@ -89,6 +89,20 @@ def test_functions_of_an_element(order):
         np.testing.assert_allclose(slopes @ nodes**power, right, rtol=0, atol=1e-13)
 
 
+def test_the_straight_element_is_scikit_fems():
+    """It is written down, and not asked for: functions, slopes, places of its nodes, and ends as its dofs."""
+    own, theirs, places = elements.line_element(1), skfem.ElementLineP1(), np.linspace(0.0, 1.0, 7)
+    assert own.maxdeg == theirs.maxdeg
+    np.testing.assert_array_equal(own.doflocs, theirs.doflocs)
+    for found, expected in zip(elements.values(own, places), elements.values(theirs, places), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    net = skew_net()
+    basis = discretisation.basis(net.points, net.web.lines, net.natural_length)
+    np.testing.assert_array_equal(net.cells, basis.element_dofs.T)
+    np.testing.assert_array_equal(net.gradients, elements.values(theirs, basis.X)[1])
+    np.testing.assert_array_equal(net.weights, basis.W)
+
+
 def test_basis_is_scikit_fems():
     net = skew_net()
     for element in (None, skfem.ElementLineP2(), skfem.ElementVector(skfem.ElementLineP1(), 3)):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels import copy_rows, kernel
+from ...kernels import copy_rows, inner, kernel
 from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
@@ -165,7 +165,7 @@ def take_peak(t, now, smooth, inside, total, extremes, model, observed, running)
         first, here = len(probes), total.copy()  # events are to see that of the step
         book_within(t, now, x, v, smooth, here, model, running)
         for i in range(first, signs.size):
-            value = np.dot(observed.sums[i - first], here)
+            value = inner(observed.sums[i - first], here)
             if signs[i] * value > signs[i] * extremes.values[i]:
                 extremes.values[i], extremes.times[i] = value, t
                 extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ...errors import OpenBook
-from ...kernels import ENERGY, kernel
+from ...kernels import ENERGY, among, kernel, sum_of
 from ...net.net import AXIAL_STIFFNESS, LENGTH
 from ...net.rotation import more_kinetic
 
@@ -49,7 +49,7 @@ def book_energies(t, x, v, mass, turns, cells, data, energies, energy_outs, book
     total[count], total[count + 1] = 0.0, book[count]
     for i in range(count):
         energies[i](t, x, cells[i], data[i], energy_outs[i])
-        total[i] = energy_outs[i].sum()
+        total[i] = sum_of(energy_outs[i])
         if working[i] > 0:
             total[count + 1] += book[i]
         elif working[i] < 0:
@@ -70,10 +70,10 @@ def begin_powers(t, x, v, extra, families, solved, known, power):
     """Write the power of each family that is booked by it [W]; where it is ``known``, not of those that kicks solve."""
     for n in range(families.powers.shape[0]):
         i, column = families.powers[n, 0], families.powers[n, 1]
-        if known and i in solved:
+        if known and among(solved, i):
             continue
         families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
-        power[i] = families.outs[i][:, column].sum()
+        power[i] = sum_of(families.outs[i][:, column])
 
 
 @kernel(forceinline=True)
@@ -83,7 +83,7 @@ def book_powers(t, h, x, v, extra, power, work, powers, forces, cells, data, out
         i, column = powers[n, 0], powers[n, 1]
         if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
             forces[i](t, x, v, extra, cells[i], data[i], outs[i])
-        gained = outs[i][:, column].sum()
+        gained = sum_of(outs[i][:, column])
         work[i] += 0.5 * h * (power[i] + gained)
         power[i] = gained
 
@@ -100,7 +100,7 @@ def book_potential(sign, t, x, families, work):
     for n in range(families.powers.shape[0]):
         i = families.powers[n, 0]
         families.energies[i](t, x, families.cells[i], families.data[i], families.stored[i])
-        work[i] += sign * families.stored[i].sum()
+        work[i] += sign * sum_of(families.stored[i])
 
 
 @kernel()

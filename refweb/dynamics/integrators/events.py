@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels import kernel
+from ...kernels import inner, kernel
 
 EVENT = np.dtype(
     [
@@ -86,7 +86,7 @@ def note_events(t, h, x, v, f, lines, events, where, probes, rows, data, sums, t
             if i < len(probes):
                 value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
             else:
-                value = np.dot(sums[i - len(probes)], total)
+                value = inner(sums[i - len(probes)], total)
             if crosses(event, value):
                 event.time, event.width = t, h
                 ended = ended or event.stop > 0

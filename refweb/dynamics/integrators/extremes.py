@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...kernels import kernel
+from ...kernels import inner, kernel
 from ...results.probes import NODES, PLACE, farthest, largest_in
 
 EDGE = 2.0**-16
@@ -156,7 +156,7 @@ def look_at_sums(t, total, observed, extremes, ending):
     """As `look`, at sums of the energies ``total``; the time is to be noted before."""
     first, signs, turned = len(observed.probes), observed.signs, False
     for i in range(first, signs.size):
-        value = np.dot(observed.sums[i - first], total)
+        value = inner(observed.sums[i - first], total)
         turned = turns_back(i, value, signs[i], extremes.values[i], extremes.recent, ending) or turned
         if signs[i] * value > signs[i] * extremes.values[i]:
             extremes.values[i], extremes.times[i], extremes.corrections[i] = value, t, 0.0

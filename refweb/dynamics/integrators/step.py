@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...kernels import copy_rows, kernel
+from ...kernels import copy_rows, kernel, sum_of
 from ...net.net import LENGTH
 from ...net.rotation import carry, hand_on, note_turns, turn_on
 from .rubbed import meet_all
@@ -227,7 +227,7 @@ def turn_supports(t, model, running):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
         hand_on(x, f, model.inertia.turns)
         for i in model.rubbed.families:
-            running.power[i] = families.outs[i][:, 0].sum()
+            running.power[i] = sum_of(families.outs[i][:, 0])
     return turned
 
 
