@@ -64,7 +64,11 @@ EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable
 TANGENT = {"system.sparsity", "system.factorization"}
 STATICS = {"statics", "statics.equilibrium", "system.at_rest", "system.unsupported_parts"}
 LOAD_STEPS = {"statics.simulation", "statics.remarks"}
-NEWTON = STATICS | TANGENT | {"statics.load_steps", "statics.newton", "statics.floating", "statics.energy_search"}
+NEWTON = (
+    STATICS
+    | TANGENT
+    | {"statics.load_steps", "statics.newton", "statics.bars", "statics.floating", "statics.energy_search"}
+)
 NEWTON |= {"system.conjugate_gradients"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}

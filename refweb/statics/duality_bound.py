@@ -26,10 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects.elasticity import strains
-from ..net.net import AXIAL_STIFFNESS
 from ..system import conjugate_gradients
 from ..system.factorization import Factor
+from .bars import Bars
 
 ROUNDS, MOST, CLOSE = 5, 8, 1e-2
 """Corrections of forces, iterations of conjugate gradients for each by a tangent near theirs, and what these leave."""
@@ -72,7 +71,7 @@ def duality_bound(system, equilibrium, factor=None):
         Used again where there is one; where it holds a tangent, ``held`` is its prestress τ [N].
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
-    bars = _Bars(net, x)
+    bars = Bars(net, x)
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
     factor, bound = factor or Factor(system.pattern), None
     balance = _Balance(system, bars, x, outer)
@@ -85,19 +84,6 @@ def duality_bound(system, equilibrium, factor=None):
     return bound
 
 
-class _Bars:
-    """What the bars of a net are at a displacement: arrays over them."""
-
-    def __init__(self, net, x):
-        axial = net.per_bar(AXIAL_STIFFNESS)
-        self.natural = net.bar_lengths
-        self.stiffness = axial / self.natural
-        vector = net.bar_vectors(x)
-        self.length = np.linalg.norm(vector, axis=1)
-        self.tension = axial * np.maximum(strains(net, x).ravel(), 0.0)
-        self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]
-
-
 class _Balance:
     """Forces of the bars that balance the outer ones, and what they prove.
 
@@ -105,7 +91,7 @@ class _Balance:
     ----------
     system : refweb.system.system.System
         As it stands at the load step.
-    bars : _Bars
+    bars : Bars
         Its bars at the displacement x.
     x, outer : ndarray, shape (rows, 3)
         The displacement [m] and the outer forces [N].

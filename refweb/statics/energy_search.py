@@ -66,6 +66,6 @@ class EnergySearch:
                 break
             a *= min(max(0.5 * a * slope / rise, 0.1), 0.5) if np.isfinite(rise) else 0.1
         if a < 1.0:
-            return y, 4.0 * shift
+            return y, 2.0 * shift
         good = drowned or energy - self._energy > 0.25 * 0.5 * slope
         return y, 0.1 * shift if good else shift

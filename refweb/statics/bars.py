@@ -1,0 +1,71 @@
+"""The lines of a net as bars: a straight line is one, a curved one has a bar at each quadrature point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.elasticity import strains
+from ..kernels import kernel
+from ..net.net import AXIAL_STIFFNESS
+
+
+class Bars:
+    """What the bars of a net with the tension-only law are at a displacement: arrays over them.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        The net.
+    x : ndarray, shape (rows, 3)
+        The displacement [m].
+
+    Attributes
+    ----------
+    natural, stiffness : ndarray, shape (bars,)
+        Natural length [m] and EA over it [N/m].
+    length, tension : ndarray, shape (bars,)
+        Length [m] and tension [N].
+    direction : ndarray, shape (bars, 3)
+        Unit vectors, 0 of a bar without length.
+    """
+
+    def __init__(self, net, x):
+        axial = net.per_bar(AXIAL_STIFFNESS)
+        self.natural = net.bar_lengths
+        self.stiffness = axial / self.natural
+        vector = net.bar_vectors(x)
+        self.length = np.linalg.norm(vector, axis=1)
+        self._strain = strains(net, x).ravel()
+        self.tension = axial * np.maximum(self._strain, 0.0)
+        self.direction = vector / np.where(self.length > 0, self.length, 1.0)[:, None]
+        self._net = net
+
+    def ahead(self, change):
+        """Tensions to first order in a change of the displacement, of shape (rows, 3) [m]; none is negative [N]."""
+        along = ((self._net.bars @ change) * self.direction).sum(axis=1)
+        return np.maximum(self.stiffness * (self.natural * self._strain + along), 0.0)
+
+    def across(self, tension):
+        """What other tensions make of the stiffness across the bars, a block per element (cells, 3 nodes, 3 nodes)."""
+        net = self._net
+        off = (tension - self.tension) / np.where(self.length > 0, self.length, 1.0)
+        size = 3 * net.gradients.shape[1]
+        blocks = np.zeros((len(net.cells), size, size))
+        _add_across(off, self.direction, net.weights[:, None] * net.gradients, blocks)
+        return blocks
+
+
+@kernel()
+def _add_across(off, direction, shares, blocks):
+    """Add stiffness [N/m] across the direction of each bar, whose vector has ``shares`` of its element's nodes."""
+    points, nodes = shares.shape
+    for c in range(blocks.shape[0]):
+        for q in range(points):
+            n = c * points + q
+            for a in range(nodes):
+                for b in range(nodes):
+                    d = off[n] * shares[q, a] * shares[q, b]
+                    for i in range(3):
+                        for j in range(3):
+                            blocks[c, 3 * a + i, 3 * b + j] -= d * direction[n, i] * direction[n, j]
+                        blocks[c, 3 * a + i, 3 * b + i] += d
