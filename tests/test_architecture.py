@@ -237,7 +237,7 @@ def test_one_table_names_the_effects():
         "build",
         "results.state",
         "statics.interior_point",
-        "statics.duality_bound",
+        "statics.bars",
         "statics.floating",
         "statics.lowest",
         "system.system",
