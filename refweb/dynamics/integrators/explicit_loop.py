@@ -2,8 +2,8 @@
 
 Its pieces stand beside their equations: `refweb.dynamics.integrators.step` moves, ``energy_book`` books work,
 ``extremes`` and ``events`` look, ``step_bound`` says how long a step may be. A piece that calls kernels counts
-references to all its arrays, some 0.1 µs a call, as much as two lines take: forces and looks of a plain step, which
-every scene has, stand in the loop itself.
+references to all its arrays, some 0.1 µs a call, as much as two lines take, also where it finds nothing to do: forces
+and looks of a plain step, which every scene has, stand in the loop itself, which asks once what a scene has none of.
 """
 
 from __future__ import annotations
@@ -131,6 +131,22 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
 
 
 @kernel(forceinline=True)
+def room_for_numbers(rows, driven):
+    """Room for a place, for three vectors, and for states of rows whose motion is prescribed."""
+    place, before, aside = np.zeros(2, dtype=np.int64), np.empty((driven, 7)), np.empty((rows * (driven > 0), 3))
+    return place, np.zeros(3), np.zeros(3), np.zeros(3), before, aside
+
+
+@kernel(forceinline=True)
+def room_for_forces(rows, changing, pushing, model):
+    """Room for forces that do not stay, twice where any are asked for, for natural lengths, and for what touches."""
+    families, rubbed = model.families, model.rubbed
+    more = families.powers.shape[0] + families.viscous.size + rubbed.families.size > 0 or pushing
+    extra, lengths = np.zeros((rows * more, 3)), np.empty(model.reels.lengths.size * changing)
+    return extra, np.empty_like(extra), lengths, np.empty((0, rubbed.width))
+
+
+@kernel(forceinline=True)
 def change_lengths(t, x, reels, was, lines, length_force, work):
     """Give what changes its natural lengths at time t, and book the work of that."""
     note_lengths(reels, was)
@@ -140,29 +156,26 @@ def change_lengths(t, x, reels, was, lines, length_force, work):
 
 @kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
-    """Take ``count`` steps of size h behind those taken of the row, and return how many; the first is looked at inside.
-
-    They are fewer where an event ends the run, or lines would pass. Natural lengths may be ``changing``."""
-    clock, families, reels, motions = running.clock[0], model.families, model.reels, model.motions
+    """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
+    clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
-    probes, probe_rows, probe_data = observed.probes, observed.rows, observed.data
-    plain, scales, known, pushing = observed.plain, observed.scales, np.zeros(3), model.outside.pushing.size > 0
-    signs, followed, sums, touches = observed.signs, observed.followed, observed.sums, np.empty((0, model.rubbed.width))
+    probes, probe_rows, probe_data, sums = observed.probes, observed.rows, observed.data, observed.sums
+    plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    rows, where, reaction, before = x.shape[0], np.zeros(2, dtype=np.int64), np.zeros(3), np.empty((driven.size, 7))
+    where, reaction, known, push, before, aside = room_for_numbers(x.shape[0], driven.size)
     lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
-    awaited, averaged = running.events.shape[0] > 0, observed.windows.slots.size > 0
-    extra = np.zeros((rows if powers.shape[0] + viscous.size + rubbing.size or pushing else 0, 3))
-    half, was, length_force = np.empty_like(extra), np.empty(reels.lengths.size * changing), running.length_force
-    stages, kicks, drifts = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h
-    looked, watched, fresh = extremes.looked, followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0)
+    near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
+    pushing, pushed, length_force = model.outside.pushing.size > 0, running.ledger.pushed, running.length_force
+    extra, half, was, touches = room_for_forces(x.shape[0], changing, pushing, model)
+    stages, kicks, drifts, looked = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h, extremes.looked
+    watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
-    push, pushed, nearby, bits = np.zeros(3), running.ledger.pushed, model.nearby, bits_of(flat_v, model, stages > 0)
-    inside, aside = room_inside(rows if looks else 0, lines), np.empty((rows if driven.size else 0, 3))
+    bits, inside = bits_of(flat_v, model, stages > 0), room_inside(x.shape[0] * looks, lines)
+    guarded, moves = model.guard.families.size + model.walls.families.size > 0, driven.size + len(motions.kernels) > 0
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -170,28 +183,31 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_state(x, v, f, inverse, inside.before)
         if stages:
             inner_stages(now, h, scheme, model, running, reaction, push, extra)
-        if passes(now - h, kicks[stages], drifts[stages], stages, model, running):
+        if guarded and passes(now - h, kicks[stages], drifts[stages], stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)
-        move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, model.inertia.turns)
+        move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
         if stages:
             book_potential(-1.0, now - kicks[stages + 1], x, families, work)
-        move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
+        if moves:
+            move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
             change_lengths(now, x, reels, was, data[0], length_force, work)
-        follow_near(drifts[0], x, v, bits, before, model.inertia, nearby, families)
-        look_back_at_drift(now - h, model, running)
+        if near:
+            follow_near(drifts[0], x, v, bits, before, model.inertia, nearby, families)
+            look_back_at_drift(now - h, model, running)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
             forces[i](now, x, v, f, cells[i], data[i], outs[i])
-        show_near(nearby, families)
-        hand_over(x, f, model.inertia.turns)
+        if near:
+            show_near(nearby, families)
+        hand_over(x, f, turns)
         if rubbing.size:
             touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
         elif viscous.size:
-            viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs, model.inertia.turns)
+            viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs, turns)
         else:
-            plain_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f, x, v, model.inertia.turns)
+            plain_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f, x, v, turns)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
         book_motion(driven, mass, x, v, f, before, work)
@@ -205,19 +221,19 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         for i in followed:
             if not plain_value(i, flat_x, lines, plain, scales, known):
                 known[0] = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
-            value = known[0]
-            turned = turns_back(i, value, signs[i], values[i], recent, ending) or turned
-            if signs[i] * value > signs[i] * values[i]:
-                take_over(i, value, now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
+            turned = turns_back(i, known[0], signs[i], values[i], recent, ending) or turned
+            if signs[i] * known[0] > signs[i] * values[i]:
+                take_over(i, known[0], now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
             looks = look_again(now, h, step == fresh, stages > 0, inside, total, model, observed, running)
         if averaged:
             average(now, x, v, f, lines, where, stages > 0, observed, running.averages, extremes)
-        if awaited:
-            if note_events(now, h, x, v, f, lines, running.events, where, probes, probe_rows, probe_data, sums, total):
-                return step
+        if events.size and note_events(
+            now, h, x, v, f, lines, events, where, probes, probe_rows, probe_data, sums, total
+        ):
+            return step
     return count
 
 
