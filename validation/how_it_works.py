@@ -44,14 +44,18 @@ elements for each line by 1 % for seven times the time, half the step by 0.5 %. 
 eight scenes of different character. ``python -m validation.cost.explicit``, ``validation.cost.implicit``,
 ``validation.cost.statics`` and ``validation.cost.effects`` print what steps, factorizations and effects cost.
 
-**How far it goes.** One process and one thread carry a web as far as memory does. Five load steps of the square web
-from flat, with their bounds, take 9 factorizations at 29 403 unknowns, 12 at 118 803, there 7.6 times the CPU time of
-one by SuperLU with rslab and 26 times with qdldl, and 23 at 747 003, there 3.3 GB. The triangle web takes 22 and 7.4
-times at 120 300; the hexagon web, which hangs together by far fewer lines, 55 and 22 times at 237 009. CPU time of the
-square goes with unknowns to the power 1.13 up to 118 803; memory beside 0.2 GB of libraries is 4 to 5 kB for each. By
-these figures 16 GB hold some 3 million unknowns, a million cells, and the factor is what fills them: this is an
-estimate, not a run. Explicit steps need no matrix: a million cells, 2 million lines, take 24 ns an element and step,
-1.4 GB and 10 s to be set up. A single web larger than a machine is a matter for PETSc: its SNES with the same tangents,
-spread over machines, and conjugate gradients with a multigrid of the soft modes, or MUMPS, in place of the factor.
-``python -m validation.cost.scale`` prints these figures for a machine.
+**How far it goes.** One process and one thread carry a web as far as memory does. Five load steps of a web from flat,
+with their bounds, take 12 factorizations of the square web at 118 803 unknowns, 17 of the triangle web at 120 300 and
+22 of the hexagon web at 237 009, which hangs together by far fewer lines: there 11, 8 and 11 times the CPU time of
+one by SuperLU with rslab, 25, 27 and 46 times with qdldl. The square web takes 20 factorizations, 105 s and 3.2 GB at
+747 003 unknowns. So CPU time goes with unknowns to the power 1.45 from 118 803 on: more steps for larger webs, and a
+factor whose size goes with the power 1.12 and whose work with 1.56, as its analysis alone says from 29 403 to 2 994
+003 unknowns. The first load step takes 66 s and 5.7 GB at 1 465 803 unknowns. At the last, a million cells, the
+factor has 3.1 GB and needs 4.3 GB while it is made, beside 4 GB of web, pattern and analysis. Addresses run out
+before memory: where a process may have no more than 16 GB of them, the second load step at 1 465 803 unknowns ended
+it, which had filled 5.7 GB, and the first factorization at 2 994 003; without such a limit neither has been run.
+Explicit steps need no matrix: a million cells, 2 million lines, take 24 ns an element and step and 1.4 GB. A single
+web larger than a machine is a matter for PETSc: its SNES with the same tangents, spread over machines, and conjugate
+gradients with a multigrid of the soft modes, or MUMPS, in place of the factor. ``python -m validation.cost.scale``
+prints these figures for a machine.
 """

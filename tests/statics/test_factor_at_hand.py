@@ -110,7 +110,7 @@ def _prestressed():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not importlib.util.find_spec("rslab"), reason="minutes without it")
+@pytest.mark.skipif(not importlib.util.find_spec("rslab"), reason="a factorization takes seconds without it")
 @pytest.mark.parametrize("mesh", MOST)
 def test_few_factorizations_of_large_webs(mesh):
     found = series(web(mesh, cells=200))
