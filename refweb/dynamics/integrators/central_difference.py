@@ -28,7 +28,7 @@ from .extremes import Extremes
 from .guard import look_anew
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
-from .nearby import look_at_all
+from .nearby import forget, look_at_all
 from .records import CLOCK, Model, Observed, Running, Scheme
 from .step_bound import safe_step
 
@@ -127,7 +127,7 @@ class CentralDifference(Integrator):
             )
         self._outs = outs = tuple(system.per_cell())
         self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
-        self._events, self._least = event_rows(events), least_energy(net)
+        self._events, self._least, self._taken = event_rows(events), least_energy(net), None
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
@@ -161,7 +161,7 @@ class CentralDifference(Integrator):
 
     def start(self, x=None, v=None):
         """The `ExplicitCourse` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
-        system = self.system
+        system, self._taken = self.system, None
         force = np.zeros((system.rows, 3))
         x = np.zeros_like(force) if x is None else np.array(x, dtype=float, order="C")
         v = system.initial_velocity() if v is None else np.array(v, dtype=float, order="C")
@@ -204,7 +204,7 @@ class CentralDifference(Integrator):
 
     def load(self, arrays):
         """The `ExplicitCourse` of a checkpoint; families show what they do there."""
-        course = ExplicitCourse.of_arrays(arrays)
+        course, self._taken = ExplicitCourse.of_arrays(arrays), None
         self.system.force_to(self._outs, course.time, course.x, course.v)
         return course
 
@@ -259,6 +259,8 @@ class CentralDifference(Integrator):
         records = self._scheme, self._model, self._observed, self._running(course)
         clock = records[-1].clock
         look_anew(self._model.guard)
+        if self._taken != (id(course), course.nsteps):
+            forget(self._model, course.nsteps > 0)
         try:
             while True:
                 more = advance_rows(times[done:], breath, DRIFT, *records, history.values[done:])
@@ -280,6 +282,7 @@ class CentralDifference(Integrator):
             raise
         finally:
             look_at_all(self.system, self._model)
+            self._taken = id(course), int(clock[0]["nsteps"])
             nearby = self._model.nearby
             followed = len(nearby.families) and len(self.drifts) == 1 and not self.system.carried.any()
             course.way = max(course.way, float(nearby.skin[0]["longest"]) if followed else math.inf)

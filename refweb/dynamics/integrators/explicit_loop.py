@@ -33,7 +33,7 @@ from .extremes import begin_anew, correct_within, look, note_time, plain_value, 
 from .guard import LEAST, SHORTER, comes_through, look_back_at_drift, passes
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, push_on, set_push
-from .nearby import bits_of, exchange, follow_near, reach_all, show_near, spread_of
+from .nearby import bits_of, covered, exchange, follow_near, reach_all, show_near, spread_of
 from .rows import energies_now, write_row
 from .step import (
     add_forces,
@@ -258,7 +258,7 @@ def steps_until(end, changing, scheme, model, running):
         fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
     reach = 2.0 * interval * fastest
     reach_all(reach, running.x, model.nearby, model.families)
-    if not model.nearby.at.shape[0]:
+    if not model.nearby.at.shape[0] or covered(0.5 * reach, running.x, model.nearby, model.families):
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
     families, cells, data = model.families, model.families.cells.copy(), model.families.data.copy()
     more, first = len(cells) - len(data), 2 * len(data) - len(cells)

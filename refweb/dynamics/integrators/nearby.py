@@ -33,7 +33,7 @@ LONGEST = 256.0
 WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
 """Depth of a skin around pairs over the mean length of elements, at most; number of steps that it is to last, at most
 and at least."""
-PRICE = 16.0
+PRICE = 64.0
 """Time that it takes to find the pairs of an element, over that to look at one."""
 KEPT_UP_TO = 0.7
 """Share of a skin around pairs that may be used up where a list is kept."""
@@ -56,17 +56,19 @@ SKIN = np.dtype(
             "lasts",
             "longest",
             "steps",
+            "unknown",
             "top",
             "fastest",
         ],
-        "formats": [*(8 * [float]), np.int64, np.int64, float],
-        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 72],
+        "formats": [*(8 * [float]), np.int64, np.int64, np.int64, float],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80],
     }
 )
 """Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
 bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
-of steps that a list of pairs is to last; the longest of all ways of a step [m]; number of steps of which that is known;
-the largest component of a velocity, as a whole number and as what it is [m/s]."""
+of steps that a list of pairs is to last; the longest of all ways of a step [m]; number of steps of which that is known,
+and above which a list is made, 0 from the start of a run on; the largest component of a velocity, as a whole number and
+as what it is [m/s]."""
 TAKE, SHOW = 0, 1
 """What is asked for: the cells within the skin, all where it is infinitely deep, or to show what those show."""
 NOWHERE = np.zeros((0, 3))
@@ -104,7 +106,7 @@ class Nearby(NamedTuple):
     def of(cls, system):
         """Those of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
-        skin["depth"], skin["lasts"] = np.inf, MANY
+        skin["depth"], skin["lasts"], skin["unknown"] = np.inf, MANY, COVERED
         swaps = typed_list(SWAP, [swap_for(system.families[i]) for i in near])
         pairs = any(family.finder is not None for family in system.families)
         at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
@@ -217,15 +219,20 @@ def ask(what, x, nearby, families):
         )  # fmt: skip
 
 
+def forget(model, begun):
+    """Forget how things moved: who comes next has not taken the last steps, or has ``begun`` and taken none."""
+    model.nearby.skin["steps"], model.nearby.skin["unknown"] = 0, COVERED if begun else 0
+
+
 def look_at_all(system, model):
-    """Look at all cells, as whoever comes next does, and forget how things moved."""
+    """Look at all cells, as whoever comes next does."""
     skin, families = model.nearby.skin[0], model.families
     if skin["depth"] < np.inf:
         for m, i in enumerate(near_of(system)):
             swap_for(system.families[i])(
                 TAKE, i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
             )
-    skin["depth"], skin["steps"] = np.inf, 0
+    skin["depth"] = np.inf
 
 
 @kernel(forceinline=True)
@@ -260,8 +267,7 @@ def take_pairs(x, nearby, families):
 def reach_all(reach, x, nearby, families):
     """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
 
-    Pairs that are found stay: bounds look at the elements themselves, see `exchange`, so that steps do not depend on
-    which pairs happen to be listed, as they would where a run is taken row by row.
+    Pairs that are found stay, see `covered`.
     """
     skin = nearby.skin[0]
     skin.wished = 2.0 * reach
@@ -270,6 +276,27 @@ def reach_all(reach, x, nearby, families):
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf
         ask(TAKE, x, nearby, families)
+
+
+@kernel()
+def covered(way, x, nearby, families):
+    """Whether the pairs that are listed are all that can touch by coming nearer by a way [m].
+
+    They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
+    bounds look at the elements themselves, see `exchange`. So steps do not depend on which pairs happen to be listed,
+    as they would where a run is taken row by row.
+    """
+    skin = nearby.skin[0]
+    if not skin.depth < math.inf:
+        return False
+    if skin.used + way <= SHARE * skin.depth:
+        return True
+    depth = max(skin.depth, 4.0 * (skin.last + skin.before + skin.earlier))
+    if not way <= KEPT_UP_TO * depth:
+        return False
+    skin.depth, skin.used = depth, 0.0
+    take_pairs(x, nearby, families)
+    return True
 
 
 @kernel()
@@ -333,7 +360,7 @@ def follow_near(drift, x, v, bits, before, inertia, nearby, families):
     skin.longest = max(skin.longest, way)
     skin.used += way
     skin.steps += 1
-    if skin.steps > COVERED and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
+    if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
         recent = skin.last + skin.before + skin.earlier
         if pairs:
             if skin.depth < math.inf:

@@ -20,9 +20,8 @@ import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from .pair import DAMPING, LENGTH, OTHER, SCALE, TOUCH
-from .press import MOST, OF_REACH, add_all_second, foreseen, press, steepest, stored
+from .press import MOST, OF_REACH, add_all_second, foreseen, give, pushed, steepest, stored
 from .search import found
-from .smeared import ROOM
 
 SHALLOW = 0.05
 """Share of the overlap that a pair may come to that is reckoned with before it is there: a step that has to do with
@@ -30,107 +29,81 @@ more is iterated for longer, and the next bound knows the overlap."""
 
 
 @kernel(forceinline=True)
-def loss(v, cells, data, c, push):
-    """(m, |f|, f·v) of pair c, ``push (4, 3)`` being f."""
+def loss(v, cells, data, c, forces):
+    """(m, |f|, f·v) of pair c, f being the forces on its four nodes."""
     square = power = 0.0
     for n in range(4):
         for k in range(3):
-            square += push[n, k] * push[n, k]
-            power += push[n, k] * v[cells[c, n], k]
+            square += forces[n][k] * forces[n][k]
+            power += forces[n][k] * v[cells[c, n], k]
     size = math.sqrt(square)
     if not size > 0.0:
         return 0.0, 0.0, 0.0
     return max(-data[c, DAMPING] * power / size, -1.0), size, power
 
 
-@kernel()
-def push_of(x, cells, data, c, nodes, push, ends):
-    """Write the forces of pair c to ``push (4, 3)``; ``nodes (1, 4)`` counts these."""
-    push[:] = 0.0
-    return press(x, push, cells, data, c, nodes, ends)
-
-
-@kernel()
-def lose(x, v, f, cells, data, c, nodes, push, ends):
-    """Add the forces of the losses of pair c; their power [W]."""
-    push_of(x, cells, data, c, nodes, push, ends)
-    damped, _, power = loss(v, cells, data, c, push)
-    if damped != 0.0:
-        for n in range(4):
-            for k in range(3):
-                f[cells[c, n], k] += damped * push[n, k]
-    return damped * power
-
-
-@kernel()
-def counted():
-    """Numbers of the four nodes of a pair."""
-    nodes = np.empty((1, 4), dtype=np.int32)
-    for n in range(4):
-        nodes[0, n] = n
-    return nodes
-
-
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
-    ends, push, nodes = np.empty(ROOM), np.empty((4, 3)), counted()
     if cells.shape[1] == 4:
         for c in range(cells.shape[0]):
-            out[c, 0] = lose(x, v, f, cells, data, c, nodes, push, ends)
+            _, forces = pushed(x, cells, data, c)
+            damped, _, power = loss(v, cells, data, c, forces)
+            give(damped, f, cells, c, forces)
+            out[c, 0] = damped * power
         return
     out[:, 0] = 0.0
     chosen, rows, numbers = found(0.0, x, cells, data)
     for c in range(rows.shape[0]):
-        power = 0.5 * lose(x, v, f, rows, numbers, c, nodes, push, ends)
+        _, forces = pushed(x, rows, numbers, c)
+        damped, _, power = loss(v, rows, numbers, c, forces)
+        give(damped, f, rows, c, forces)
         for n in range(2):
-            out[chosen[c, n], 0] += power
+            out[chosen[c, n], 0] += 0.5 * damped * power
 
 
 @kernel(STIFFNESS)
 def stiffness(t, x, v, blocks, cells, data, definite):
-    ends, push, nodes = np.empty(ROOM), np.empty((4, 3)), counted()
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
         if definite:
             continue
-        push_of(x, cells, data, c, nodes, push, ends)
+        _, push = pushed(x, cells, data, c)
         damped, size, power = loss(v, cells, data, c, push)
         if size == 0.0:
             continue
-        add_all_second(x, cells, data, c, False, ends, blocks[c])
+        add_all_second(x, cells, data, c, False, blocks[c])
         slope = np.zeros(12)
         for i in range(12):
             for j in range(12):
                 n, k = j // 3, j % 3
-                slope[i] += blocks[c, j, i] * (v[cells[c, n], k] - power * push[n, k] / size**2) / size
+                slope[i] += blocks[c, j, i] * (v[cells[c, n], k] - power * push[n][k] / size**2) / size
         rate = data[c, DAMPING] if damped > -1.0 else 0.0
         for i in range(12):
             for j in range(12):
-                blocks[c, i, j] = damped * blocks[c, i, j] - rate * push[i // 3, i % 3] * slope[j]
+                blocks[c, i, j] = damped * blocks[c, i, j] - rate * push[i // 3][i % 3] * slope[j]
 
 
 @kernel(STIFFNESS)
 def damping(t, x, v, blocks, cells, data, definite):
-    ends, push, nodes = np.empty(ROOM), np.empty((4, 3)), counted()
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
-        push_of(x, cells, data, c, nodes, push, ends)
+        _, push = pushed(x, cells, data, c)
         damped, size, _ = loss(v, cells, data, c, push)
         if size == 0.0 or damped == -1.0:
             continue
         for i in range(12):
             for j in range(12):
-                blocks[c, i, j] = data[c, DAMPING] * push[i // 3, i % 3] * push[j // 3, j % 3] / size
+                blocks[c, i, j] = data[c, DAMPING] * push[i // 3][i % 3] * push[j // 3][j % 3] / size
 
 
 @kernel()
 def add_bounds(reach, speed, x, mass, rates, cells, data, viscous):
     """Add the row sums of ∂F/∂v, or of ∂F/∂x, to the rates."""
-    own, most, ends = np.zeros(rates.size), np.zeros(rates.size), np.empty(ROOM)
+    own, most = np.zeros(rates.size), np.zeros(rates.size)
     for c in range(cells.shape[0]):
-        room = foreseen(reach, speed, x, mass, cells, data, c, ends)
+        room = foreseen(reach, speed, x, mass, cells, data, c)
         if room > 0.0:
-            now = (1.875 * stored(x, cells, data, c, ends) / data[c, SCALE]) ** 0.4
+            now = (1.875 * stored(x, cells, data, c) / data[c, SCALE]) ** 0.4
             room = min(room, max(2.0 * now, SHALLOW * room))
             value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
             value *= data[c, DAMPING] * (0.5 * room / data[c, TOUCH] if viscous else speed)

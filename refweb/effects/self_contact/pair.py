@@ -30,6 +30,21 @@ class Place(NamedTuple):
     w: tuple
 
 
+class Numbers(NamedTuple):
+    """Of a pair: the distance at which it touches, κ, and natural lengths, as in its data."""
+
+    touch: float
+    scale: float
+    length: float
+    other: float
+
+
+@kernel(forceinline=True)
+def numbers_of(data, c):
+    """The `Numbers` of pair c."""
+    return Numbers(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER])
+
+
 @kernel(forceinline=True)
 def place_of(x, cells, data, c):
     """The `Place` of pair c at displacements x."""

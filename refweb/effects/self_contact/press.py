@@ -28,9 +28,9 @@ import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..vectors import cross, dot
-from .pair import ENDS, LENGTH, OTHER, SCALE, TOUCH, angle_factor, apart, nearest, place_of
+from .pair import ENDS, LENGTH, OTHER, SCALE, TOUCH, angle_factor, apart, nearest, numbers_of, place_of
 from .search import REACH, found
-from .smeared import ROOM, add_second, first
+from .smeared import add_second, first
 
 MARGIN = 0.75
 """Factor on that of a rigid body: of 4000 pairs at random no row sum is above 0.7 of what it leaves."""
@@ -42,16 +42,17 @@ OF_REACH = 0.5
 """Share of the reach of a bound that pairs come nearer by: that is twice what two rows may at its speed."""
 NOT_SEEN = -1.0
 """What a pair shows that does not overlap."""
+NO_PUSH = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+"""Forces of such a pair."""
 
 
 @kernel(forceinline=True)
-def overlap(place, data, c, ends):
+def overlap(place, of):
     """(J, its gradients by the nodes), E = f J; the gradients are in the order of the pair."""
-    touch, half = data[c, TOUCH], 0.5 * data[c, SCALE]
     p, u, w = place
-    one, a, b, d = first(p, u, w, touch, ends)
-    other, e, g, h = first((-p[0], -p[1], -p[2]), w, u, touch, ends)
-    own, more = half * data[c, LENGTH], half * data[c, OTHER]
+    one, a, b, d = first(p, u, w, of.touch)
+    other, e, g, h = first((-p[0], -p[1], -p[2]), w, u, of.touch)
+    own, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.other
     first_node = (
         own * a[0] - more * (e[0] + g[0] + h[0]),
         own * a[1] - more * (e[1] + g[1] + h[1]),
@@ -78,17 +79,7 @@ def slopes_of_factor(u, w, n, f, area):
 
 
 @kernel(forceinline=True)
-def press(x, f, cells, data, c, nodes, ends):
-    """Add the forces of pair c to the rows ``nodes[c]`` of f; how deep it overlaps [m], `NOT_SEEN` where it does not.
-
-    Of ``nodes`` with a single row that is taken. What is apart costs no call.
-    """
-    place = place_of(x, cells, data, c)
-    return NOT_SEEN if apart(place, data[c, TOUCH]) else add_push(place, f, data, c, nodes, ends)
-
-
-@kernel(forceinline=True)
-def crossed(place, n, data, c):
+def crossed(place, n, of):
     """(J, its slopes by p, u and w, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
 
     Of a crossing at the places s and t of both infinite lines, a distance h apart, R = c² − h² and N = |u × w|, the
@@ -96,7 +87,7 @@ def crossed(place, n, data, c):
 
         J = (8/15) κ R^(5/2) (L |w| + L' |u|)/N.
     """
-    (p, u, w), touch, zero = place, data[c, TOUCH], (0.0, 0.0, 0.0)
+    (p, u, w), touch, zero = place, of.touch, (0.0, 0.0, 0.0)
     uu, uw, ww, nn, pn = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, n)
     room = touch * touch * nn - pn * pn
     if not (room > 0.0 and nn > 0.0):
@@ -108,10 +99,10 @@ def crossed(place, n, data, c):
     wide, high = max(half * other, (along + touch) / first), max(half * first, (along + touch) / other)
     if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
         return 0.0, zero, zero, zero, math.inf
-    size = data[c, LENGTH] * other + data[c, OTHER] * first
-    j = 8.0 / 15.0 * data[c, SCALE] * room * room * half * size
+    size = of.length * other + of.other * first
+    j = 8.0 / 15.0 * of.scale * room * room * half * size
     by_p, turn = -5.0 * pn / (room * nn) * j, (5.0 * pn * pn / (room * nn) - 1.0) * j / nn
-    own, more = data[c, OTHER] / (first * size) * j, data[c, LENGTH] / (other * size) * j
+    own, more = of.other / (first * size) * j, of.length / (other * size) * j
     wp, pu, wn, nu = cross(w, p), cross(p, u), cross(w, n), cross(n, u)
     return (
         j,
@@ -130,84 +121,94 @@ def crossed(place, n, data, c):
     )
 
 
-@kernel(forceinline=True)
-def push_apart(place, n, f, data, c, nodes):
-    """As `add_push`, of a pair that overlaps far from its ends; `NOT_SEEN` of all others."""
-    j, by_p, by_u, by_w, square = crossed(place, n, data, c)
-    if j == 0.0:
-        return NOT_SEEN
-    touch = data[c, TOUCH]
-    factor, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
-    turn_u, turn_w = slopes_of_factor(place.u, place.w, n, factor, area)
-    row = min(c, nodes.shape[0] - 1)
-    for k in range(3):
-        along_p, along_u = factor * by_p[k], factor * by_u[k] + j * turn_u[k]
-        along_w = factor * by_w[k] + j * turn_w[k]
-        f[nodes[row, 0], k] -= along_p - along_u
-        f[nodes[row, 1], k] -= along_u
-        f[nodes[row, 2], k] += along_p + along_w
-        f[nodes[row, 3], k] -= along_w
-    return touch - math.sqrt(square)
-
-
 @kernel()
-def add_push(place, f, data, c, nodes, ends):
-    """As `press`, where a pair may touch."""
-    touch, n = data[c, TOUCH], cross(place.u, place.w)
-    deep = push_apart(place, n, f, data, c, nodes)
-    if deep != NOT_SEEN:
-        return deep
-    j, g0, g1, g2, g3 = overlap(place, data, c, ends)
-    if j == 0.0:
-        return NOT_SEEN
-    factor, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
-    by_u, by_w = slopes_of_factor(place.u, place.w, n, factor, area)
-    row = min(c, nodes.shape[0] - 1)
-    for k in range(3):
-        f[nodes[row, 0], k] -= factor * g0[k] - j * by_u[k]
-        f[nodes[row, 1], k] -= factor * g1[k] + j * by_u[k]
-        f[nodes[row, 2], k] -= factor * g2[k] - j * by_w[k]
-        f[nodes[row, 3], k] -= factor * g3[k] + j * by_w[k]
-    return max(touch - math.sqrt(max(nearest(place.p, place.u, place.w)[2], 0.0)), 0.0)
-
-
-@kernel()
-def stored(x, cells, data, c, ends):
-    """Energy of pair c [J]."""
-    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
-    if apart(place, touch):
-        return 0.0
+def forces_of(place, of):
+    """(How deep a pair that may touch overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes)."""
     n = cross(place.u, place.w)
-    factor, _ = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
-    return factor * overlap(place, data, c, ends)[0]
+    j, by_p, by_u, by_w, square = crossed(place, n, of)
+    if j == 0.0:
+        j, g0, g1, g2, g3 = overlap(place, of)
+        if j == 0.0:
+            return NOT_SEEN, NO_PUSH
+        square = nearest(place.p, place.u, place.w)[2]
+    else:
+        g0 = by_p[0] - by_u[0], by_p[1] - by_u[1], by_p[2] - by_u[2]
+        g1, g3 = by_u, by_w
+        g2 = -by_p[0] - by_w[0], -by_p[1] - by_w[1], -by_p[2] - by_w[2]
+    f, area = angle_factor(n, of.length, of.other, of.touch)
+    by_u, by_w = slopes_of_factor(place.u, place.w, n, f, area)
+    return max(of.touch - math.sqrt(max(square, 0.0)), 0.0), (
+        (j * by_u[0] - f * g0[0], j * by_u[1] - f * g0[1], j * by_u[2] - f * g0[2]),
+        (-j * by_u[0] - f * g1[0], -j * by_u[1] - f * g1[1], -j * by_u[2] - f * g1[2]),
+        (j * by_w[0] - f * g2[0], j * by_w[1] - f * g2[1], j * by_w[2] - f * g2[2]),
+        (-j * by_w[0] - f * g3[0], -j * by_w[1] - f * g3[1], -j * by_w[2] - f * g3[2]),
+    )
+
+
+@kernel(forceinline=True)
+def pushed(x, cells, data, c):
+    """(How deep pair c overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes [N]).
+
+    What is apart costs no call, and a call takes no array, nor does what is written here: to count the references to
+    the arrays of a pair takes as long as its push.
+    """
+    place, of = place_of(x, cells, data, c), numbers_of(data, c)
+    if apart(place, of.touch):
+        return NOT_SEEN, NO_PUSH
+    return forces_of(place, of)
+
+
+@kernel(forceinline=True)
+def give(share, f, cells, c, forces):
+    """Add a share of the forces on the four nodes of pair c to f."""
+    for n in range(4):
+        for k in range(3):
+            f[cells[c, n], k] += share * forces[n][k]
+
+
+@kernel()
+def energy_of(place, of):
+    """Energy of a pair that may touch [J]."""
+    n = cross(place.u, place.w)
+    return angle_factor(n, of.length, of.other, of.touch)[0] * overlap(place, of)[0]
+
+
+@kernel(forceinline=True)
+def stored(x, cells, data, c):
+    """Energy of pair c [J]."""
+    place, of = place_of(x, cells, data, c), numbers_of(data, c)
+    return 0.0 if apart(place, of.touch) else energy_of(place, of)
 
 
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
-    ends = np.empty(ROOM)
     if cells.shape[1] == 4:
         for c in range(cells.shape[0]):
-            out[c, 0] = max(press(x, f, cells, data, c, cells, ends), 0.0)
+            deep, forces = pushed(x, cells, data, c)
+            out[c, 0] = max(deep, 0.0)
+            if deep != NOT_SEEN:
+                give(1.0, f, cells, c, forces)
         return
     out[:, 0] = 0.0
     chosen, rows, numbers = found(0.0, x, cells, data)
     for c in range(rows.shape[0]):
-        deep = press(x, f, rows, numbers, c, rows, ends)
-        for n in range(2):
-            out[chosen[c, n], 0] = max(out[chosen[c, n], 0], deep)
+        deep, forces = pushed(x, rows, numbers, c)
+        if deep != NOT_SEEN:
+            give(1.0, f, rows, c, forces)
+            for n in range(2):
+                out[chosen[c, n], 0] = max(out[chosen[c, n], 0], deep)
 
 
 @kernel(ENERGY)
 def energy(t, x, cells, data, out):
-    ends = np.empty(ROOM)
     if cells.shape[1] == 4:
         for c in range(cells.shape[0]):
-            out[c] = stored(x, cells, data, c, ends)
+            out[c] = stored(x, cells, data, c)
         return
     out[:] = 0.0
     chosen, rows, numbers = found(0.0, x, cells, data)
     for c in range(rows.shape[0]):
-        own = 0.5 * stored(x, rows, numbers, c, ends)
+        own = 0.5 * stored(x, rows, numbers, c)
         for n in range(2):
             out[chosen[c, n]] += own
 
@@ -235,21 +236,21 @@ def add_turning(block, place, j, slopes, by_u, by_w, f, area):
 
 
 @kernel()
-def add_all_second(x, cells, data, c, definite, ends, block):
+def add_all_second(x, cells, data, c, definite, block):
     """Add the second derivatives of the energy of pair c to its block, or a part that is positive semidefinite."""
-    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
-    if apart(place, touch):
+    place, of = place_of(x, cells, data, c), numbers_of(data, c)
+    if apart(place, of.touch):
         return
     p, u, w = place
     n = cross(u, w)
-    f, area = angle_factor(n, data[c, LENGTH], data[c, OTHER], touch)
-    half = 0.5 * data[c, SCALE] * f
-    add_second(p, u, w, touch, half * data[c, LENGTH], definite, (0, 1, 2, 3), ends, block)
+    f, area = angle_factor(n, of.length, of.other, of.touch)
+    half = 0.5 * of.scale * f
+    add_second(p, u, w, of.touch, half * of.length, definite, (0, 1, 2, 3), block)
     back = -p[0], -p[1], -p[2]
-    add_second(back, w, u, touch, half * data[c, OTHER], definite, (2, 3, 0, 1), ends, block)
+    add_second(back, w, u, of.touch, half * of.other, definite, (2, 3, 0, 1), block)
     if definite:
         return
-    j, g0, g1, g2, g3 = overlap(place, data, c, ends)
+    j, g0, g1, g2, g3 = overlap(place, of)
     slopes = np.empty((4, 3))
     for k in range(3):
         slopes[0, k], slopes[1, k], slopes[2, k], slopes[3, k] = g0[k], g1[k], g2[k], g3[k]
@@ -259,10 +260,9 @@ def add_all_second(x, cells, data, c, definite, ends, block):
 
 @kernel(STIFFNESS)
 def stiffness(t, x, v, blocks, cells, data, definite):
-    ends = np.empty(ROOM)
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
-        add_all_second(x, cells, data, c, definite, ends, blocks[c])
+        add_all_second(x, cells, data, c, definite, blocks[c])
 
 
 @kernel(forceinline=True)
@@ -283,7 +283,7 @@ def room_left(most, touch, scale, stored_now, moving):
 
 
 @kernel(forceinline=True)
-def foreseen(reach, speed, x, mass, cells, data, c, ends):
+def foreseen(reach, speed, x, mass, cells, data, c):
     """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
     place, touch = place_of(x, cells, data, c), data[c, TOUCH]
     square = nearest(place.p, place.u, place.w)[2]
@@ -293,15 +293,14 @@ def foreseen(reach, speed, x, mass, cells, data, c, ends):
     reduced = own * other / (own + other) if min(own, other) > 0.0 else max(own, other)
     moving = 0.5 * reduced * speed * speed if speed > 0.0 else math.inf
     left = max(math.sqrt(square) - reach, 0.0)
-    return room_left(2.0 * touch * touch - left * left, touch, data[c, SCALE], stored(x, cells, data, c, ends), moving)
+    return room_left(2.0 * touch * touch - left * left, touch, data[c, SCALE], stored(x, cells, data, c), moving)
 
 
 @kernel()
 def note_pairs(reach, speed, x, mass, cells, data, own, most):
     """Write the sum and the largest of the bounds of all pairs of each row."""
-    ends = np.empty(ROOM)
     for c in range(cells.shape[0]):
-        room = foreseen(reach, speed, x, mass, cells, data, c, ends)
+        room = foreseen(reach, speed, x, mass, cells, data, c)
         if room > 0.0:
             value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
             for n in range(4):

@@ -38,16 +38,16 @@ BOXES = 4
 
 @kernel()
 def middles(x, cells, data, room):
-    """Write middle and half length of each element to ``room (elements, 4)``; the largest half length."""
+    """Write middle, half vector and half length of each element to ``room (elements, 7)``; the largest half length."""
     most = 0.0
     for c in range(cells.shape[0]):
         i, j, square = cells[c, 0], cells[c, 1], 0.0
         for k in range(3):
             a, b = data[c, ENDS + k] + x[i, k], data[c, ENDS + 3 + k] + x[j, k]
-            room[c, k] = 0.5 * (a + b)
+            room[c, k], room[c, 3 + k] = 0.5 * (a + b), 0.5 * (b - a)
             square += (b - a) * (b - a)
-        room[c, 3] = 0.5 * math.sqrt(square)
-        most = max(most, room[c, 3])
+        room[c, 6] = 0.5 * math.sqrt(square)
+        most = max(most, room[c, 6])
     return most
 
 
@@ -90,7 +90,7 @@ def sorted_by_box(low, width, count, room):
         at = filled[own[c]]
         order[at] = c
         filled[own[c]] += 1
-        for k in range(4):
+        for k in range(room.shape[1]):
             rows[at, k] = room[c, k]
     return order, start, rows
 
@@ -110,24 +110,17 @@ def strangers(a, b, cells, data):
 
 
 @kernel(forceinline=True)
-def near_each_other(reach, a, b, x, cells, data):
-    """Whether two elements that may touch are nearer than a distance."""
-    if not strangers(a, b, cells, data):
+def near_each_other(reach, m, n, rows):
+    """Whether two elements are nearer than a reach, by their boxes first."""
+    d = rows[m, 0] - rows[n, 0], rows[m, 1] - rows[n, 1], rows[m, 2] - rows[n, 2]
+    g, h = (rows[m, 3], rows[m, 4], rows[m, 5]), (rows[n, 3], rows[n, 4], rows[n, 5])
+    out = abs(d[0]) > reach + abs(g[0]) + abs(h[0])
+    out |= abs(d[1]) > reach + abs(g[1]) + abs(h[1])  # three looks and one branch
+    out |= abs(d[2]) > reach + abs(g[2]) + abs(h[2])
+    if out:
         return False
-    i, j, k, m = cells[a, 0], cells[a, 1], cells[b, 0], cells[b, 1]
-    first = data[a, ENDS] + x[i, 0], data[a, ENDS + 1] + x[i, 1], data[a, ENDS + 2] + x[i, 2]
-    other = data[b, ENDS] + x[k, 0], data[b, ENDS + 1] + x[k, 1], data[b, ENDS + 2] + x[k, 2]
-    p = first[0] - other[0], first[1] - other[1], first[2] - other[2]
-    u = (
-        data[a, ENDS + 3] + x[j, 0] - first[0],
-        data[a, ENDS + 4] + x[j, 1] - first[1],
-        data[a, ENDS + 5] + x[j, 2] - first[2],
-    )
-    w = (
-        data[b, ENDS + 3] + x[m, 0] - other[0],
-        data[b, ENDS + 4] + x[m, 1] - other[1],
-        data[b, ENDS + 5] + x[m, 2] - other[2],
-    )
+    p = d[0] - g[0] + h[0], d[1] - g[1] + h[1], d[2] - g[2] + h[2]
+    u, w = (2.0 * g[0], 2.0 * g[1], 2.0 * g[2]), (2.0 * h[0], 2.0 * h[1], 2.0 * h[2])
     return nearest(p, u, w)[2] < reach * reach
 
 
@@ -148,7 +141,7 @@ def set_ranges(box, count, start, ranges):
 
 
 @kernel()
-def fill(reach, count, start, order, rows, x, cells, data, found):
+def fill(reach, count, start, order, rows, cells, data, found):
     """Write all pairs of elements nearer than a reach to ``found``, as far as it has room; their number."""
     ranges, amount = np.empty((5, 2), dtype=np.int64), 0
     for box in range(start.size - 1):
@@ -157,13 +150,11 @@ def fill(reach, count, start, order, rows, x, cells, data, found):
         beside = set_ranges(box, count, start, ranges)
         for m in range(start[box], start[box + 1]):
             ranges[0, 0] = m + 1
-            m0, m1, m2, wide = rows[m, 0], rows[m, 1], rows[m, 2], rows[m, 3] + reach
             for part in range(beside):
                 for n in range(ranges[part, 0], ranges[part, 1]):
-                    d0, d1, d2, both = rows[n, 0] - m0, rows[n, 1] - m1, rows[n, 2] - m2, wide + rows[n, 3]
-                    if d0 * d0 + d1 * d1 + d2 * d2 < both * both:
+                    if near_each_other(reach, m, n, rows):
                         a, b = min(order[m], order[n]), max(order[m], order[n])
-                        if near_each_other(reach, a, b, x, cells, data):
+                        if strangers(a, b, cells, data):
                             if amount < found.shape[0]:
                                 found[amount, 0], found[amount, 1] = a, b
                             amount += 1
@@ -173,7 +164,7 @@ def fill(reach, count, start, order, rows, x, cells, data, found):
 @kernel()
 def pairs_within(skin, x, cells, data):
     """Numbers of all pairs of elements that may push each other when they come nearer by ``skin`` [m], shape (., 2)."""
-    found, room = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 4))
+    found, room = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
     if cells.shape[0] < 2:
         return found[:0]
     reach = REACH * data[0, TOUCH] + skin
@@ -181,10 +172,10 @@ def pairs_within(skin, x, cells, data):
     if count[0] == 0:
         return found[:0]
     order, start, rows = sorted_by_box(low, width, count, room)
-    amount = fill(reach, count, start, order, rows, x, cells, data, found)
+    amount = fill(reach, count, start, order, rows, cells, data, found)
     if amount > found.shape[0]:
         found = np.empty((amount, 2), dtype=np.int64)
-        fill(reach, count, start, order, rows, x, cells, data, found)
+        fill(reach, count, start, order, rows, cells, data, found)
     return found[:amount]
 
 

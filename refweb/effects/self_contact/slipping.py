@@ -45,11 +45,10 @@ from ..kicks import FRICTION as DRAG
 from ..kicks import SLIP as CREEP
 from ..kicks import WIDTH as BEHIND
 from ..vectors import dot
-from .losses import counted, push_of
 from .pair import FRICTION, LENGTH, NAMES, OTHER, RUBBING, SLIP, TOUCH, place_of
 from .press import bound as press_bound
+from .press import pushed
 from .search import found
-from .smeared import ROOM
 
 ALIKE = 0.01
 """Share of (2r)²/(L L') that keeps the slip of lines along each other finite: it takes half of it from friction."""
@@ -64,13 +63,13 @@ SLOTS, NOTED = 8, 5
 
 
 @kernel()
-def slip_rows(x, cells, data, c, nodes, push, ends, rows, shares):
+def slip_rows(x, cells, data, c, rows, shares):
     """N of pair c [N], 0 where it does not touch; what nodes add to both components of u to ``rows (2, 4, 3)``.
 
     ``shares (2, 2)`` is what forces along both are along û and ŵ.
     """
-    push_of(x, cells, data, c, nodes, push, ends)
-    whole = push[0, 0] + push[1, 0], push[0, 1] + push[1, 1], push[0, 2] + push[1, 2]
+    _, push = pushed(x, cells, data, c)
+    whole = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
     p, u, w = place_of(x, cells, data, c)
     long, wide = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
     if not (dot(whole, whole) > 0.0 and long > 0.0 and wide > 0.0):
@@ -97,8 +96,7 @@ def slip_rows(x, cells, data, c, nodes, push, ends, rows, shares):
     within = dot(whole, n)
     if not within > 0.0:
         return 0.0
-    a = (push[1, 0] * n[0] + push[1, 1] * n[1] + push[1, 2] * n[2]) / within
-    b = -(push[3, 0] * n[0] + push[3, 1] * n[1] + push[3, 2] * n[2]) / within
+    a, b = dot(push[1], n) / within, -dot(push[3], n) / within
     d = p[0] + a * u[0] - b * w[0], p[1] + a * u[1] - b * w[1], p[2] + a * u[2] - b * w[2]
     own, its = dot(one, d), dot(other, d)
     for k in range(3):
@@ -123,9 +121,9 @@ def slip_of(v, cells, c, rows, i):
 
 
 @kernel()
-def rub(x, v, f, cells, data, c, nodes, push, ends, rows, shares):
+def rub(x, v, f, cells, data, c, rows, shares):
     """Add the friction of pair c to the rows ``cells[c]`` of f; its power [W]."""
-    normal = slip_rows(x, cells, data, c, nodes, push, ends, rows, shares)
+    normal = slip_rows(x, cells, data, c, rows, shares)
     if normal == 0.0:
         return 0.0
     one, other = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
@@ -138,27 +136,27 @@ def rub(x, v, f, cells, data, c, nodes, push, ends, rows, shares):
 
 @kernel(FORCE)
 def force(t, x, v, f, cells, data, out):
-    ends, push, nodes, rows, shares = np.empty(ROOM), np.empty((4, 3)), counted(), np.empty((2, 4, 3)), np.empty((2, 2))
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     if cells.shape[1] == 4:
         for c in range(cells.shape[0]):
-            out[c, 0] = rub(x, v, f, cells, data, c, nodes, push, ends, rows, shares)
+            out[c, 0] = rub(x, v, f, cells, data, c, rows, shares)
         return
     out[:, 0] = 0.0
     chosen, pairs, numbers = found(0.0, x, cells, data)
     for c in range(pairs.shape[0]):
-        out[chosen[c, 0], 0] += rub(x, v, f, pairs, numbers, c, nodes, push, ends, rows, shares)
+        out[chosen[c, 0], 0] += rub(x, v, f, pairs, numbers, c, rows, shares)
 
 
 @kernel(STIFFNESS)
 def stiffness(t, x, v, blocks, cells, data, definite):
-    ends, push, nodes, rows, shares = np.empty(ROOM), np.empty((4, 3)), counted(), np.empty((2, 4, 3)), np.empty((2, 2))
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     place, speed, ahead, behind = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
     own = np.empty((1, 4), dtype=np.int32)
     for n in range(4):
         own[0, n] = n
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
-        if definite or slip_rows(x, cells, data, c, nodes, push, ends, rows, shares) == 0.0:
+        if definite or slip_rows(x, cells, data, c, rows, shares) == 0.0:
             continue
         numbers, step = data[c : c + 1], STEP * data[c, TOUCH]
         for n in range(4):
@@ -169,9 +167,9 @@ def stiffness(t, x, v, blocks, cells, data, definite):
             was = place[n, k]
             ahead[:], behind[:] = 0.0, 0.0
             place[n, k] = was + step
-            rub(place, speed, ahead, own, numbers, 0, nodes, push, ends, rows, shares)
+            rub(place, speed, ahead, own, numbers, 0, rows, shares)
             place[n, k] = was - step
-            rub(place, speed, behind, own, numbers, 0, nodes, push, ends, rows, shares)
+            rub(place, speed, behind, own, numbers, 0, rows, shares)
             place[n, k] = was
             for i in range(12):
                 blocks[c, i, m] = (behind[i // 3, i % 3] - ahead[i // 3, i % 3]) / (2.0 * step)
@@ -179,10 +177,10 @@ def stiffness(t, x, v, blocks, cells, data, definite):
 
 @kernel(STIFFNESS)
 def damping(t, x, v, blocks, cells, data, definite):
-    ends, push, nodes, rows, shares = np.empty(ROOM), np.empty((4, 3)), counted(), np.empty((2, 4, 3)), np.empty((2, 2))
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
-        normal = slip_rows(x, cells, data, c, nodes, push, ends, rows, shares)
+        normal = slip_rows(x, cells, data, c, rows, shares)
         if normal == 0.0:
             continue
         u = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
@@ -280,12 +278,12 @@ def set_touch(touches, at, c, cell, normal, cells, data, v, inverse, rows, share
 
 @kernel(MEET)
 def meet(h, x, v, inverse, cells, data, touches, begin):
-    ends, push, nodes, rows, shares = np.empty(ROOM), np.empty((4, 3)), counted(), np.empty((2, 4, 3)), np.empty((2, 2))
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     count, chosen = begin, np.empty((0, 2), dtype=np.int64)
     if cells.shape[1] != 4:
         chosen, cells, data = found(0.0, x, cells, data)
     for c in range(cells.shape[0]):
-        normal = slip_rows(x, cells, data, c, nodes, push, ends, rows, shares)
+        normal = slip_rows(x, cells, data, c, rows, shares)
         if normal > 0.0:
             if count < touches.shape[0]:
                 cell = chosen[c, 0] if chosen.shape[0] else c

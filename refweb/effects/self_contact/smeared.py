@@ -38,8 +38,8 @@ from ..vectors import dot
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 PLACES, WEIGHTS = tuple((0.5 * (1.0 + _POINTS)).tolist()), tuple((0.5 * _WEIGHTS).tolist())
 """Gauss points and weights on [0, 1]."""
-ROOM = 4
-"""Numbers of a row of space to work in: ends of pieces."""
+NOWHERE = 0.0, 0.0, 0.0, 0.0
+"""Ends of no pieces."""
 SHORT = 1e-9
 """Length of an element over the distance of touch below which it has no direction."""
 
@@ -66,40 +66,37 @@ def along(p, u, w):
 
 
 @kernel()
-def pieces(length, y, rate, across, turn, touch, ends):
-    """Write the ends of the pieces on which the integrand is a polynomial to ``ends``; the number of pieces."""
+def pieces(length, y, rate, across, turn, touch):
+    """(Number of the pieces on which the integrand is a polynomial, their ends).
+
+    They are handed over as numbers: a call that takes an array counts references to it, as long as a piece takes.
+    """
     square, half, over = dot(turn, turn), dot(across, turn), dot(across, across) - touch * touch
     root = half * half - square * over
     if root <= 0.0 and over >= 0.0:
-        return 0
+        return 0, NOWHERE
     low, high = 0.0, 1.0
     if square > 0.0:
         q = -(half + math.copysign(math.sqrt(max(root, 0.0)), half))
         one, other = q / square, (over / q if q != 0.0 else math.inf)
         low, high = max(low, min(one, other)), min(high, max(one, other))
     if not low < high:
-        return 0
-    count = 1
-    ends[0] = low
-    if rate != 0.0:
-        first, last = (-touch - y) / rate, (length + touch - y) / rate
-        low, high = max(low, min(first, last)), min(high, max(first, last))
-        if not low < high:
-            return 0
-        ends[0] = low
-        one, other = (touch - y) / rate, (length - touch - y) / rate
-        for inner in (min(one, other), max(one, other)):
-            if low < inner < high:
-                ends[count] = inner
-                count += 1
-    elif not -touch < y < length + touch:
-        return 0
-    ends[count] = high
-    return count
+        return 0, NOWHERE
+    if rate == 0.0:
+        return (1 if -touch < y < length + touch else 0), (low, high, high, high)
+    first, last = (-touch - y) / rate, (length + touch - y) / rate
+    low, high = max(low, min(first, last)), min(high, max(first, last))
+    if not low < high:
+        return 0, NOWHERE
+    one, other = (touch - y) / rate, (length - touch - y) / rate
+    inner, outer = min(one, other), max(one, other)
+    if not low < inner < high:
+        return (2, (low, outer, high, high)) if low < outer < high else (1, (low, high, high, high))
+    return (3, (low, inner, outer, high)) if low < outer < high else (2, (low, inner, high, high))
 
 
 @kernel()
-def first(p, u, w, touch, ends):
+def first(p, u, w, touch):
     """(I, its gradients by the two nodes of the first element and by the second node of the other).
 
     That by the first node of the other is the negative of their sum. p is the first node of the first element from the
@@ -109,7 +106,8 @@ def first(p, u, w, touch, ends):
     f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
     if dot(w, w) > (SHORT * touch) ** 2:
         length, unit, y0, rate, across, turn = along(p, u, w)
-        for n in range(pieces(length, y0, rate, across, turn, touch, ends)):
+        count, ends = pieces(length, y0, rate, across, turn, touch)
+        for n in range(count):
             low, span = ends[n], ends[n + 1] - ends[n]
             for i in range(4):
                 s = low + span * PLACES[i]
@@ -138,7 +136,7 @@ def add_product(block, weights, others, value, i, j, order):
 
 
 @kernel()
-def add_second(p, u, w, touch, scale, definite, order, ends, block):
+def add_second(p, u, w, touch, scale, definite, order, block):
     """Add the second derivatives of I, times a scale, to the block of four nodes: of a pair, in an order of its nodes.
 
     ``definite`` takes the part that is positive semidefinite in any state: 2 ∇D∇D of e.
@@ -146,7 +144,8 @@ def add_second(p, u, w, touch, scale, definite, order, ends, block):
     if not dot(w, w) > (SHORT * touch) ** 2:
         return
     length, unit, y0, rate, across, turn = along(p, u, w)
-    for k in range(pieces(length, y0, rate, across, turn, touch, ends)):
+    count, ends = pieces(length, y0, rate, across, turn, touch)
+    for k in range(count):
         low, span = ends[k], ends[k + 1] - ends[k]
         for point in range(4):
             s = low + span * PLACES[point]
