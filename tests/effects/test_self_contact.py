@@ -685,14 +685,22 @@ def test_a_stiffness_that_is_left_out_follows_from_the_motion():
 
 
 def test_rows_one_by_one_are_the_rows_of_one_call(monkeypatch):
-    """Pairs are found anew in each call: what they push does not depend on it but by rounding, nor do steps."""
+    """Pairs are found anew in each call: what they push does not depend on it but by rounding, nor do steps.
+
+    Who goes on from a checkpoint knows no list, and its bounds look at all elements.
+    """
     monkeypatch.setattr(table, "LISTED", 0)
     system, course, _ = thrown(strings(damping=2.0), rows=20)
     solver = INTEGRATORS["central-difference"].integrator_of(refweb.Dynamic(duration=0.02), system, (), (), ())
     v, first = np.zeros((system.rows, 3)), np.abs(system.net.points[:, 2]) < 1e-9
     v[first & ~system.supported.all(axis=1)] = 0.0, 0.0, 3.0
     other = solver.start(None, v)
+    loaded = solver.start(None, v)
     for time in np.linspace(0.0, 0.02, 21)[1:]:
         solver.advance(other, [time])
+        loaded = solver.load(solver.save(loaded))
+        solver.advance(loaded, [time])
+        assert loaded.nsteps == other.nsteps
     assert other.nsteps == course.nsteps and np.abs(course.x).max() > 1e-2
-    np.testing.assert_allclose(other.x, course.x, atol=1e-12)
+    for one in (other, loaded):
+        np.testing.assert_allclose(one.x, course.x, atol=1e-12)
