@@ -266,7 +266,9 @@ MUTANTS = [
         "effects/contact/passing", "return abs(drift) * math.sqrt(most)", "return 0.5 * abs(drift) * math.sqrt(most)"
     ),
     Mutant("effects/contact/passing", "met[3] = 0 if below", "met[3] = 1 if below"),
-    Mutant("dynamics/integrators/guard", "if whole and walls.met[3] == 0:", "if walls.met[3] == 0 and not whole:"),
+    Mutant(
+        "dynamics/integrators/guard", "if then != TOLD and walls.met[3] == 0:", "if walls.met[3] == 0 and then == TOLD:"
+    ),
     Mutant("dynamics/integrators/guard", "CALM * skin.last < left", "CALM * skin.last < 20.0 * left"),
     Mutant("dynamics/integrators/followed_bodies", "2.0 * self._extent * np.hypot", "0.0 * self._extent * np.hypot"),
     Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),

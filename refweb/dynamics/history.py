@@ -11,12 +11,12 @@ import numpy as np
 from ..effects.base import pairs_of
 from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
-from ..registry import INTEGRATORS
 from ..results import probes
 from ..results.observables.book import weights
 from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
 from ..results.state import State
+from .integrators.crossings import PAIRS
 from .integrators.events import Event
 from .integrators.integrator import AXES, VECTORS, History, Sum
 
@@ -120,8 +120,6 @@ class Watch:
         self._warned = _probes_of_warnings(system, self.probes)
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
-        if pairs_of(system) and INTEGRATORS[scene.solve.method].knob != "safety":
-            self.sums.append(Sum(weights(system, "step_size"), 1.0))
         self.events = self._add_events(scene.event)
         used = self._of_warning("utilisation")
         if system.weakness is not None and used is not None:
@@ -321,13 +319,14 @@ class Watch:
                 overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]), course.time)
 
     def note_way(self, course, pairs, integrator):
-        """Note what bounds the way of bodies in a step in `refweb.effects.contact.pair_overlap.PairOverlaps`."""
-        explicit, values = integrator.knob == "safety", course.extremes.values
-        if explicit and integrator.step_size is None:
+        """Note what has met in `refweb.effects.contact.pair_overlap.PairOverlaps`, or what bounds the way in a step."""
+        if integrator.knob != "safety":
+            pairs.note_met(course.crossings[PAIRS])
+        elif integrator.step_size is None:
             pairs.note_way(safety=integrator.safety * integrator.stretch)
-            return
-        step = integrator.step_size if explicit else float(values[len(self.probes) + len(self._followed)])
-        pairs.note_way(step=step, speed=float(values[self._of_warning("body speed")]))
+        else:
+            speed = float(course.extremes.values[self._of_warning("body speed")])
+            pairs.note_way(step=integrator.step_size, speed=speed)
 
     def _of_warning(self, name):
         """Number of the probe of a warning, None where there is none."""

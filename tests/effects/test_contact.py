@@ -481,6 +481,49 @@ def test_capstan(friction, wrap):
     assert errors[-1] < 2e-3 and abs(slope(errors, 1.0 / counts) - 2.0) < 0.2
 
 
+def wound(turns, share, friction=0.2, parts=16, pull=1.0):
+    """Speed of a cable that is wound n turns around a fixed drum, T₁ at one end, and T₂ = share · T₁ e^(2π n μ) at the
+    other, 0.15 s after that [m/s]."""
+    half, count = np.pi / parts, turns * parts + 5
+    angle = 2.0 * half * np.arange(turns * parts + 1)
+    arc = RADIUS / np.cos(half) * np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+    ends = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]])  # along the cable, outwards
+    far = 2.0 * RADIUS * np.tan(half) * np.array([[1.0], [2.0]])
+    points = np.vstack([arc[0] + far[::-1] * ends[0], arc, arc[-1] + far * ends[1]])
+    least, most = [(0.0, 0.0), (0.02, 1.0)], share * np.exp(2.0 * np.pi * turns * friction)
+    effects = [
+        refweb.Body(
+            name="drum", shape="cylinder", radius=RADIUS, length=1.0, axis=(0, 1, 0), position=(0, 0, 0), fixed=True
+        ),
+        refweb.Contact(stiffness=1e5, friction=friction, slip_velocity=1e-3, damping=1.0),
+        refweb.Damping(rate=50.0),
+        refweb.Load(node=0, force=tuple(pull * ends[0]), factor=least),
+        refweb.Load(node=count - 1, force=tuple(pull * ends[1]), factor=[*least, (0.05, 1.0), (0.15, most)]),
+    ]
+    solution = refweb.run(
+        refweb.Scene(
+            web=refweb.Inline(points=points.tolist(), lines=[(i, i + 1) for i in range(count - 1)], supports=[]),
+            cable=refweb.Cable(law="linear", modulus=1e9, area=1e-6, density=1e4),
+            effects=effects,
+            solve=refweb.Dynamic(duration=0.3),
+            accuracy=refweb.Accuracy(error="none"),
+        ),
+        progress=False,
+    )
+    return solution.state.v[count - 1] @ ends[1]
+
+
+@pytest.mark.parametrize("turns", [1, 2])
+def test_a_cable_holds_by_its_turns(turns):
+    """It holds if and only if 2π n μ > ln(T₂/T₁): below, it creeps, within ten slip velocities; above it slides.
+
+    Of 16 lines in a turn kinks hold 1.7 % more than the arc in one turn and 3.5 % in two, see `capstan`: 8 % lie on
+    either side. What is missing above, 1 % of T₂ and more, speeds 0.01 kg a turn up to decimetres a second.
+    """
+    assert 0.0 < wound(turns, 0.92) < 0.01
+    assert wound(turns, 1.08) > 0.1
+
+
 # Momentum, and bodies that turn
 
 SPUN = {

@@ -611,6 +611,20 @@ def test_tensions_at_a_kink():
     np.testing.assert_allclose(excess[:-1] / excess[1:], 2.0, rtol=0.1)
 
 
+def test_a_line_that_is_wound_around_a_straight_one_turns_it_like_a_pulley():
+    """Friction has no moment about the axis of either element: neither can take one. Rounding leaves 1e-12 of F 2r."""
+    count = 0
+    for pair, x, v in some_pairs(40):
+        force, power = pair.rub(x, v)
+        places, size = pair.points + x, np.linalg.norm(force, axis=1).sum()
+        for own, other in ((slice(0, 2), slice(2, 4)), (slice(2, 4), slice(0, 2))):
+            axis = np.diff(places[other], axis=0)[0]
+            moment = np.cross(places[own] - places[other][0], force[own]).sum(axis=0)
+            assert abs(moment @ axis) <= 1e-12 * size * np.linalg.norm(axis)
+        count += power < 0.0
+    assert count > 20  # the others are pressed along themselves alone
+
+
 def dragged(share, method="central-difference", **solve):
     """(displacement of a line along itself, speed) of one that is pressed with 10 N onto another that crosses it, and
     pulled along itself with a share of μ N, in 50 ms."""

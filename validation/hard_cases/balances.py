@@ -92,7 +92,8 @@ def energy_left(solution):
         turns, own = body.turning(state.x, state.v), state.v[body.spin]
         kinetic += 0.5 * body.moment * (turns - own) @ own
     stored = tensions(solution)[2]
-    others = sum(history.get(name, [0.0])[-1] for name in ("contact_energy", "dissipated_energy", "rupture_energy"))
+    booked = "contact_energy", "body_contact_energy", "self_contact_energy", "dissipated_energy", "rupture_energy"
+    others = sum(history.get(name, [0.0])[-1] for name in booked)
     for effect in solution.scene.effects:
         if isinstance(effect, refweb.Gravity):
             net = state.system.net

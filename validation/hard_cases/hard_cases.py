@@ -4,7 +4,8 @@ Small webs under what breaks solvers: no tension at all and a million newtons, m
 1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
 bodies that start inside of the web, edges that lines press deeper than
 they are round, boxes that tumble onto edges and corners, plates at 50 m/s, surfaces with slivers, a body at rest on a
-net for 1e5 steps, pulses and peaks between steps, hammer blows, tables with more corners than steps.
+net for 1e5 steps, lines and bodies that touch their like, pulses and peaks between steps, hammer blows, tables with
+more corners than steps.
 Each is solved by every method that takes it; a number proves each result:
 
 - statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
@@ -46,6 +47,7 @@ from .balances import energy_left, momentum_left, turning_left, unbalanced
 from .overlaps import outcome as hit_of
 from .overlaps import random_hit
 from .random_scenes import near_the_limit, outcome, random_net
+from .touching import BODIES, LINES
 from .tumbling_hits import HITS, at_rest, bad_surface
 
 STATIC = ("newton", "relaxation")
@@ -444,6 +446,8 @@ MOTIONS = {
         "no density, a mass thrown": free(*MASS, density=0.0, prestrain=0.01, supports=RIM, refused=MASSLESS),
         "no density, without tension": free(*MASS, density=0.0, supports=RIM, refused=ADRIFT),
     },
+    **LINES,
+    **BODIES,
 }  # fmt: skip
 
 

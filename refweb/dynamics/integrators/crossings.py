@@ -1,4 +1,4 @@
-"""The first lines of a run that may have passed through each other, or through a body: when, and which."""
+"""The first lines and bodies of a run that may have passed through each other: when, and which."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 
 from ...kernels import kernel
 
-APART, BESIDE, THROUGH = 0, 1, 2
-"""Rows of what has met: lines that push each other, neighbours along the net, and a line and the middle of a body."""
+APART, BESIDE, THROUGH, PAIRS = 0, 1, 2, 3
+"""Rows of what has met: lines that push each other, neighbours along the net, a line and the middle of a body, and two
+bodies, by their rows, that have come to the middle of one of them."""
 
 
 def none_met():
-    """Nothing has met: times [s] and four rows each, shape (3, 5)."""
-    return np.tile([np.inf, -1.0, -1.0, -1.0, -1.0], (3, 1))
+    """Nothing has met: times [s] and four rows each, shape (4, 5)."""
+    return np.tile([np.inf, -1.0, -1.0, -1.0, -1.0], (4, 1))
 
 
 @kernel()

@@ -30,7 +30,7 @@ from .energy_book import (
 )
 from .events import ended_by, note_events
 from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
-from .guard import LEAST, SHORTER, comes_through, look_back_at_drift, passes
+from .guard import LEAST, SHORTER, TOLD, comes_through, foreseen, look_back_at_drift, passes
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, push_on, set_push
 from .nearby import bits_of, covered, exchange, follow_near, reach_all, show_near, spread_of
@@ -63,8 +63,11 @@ BREATH = 10_000_000
 def inner_stages(now, h, scheme, model, running, reaction, push, extra):
     """All kicks and drifts of a step of higher order but the last drift, with work and the impulses of forces.
 
-    Time goes with the drifts, and in the potential that is booked with the kicks.
+    Time goes with the drifts, and in the potential that is booked with the kicks. A step in which lines would pass is
+    not begun, which it returns.
     """
+    if foreseen(now - h, h, model, running):
+        return False
     families, inverse, held = model.families, model.inertia.inverse, model.inertia.held
     turns = model.inertia.turns
     x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
@@ -77,7 +80,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         give_impulse(kick, push, running.ledger.pushed)
         book_potential(1.0, kicked, x, families, running.work)
         if model.guard.families.size + model.walls.families.size:
-            comes_through(now - h, kick, drift, False, model, running)
+            comes_through(now - h, kick, drift, TOLD, model, running)
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
@@ -86,6 +89,7 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
         if model.outside.pushing.size:
             set_push(drifted, x, v, model.outside, families, extra, push)
     book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
+    return True
 
 
 @kernel()
@@ -181,8 +185,8 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
         now = clock.time + (begun + step) * h
         if looks:
             note_state(x, v, f, inverse, inside.before)
-        if stages:
-            inner_stages(now, h, scheme, model, running, reaction, push, extra)
+        if stages and not inner_stages(now, h, scheme, model, running, reaction, push, extra):
+            return step - 1
         if guarded and passes(now - h, kicks[stages], drifts[stages], stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)

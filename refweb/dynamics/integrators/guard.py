@@ -4,8 +4,11 @@ In a drift rows move in straight lines, behind the kick that gives them their ve
 way by which two rows may come nearer are together less than the distance of touch cannot meet. Where they are not, the
 pairs of lines are looked at one by one, see `refweb.effects.self_contact.crossing`: a step in which two would meet is
 not taken but cut to `SHORTER` of it, until the next row or corner of a table. Where less than `LEAST` of the step that
-is stable is left, the run ends. Steps of higher order are not cut, but told of. Of neighbours along the net, which do
-not push each other, it is told when the first two meet.
+is stable is left, the run ends. Of neighbours along the net, which do not push each other, it is told when the first
+two meet.
+
+A step of higher order has several drifts, and cannot be taken back behind the first. It is looked at before as if it
+were one of order 2, and cut likewise; what comes through in one of its drifts nevertheless is told of.
 
 Bodies keep lines out of their middle in the same way, see `refweb.effects.contact.passing`: the depth of all contacts
 and the way of a drift are together less than the depth there, or lines near bodies are looked at one by one. A line
@@ -33,6 +36,8 @@ LEAST = 1e-3
 """Share of the stable step below which none is tried."""
 CALM = 2.0
 """Way of a drift that is not looked at before, over that of the last, at most; above, it is told of."""
+TOLD, KEPT_APART, FORESEEN = 0, 1, 2
+"""Where lines would pass, they are told of, the drift is not taken, or the step is not begun and nothing is told of."""
 FAR = 0.02
 """Way over the distance of touch above which it is looked at more closely."""
 
@@ -215,14 +220,22 @@ def passes(time, kick, drift, stages, model, running):
     if stages + model.guard.families.size + model.inertia.turns.moment.size == 0:
         if calm(model.walls, model.nearby, model.families):
             return False
-    return comes_through(time, kick, drift, stages == 0, model, running)
+    return comes_through(time, kick, drift, TOLD if stages else KEPT_APART, model, running)
+
+
+@kernel(forceinline=True)
+def foreseen(time, h, model, running):
+    """Whether a step of several drifts, of size h, is not to be begun."""
+    if model.guard.families.size + model.walls.families.size == 0:
+        return False
+    return comes_through(time, 0.5 * h, h, FORESEEN, model, running)
 
 
 @kernel()
-def comes_through(time, kick, drift, whole, model, running):
+def comes_through(time, kick, drift, then, model, running):
     """Whether lines would pass in a drift behind a kick, from a time on: each other, or the middle of a body.
 
-    Where a step is not a ``whole`` drift that is noted, as neighbours that meet are.
+    What is ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
     """
     linear, touch = model.inertia.linear, model.guard.touch
     size = 3 * linear
@@ -233,16 +246,16 @@ def comes_through(time, kick, drift, whole, model, running):
         way = min(way, abs(drift) * (spread_of(running.v[:linear]) + more))
     if not way < math.inf:
         return False
-    came = passes_lines(time, way, kick, drift, whole, model, running) if touch > 0.0 else False
+    came = passes_lines(time, way, kick, drift, then, model, running) if touch > 0.0 else False
     if model.walls.families.size:
-        came = passes_bodies(time, way, kick, drift, whole, model, running) or came
+        came = passes_bodies(time, way, kick, drift, then, model, running) or came
     if came:
         running.clock[0].held = 1
     return came
 
 
 @kernel()
-def passes_lines(time, way, kick, drift, whole, model, running):
+def passes_lines(time, way, kick, drift, then, model, running):
     """Whether lines that push each other would meet."""
     guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
     inverse = model.inertia.inverse
@@ -251,10 +264,10 @@ def passes_lines(time, way, kick, drift, whole, model, running):
         if not way + deepest_of(families.outs[i]) < guard.touch:
             cells, data = near_cells(way - guard.touch, i, guard.places[m], model)
             if guard.meets[m](0.0, way, kick, drift, x, v, f, inverse, cells, data, guard.met):
-                came = whole
-                if not whole:
+                came = then != TOLD
+                if then == TOLD:
                     note_met(APART, time, guard.met, running.crossings)
-        if not came and guard.watches[m](
+        if not came and then != FORESEEN and guard.watches[m](
             0.0, way, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], guard.due[m], guard.chosen[m],
             guard.met,
         ):  # fmt: skip
@@ -263,7 +276,7 @@ def passes_lines(time, way, kick, drift, whole, model, running):
 
 
 @kernel()
-def passes_bodies(time, way, kick, drift, whole, model, running):
+def passes_bodies(time, way, kick, drift, then, model, running):
     """Whether lines would come as deep in a body as its middle."""
     walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
     inverse, room = model.inertia.inverse, 0.0
@@ -277,8 +290,9 @@ def passes_bodies(time, way, kick, drift, whole, model, running):
             continue
         cells, data = near_cells(way + room, i, walls.places[m], model)
         if walls.meets[m](room, way, kick, drift, x, v, f, inverse, cells, data, walls.met):
-            if whole and walls.met[3] == 0:
+            if then != TOLD and walls.met[3] == 0:
                 came = True
                 break
-            note_met(THROUGH, time, walls.met, running.crossings)
+            if then != FORESEEN:
+                note_met(THROUGH, time, walls.met, running.crossings)
     return came

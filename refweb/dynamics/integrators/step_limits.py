@@ -28,6 +28,8 @@ class StepLimits:
     ----------
     lines : refweb.dynamics.integrators.followed_lines.FollowedLines, optional
         Lines that touch lines, where any do.
+    pairs : refweb.dynamics.integrators.followed_pairs.FollowedPairs, optional
+        Bodies that touch bodies, where any do.
     followed : list of refweb.dynamics.integrators.followed_lines.FollowedLines
         These, and lines that touch bodies.
     """
@@ -43,6 +45,12 @@ class StepLimits:
             from .followed_bodies import FollowedBodies
 
             self.followed.append(FollowedBodies(system))
+        self.pairs = None
+        if any(family.pairs for family in system.families):
+            from .followed_pairs import FollowedPairs
+
+            self.pairs = FollowedPairs(system)
+            self.followed.append(self.pairs)
         self._rotations = rotations
         self._net, self._moving = system.net, system.rows - system.net.spins
         self._corners = system.corners
@@ -68,8 +76,9 @@ class StepLimits:
                 speed = max(speed, self._rotations.speed(x, v))
             speed, way = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
             stop = min(stop, t + way / speed) if speed > 0.0 else stop
-        if self.lines is not None:
-            stop = min(stop, t + self.lines.soon(x, v))
+        for followed in (self.lines, self.pairs):
+            if followed is not None:
+                stop = min(stop, t + followed.soon(x, v))
         return t + SAME * end if stop - t < SAME * end else stop
 
 

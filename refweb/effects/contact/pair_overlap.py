@@ -5,11 +5,13 @@ An overlap is held against the smaller of two bodies, as that of a line is again
 at one. In a step two bodies come nearer by at most its length times the speeds of their fastest points. So where the
 deepest overlap of all steps and that way together are less than the least distance from a middle to its surface, it is
 certain that nothing has passed. Explicit steps by the bound are so short that this way is 0.2 of that distance times
-``safety``; for all others the longest step and the largest speed of the run tell.
+``safety``; for explicit steps of a given size that and the largest speed of the run tell. Steps of CVODE and IDA are
+followed one by one, see `refweb.dynamics.integrators.followed_pairs`.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from ...errors import SolverError
@@ -135,7 +137,7 @@ class PairOverlaps:
     def __init__(self, contact, chosen, system):
         self._contact, self._chosen, self._system = contact, set(chosen), system
         self.found = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
-        self._way, self._open = None, []
+        self._way, self._met = None, None
 
     def _deepest(self, bodies, overlap, time, initial, deepening=False):
         stiffness, exponent, *_ = self._contact.law_between(*bodies)
@@ -157,10 +159,14 @@ class PairOverlaps:
     def note_way(self, safety=0.0, step=0.0, speed=0.0):
         """Note what bounds the way in a step.
 
-        That is ``safety``, where steps follow the bound, or the longest step [s] and the largest speed of a point of a
-        body [m/s].
+        That is ``safety``, where steps follow the bound, or the size of all steps [s] and the largest speed of a point
+        of a body [m/s].
         """
         self._way = (lambda pair: WAY * safety * pair.thickness) if safety > 0.0 else (lambda pair: 2.0 * step * speed)
+
+    def note_met(self, met):
+        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.Course.crossings`."""
+        self._met = met
 
     def refuse(self):
         """Refuse what may not be, see `DeepestPair.refuse`."""
@@ -173,6 +179,8 @@ class PairOverlaps:
 
     def passage(self):
         """ "certified", or of which pair it is not certain that nothing has passed, and when it was deepest."""
+        if self._met is not None:
+            return self._told(*self._met)
         if self._way is None:
             return "not certified"
         for pair in self.found:
@@ -183,6 +191,16 @@ class PairOverlaps:
                     f"are {pair.thickness:.3g} m below their surfaces{when}"
                 )
         return "certified"
+
+    def _told(self, time, one, other, *_):
+        """The same of steps that were followed, of which two bodies have met at a time, or none."""
+        if not math.isfinite(time):
+            return "certified"
+        pair = next(pair for pair in self.found if [body.row for body in pair.bodies] == [one, other])
+        return (
+            f"not certified: bodies {pair.name} came as near each other as {pair.thickness:.3g} m below a surface, "
+            f"where they may pass, at t = {time:.6g} s"
+        )
 
     @property
     def touched(self):

@@ -77,8 +77,9 @@ class Contact(Table):
     A line passes a body through its middle, where the push turns over. How deep every line comes is followed from the
     start of a run on, and ``passage`` of ``run.json`` says "certified" of ``bodies`` where none has come there: before
     each drift of an explicit step, which is cut where one would, and in steps of cvode and ida on their interpolants.
-    Steps of order 4 and 6 are not cut but told of; load steps of statics and curved elements are not followed. What is
-    not certified is a warning as well. ``pairs`` are bodies that touch each other.
+    Steps of order 4 and 6 are cut where one of order 2 would be, and what comes through nevertheless is told of; load
+    steps of statics and curved elements are not followed. What is not certified is a warning as well. ``pairs`` are
+    bodies that touch each other.
 
     Parameters
     ----------

@@ -13,7 +13,11 @@ v_s,
 
     F = −μ N ∂|u|²/∂s / (2 √(|u|² + v_s²)),        its power  F·s = −μ N |u|²/√(|u|² + v_s²) ≤ 0,
 
-spread to the nodes as s takes their velocities, so that it keeps momentum and angular momentum. N is the push of the
+spread to the nodes as s takes their velocities, so that it keeps momentum and angular momentum. Nodes of a straight
+line take no moment about it, so friction has none either: lines turn freely about themselves, and one that is wound
+around a straight line is held no more than over a pulley that turns, whatever μ is. A friction that held it would have
+to leave the moment 2 r F of each contact to a torsion that elements without thickness do not have, and would brake nets
+that turn as a whole. N is the push of the
 overlap, whatever damping adds to it. Lines that lie along each other slide along themselves alone: across, such lines
 roll, as nothing resists their turning about themselves. 1 + `ALIKE` c²/(L L'), of the distance of touch c, stands for
 the ones of G, so that this is the limit.

@@ -50,7 +50,9 @@ class SelfContact(Table):
         d of Hunt and Crossley [s/m]: a push of 1 + d δ̇ times that of the overlap, never a pull; δ̇ is the rate of the
         overlap.
     friction : float
-        μ of Coulomb [1]; against it stands the push of the overlap.
+        μ of Coulomb [1]; against it stands the push of the overlap. Lines are free to turn about themselves: one that
+        is wound around a straight one slides as over a pulley that turns. What is to hold it by friction has to be a
+        body.
     slip_velocity : float
         v_s [m/s], of μ N |u|/√(|u|² + v_s²): what sticks creeps below it.
 
