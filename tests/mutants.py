@@ -45,6 +45,7 @@ MIRRORS = {
     "effects/contact/overlap": "effects/test_overlap.py",
     "effects/contact/passing": "effects/test_passage.py",
     "dynamics/integrators/followed_bodies": "effects/test_passage.py",
+    "dynamics/integrators/followed_pairs": "effects/test_between_bodies.py",
     "dynamics/integrators/guard": "effects/test_passage.py effects/test_self_contact.py",
     "effects/contact/rubbing": "effects/test_rubbing.py effects/test_contact.py",
     "effects/contact/carrying": "effects/test_carried_losses.py",
@@ -270,6 +271,12 @@ MUTANTS = [
         "dynamics/integrators/guard", "if then != TOLD and walls.met[3] == 0:", "if walls.met[3] == 0 and then == TOLD:"
     ),
     Mutant("dynamics/integrators/guard", "CALM * skin.last < left", "CALM * skin.last < 20.0 * left"),
+    Mutant(
+        "dynamics/integrators/guard", "return comes_through(time, 0.5 * h, h, FORESEEN, model, running)", "return False"
+    ),
+    Mutant("dynamics/integrators/followed_pairs", "if not (depth + nearer <", "if not (depth <"),
+    Mutant("dynamics/integrators/followed_pairs", "or nearer < self._apart(pair, x)", "or 0.0 < self._apart(pair, x)"),
+    Mutant("dynamics/integrators/followed_pairs", "for one in (way, bend))", "for one in (way,))"),
     Mutant("dynamics/integrators/followed_bodies", "2.0 * self._extent * np.hypot", "0.0 * self._extent * np.hypot"),
     Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     Mutant("effects/kicks", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),

@@ -352,6 +352,18 @@ def test_bodies_that_come_to_a_middle_are_seen():
     """
     built, rng, seen = system("sphere", "sphere", stiffness=1e3)[0], np.random.default_rng(5), [0, 0]
     followed, (one, other) = FollowedPairs(built), built.net.bodies
+
+    def met(at):
+        course = SimpleNamespace(time=0.0, x=at(0.0), crossings=none_met())
+        followed.look(course, SimpleNamespace(middle=Place(0.5, at(0.5)), end=Place(1.0, at(1.0))), at)
+        return np.isfinite(course.crossings[MET, 0])
+
+    def there_and_back(t):
+        x = np.zeros((built.rows, 3))
+        x[other.row, 0] = 0.25 + 1.6 * (t - 0.25) ** 2 - 0.5  # 0.35 m at 0 and at 0.5, and 0.25 m between
+        return x
+
+    assert met(there_and_back)
     for _ in range(60):
         start, bend = rng.uniform(-1.5, 1.5, (2, 3)), 0.3 * rng.standard_normal((2, 3))
         way = rng.uniform(-0.4, 0.4, (2, 3)) - 2.0 * start
@@ -367,9 +379,7 @@ def test_bodies_that_come_to_a_middle_are_seen():
 
         if apart(0.0) < 0.3:
             continue
-        course = SimpleNamespace(time=0.0, x=at(0.0), crossings=none_met())
-        followed.look(course, SimpleNamespace(middle=Place(0.5, at(0.5)), end=Place(1.0, at(1.0))), at)
-        found, nearest = np.isfinite(course.crossings[MET, 0]), min(apart(t) for t in np.linspace(0.0, 1.0, 401))
+        found, nearest = met(at), min(apart(t) for t in np.linspace(0.0, 1.0, 401))
         assert nearest > 0.3 or found
         assert nearest < 0.31 or not found
         seen[int(found)] += 1
