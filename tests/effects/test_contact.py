@@ -430,7 +430,7 @@ def test_losses_close_the_book(exponent):
 
 
 def capstan(n, friction=0.3, wrap=np.pi, pull=1.0, legs=2):
-    """Tensions along a cable that slips steadily over a fixed cylinder, n lines on it, by Newton's method."""
+    """State of a cable that slips steadily over a fixed cylinder, n lines on it, by Newton's method."""
     count, stiffness, k, half = n + 1 + 2 * legs, 1e2, 1e5, 0.5 * wrap / n
     middle = RADIUS - 2.0 * pull * np.sin(half) / k  # of each line of the polygon, in the drum by the push it takes
     side = 2.0 * middle * np.tan(half)
@@ -467,7 +467,7 @@ def capstan(n, friction=0.3, wrap=np.pi, pull=1.0, legs=2):
             x, force = x + part * move, there
         else:
             raise AssertionError("no equilibrium")
-    return State(system, 0.0, x, velocity).tension
+    return State(system, 0.0, x, velocity)
 
 
 @pytest.mark.parametrize("friction, wrap", [(0.3, np.pi), (0.5, 0.5 * np.pi)])
@@ -475,10 +475,31 @@ def test_capstan(friction, wrap):
     """The tensions of both legs have the ratio e^(μ φ), of order 2 in the lines on the drum."""
     counts, errors = np.array([4, 8, 16, 32]), []
     for n in counts:
-        tension = capstan(n, friction, wrap)
+        tension = capstan(n, friction, wrap).tension
         np.testing.assert_allclose([tension[0], tension[1]], 1.0, rtol=1e-9)
         errors.append(abs(tension[-1] / tension[0] / np.exp(friction * wrap) - 1.0))
     assert errors[-1] < 2e-3 and abs(slope(errors, 1.0 / counts) - 2.0) < 0.2
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.5])
+def test_tensions_at_a_kink(friction):
+    """Of a single line on the drum, at angles α and β to both legs: T₂/T₁ = (cos α + μ sin α)/(cos β − μ sin β).
+
+    That is (1 + μ tan θ/2)/(1 − μ tan θ/2) where both are half of the angle θ between the legs. The line tilts until
+    its push is between both nodes as tensions ask, so that it comes there with the third power of θ. It presses on a
+    length, along which the normal turns: 1e-5 is allowed for that.
+    """
+    wraps, off = np.array([0.4, 0.2, 0.1]), []
+    for wrap in wraps:
+        state = capstan(1, friction, wrap, legs=3)
+        ways = np.diff(state.position[:-1], axis=0)
+        ways /= np.linalg.norm(ways, axis=1)[:, None]
+        first, last = (np.arccos(ways[3] @ ways[leg]) for leg in (2, 4))
+        ratio, half = state.tension[-1] / state.tension[0], np.tan(0.5 * wrap)
+        tilted = (np.cos(first) + friction * np.sin(first)) / (np.cos(last) - friction * np.sin(last))
+        assert ratio == pytest.approx(tilted, rel=1e-5)
+        off.append(abs(ratio / ((1.0 + friction * half) / (1.0 - friction * half)) - 1.0))
+    assert off[-1] < 2e-4 and abs(slope(off, wraps) - 3.0) < 0.3
 
 
 def wound(turns, share, friction=0.2, parts=16, pull=1.0):
