@@ -462,6 +462,15 @@ def test_what_is_too_soft_is_refused():
         refweb.run(pulled(scene, rings, 1.0), progress=False)
 
 
+def test_lines_that_are_moved_through_each_other_are_refused_without_a_stiffness():
+    scene = free_lines(speed=0.0, duration=0.01)
+    moved = refweb.Motion(node=[2, 3], displacement=[(0, 0, 0, 0), (0.01, 0, 0, -0.1)])
+    held = scene.replace(effects=(scene.effects[0], moved), supports=refweb.Supports(nodes=[0, 1]))
+    for one in (held, held.replace(effects=(refweb.SelfContact(radius=5e-3), moved))):
+        with pytest.raises(SolverError, match="lines 0 and 1 .* motion of both is prescribed, and no stiffness"):
+            refweb.run(one, progress=False)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_certified_runs_keep_linking_numbers(seed):
     """Four loops of random planes about one place, thrown at random: linked or not, they stay so.

@@ -113,9 +113,10 @@ class Splitting(CentralDifference):
         for family in system.families:
             timed = family.power is not None or len(family.times) > 0
             if family.damping is not None or timed and not family.dead:
+                given = " with damping or friction" if family.name in ("contact", "self_contact") else ""
                 raise InputError(
-                    f'[solve] method = "explicit" takes no [{family.name}], nothing that depends on velocity, and of '
-                    'time dead loads alone: use "central-difference" or "cvode"'
+                    f'[solve] method = "explicit" takes no [{family.name}]{given}, nothing that depends on velocity, '
+                    'and of time dead loads alone: use "central-difference" or "cvode"'
                 )
         if system.drives or system.line_drives:
             raise InputError(

@@ -148,6 +148,11 @@ class Passage:
         own = self._elements[cell]
         names = " and ".join(str(n) for n in self._system.net.line[own].ravel().tolist()) if own.ndim else None
         names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
+        if own.ndim and self._system.supported[self._system.net.cells[own]].all():
+            raise SolverError(
+                f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}: the "
+                "motion of both is prescribed, and no stiffness of [self_contact] holds them"
+            )
         enough = float(f"{self._stiffness * (overlap / (AIM * radius)) ** POWER:.2g}")
         if self._chosen:
             enough = max(enough, STIFFER * self._stiffness)

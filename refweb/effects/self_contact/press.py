@@ -92,17 +92,19 @@ def crossed(place, n, of):
     room = touch * touch * nn - pn * pn
     if not (room > 0.0 and nn > 0.0):
         return 0.0, zero, zero, zero, math.inf
-    room /= nn
-    first, other, half = math.sqrt(uu), math.sqrt(ww), math.sqrt(room / nn)
+    inverse = 1.0 / nn
+    room *= inverse
+    first, other, half = math.sqrt(uu), math.sqrt(ww), math.sqrt(room * inverse)
     d, e = dot(u, p), dot(w, p)
-    s, t, along = (uw * e - ww * d) / nn, (uu * e - uw * d) / nn, half * abs(uw)
+    s, t, along = (uw * e - ww * d) * inverse, (uu * e - uw * d) * inverse, half * abs(uw)
     wide, high = max(half * other, (along + touch) / first), max(half * first, (along + touch) / other)
     if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
         return 0.0, zero, zero, zero, math.inf
     size = of.length * other + of.other * first
     j = 8.0 / 15.0 * of.scale * room * room * half * size
-    by_p, turn = -5.0 * pn / (room * nn) * j, (5.0 * pn * pn / (room * nn) - 1.0) * j / nn
-    own, more = of.other / (first * size) * j, of.length / (other * size) * j
+    steep, share = 5.0 * pn * inverse / room, j / (first * other * size)
+    by_p, turn = -steep * j, (steep * pn - 1.0) * j * inverse
+    own, more = of.other * other * share, of.length * first * share
     wp, pu, wn, nu = cross(w, p), cross(p, u), cross(w, n), cross(n, u)
     return (
         j,
@@ -117,7 +119,7 @@ def crossed(place, n, of):
             by_p * pu[1] + turn * nu[1] + more * w[1],
             by_p * pu[2] + turn * nu[2] + more * w[2],
         ),
-        pn * pn / nn,
+        pn * pn * inverse,
     )
 
 
@@ -170,7 +172,8 @@ def give(share, f, cells, c, forces):
 def energy_of(place, of):
     """Energy of a pair that may touch [J]."""
     n = cross(place.u, place.w)
-    return angle_factor(n, of.length, of.other, of.touch)[0] * overlap(place, of)[0]
+    j = crossed(place, n, of)[0]
+    return angle_factor(n, of.length, of.other, of.touch)[0] * (j if j > 0.0 else overlap(place, of)[0])
 
 
 @kernel(forceinline=True)
