@@ -276,7 +276,7 @@ MUTANTS = [
     ),
     Mutant("dynamics/integrators/followed_pairs", "if not (depth + nearer <", "if not (depth <"),
     Mutant("dynamics/integrators/followed_pairs", "or nearer < self._apart(pair, x)", "or 0.0 < self._apart(pair, x)"),
-    Mutant("dynamics/integrators/followed_pairs", "for one in (way, bend))", "for one in (way,))"),
+    Mutant("dynamics/integrators/followed_pairs", "+ self._nearer(pair, room)", ""),
     Mutant("dynamics/integrators/followed_bodies", "2.0 * self._extent * np.hypot", "0.0 * self._extent * np.hypot"),
     Mutant("statics/passage", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     Mutant("effects/kicks", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),

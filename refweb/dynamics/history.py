@@ -24,12 +24,12 @@ SPREAD = 3.0
 """± of a result over its error if the method has its order."""
 
 
-def _probes_of_warnings(system, followed):
+def _probes_of_warnings(system, followed, step_size):
     """Probes of what refweb warns of and refuses, by name, of which the largest value counts.
 
     That is a scale of each element times its tension or its strain, and how deep lines are in each body. ``followed``
     are probes that are looked at in any case: where one of them is of tensions, the largest of which is that of the
-    largest strain, strains need no look of their own.
+    largest strain, strains need no look of their own. How fast bodies are counts where the ``step_size`` is given [s].
     """
     net, scales = system.net, {}
     if (net.laws == SMOOTH).any():
@@ -54,9 +54,11 @@ def _probes_of_warnings(system, followed):
         cells = len(system.families[i].cells)
         found["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
     if pairs_of(system):
-        from ..results.observables.overlap import probes_between
+        from ..results.observables.overlap import probe_of_speed, probes_between
 
         found |= probes_between(system)
+        if step_size is not None:
+            found["body speed"] = probe_of_speed(system)
     return found
 
 
@@ -117,7 +119,7 @@ class Watch:
         booked = [o for o in self._observables if o.observable.booked]
         self._followed = [o for o in booked if o.reduce != "final" or o.name in awaited]
         self.probes = [o.probe(system) for o in self._probed]
-        self._warned = _probes_of_warnings(system, self.probes)
+        self._warned = _probes_of_warnings(system, self.probes, scene.solve.step_size)
         self.probes += self._warned.values()
         self.sums = [Sum(o.observable.weights(system), SIGN[o.reduce]) for o in self._followed]
         self.events = self._add_events(scene.event)

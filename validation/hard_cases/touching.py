@@ -11,13 +11,13 @@ import refweb
 RADIUS = 5e-3
 
 
-def of_lines(points, lines, thrown, velocity, duration, prestrain=0.0, **contact):
+def of_lines(points, lines, thrown, velocity, duration, **contact):
     """Lines without supports, some nodes of which are thrown at the others."""
     lossy = contact.get("damping") or contact.get("friction")
     return dict(
         refused={"explicit": "takes no [self_contact]"} if lossy else {},
         web=refweb.Inline(points=points, lines=lines, supports=[]),
-        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0, prestrain=prestrain),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0),
         effects=(
             refweb.SelfContact(radius=RADIUS, **contact),
             refweb.Velocity(node=thrown, value=velocity),
@@ -36,18 +36,16 @@ def crossed(speed, angle=90.0, aside=0.0, **contact):
 
 
 def layers(side=0.1, size=2, **contact):
-    """A small net above another, turned by 20°, both in one piece by a line beside them."""
+    """A small net thrown at another below it, and turned by 20° to it."""
     here = side * np.array([(i, j, 0.0) for i in range(size + 1) for j in range(size + 1)])
     cosine, sine = np.cos(np.radians(20.0)), np.sin(np.radians(20.0))
     there = (here - here.mean(axis=0)) @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     there += here.mean(axis=0) + [0.3 * side, 0.2 * side, 3.0 * RADIUS]
     numbers = np.arange(len(here)).reshape(size + 1, size + 1)
-    lines = [[a, b] for a, b in zip(numbers[:-1].ravel(), numbers[1:].ravel(), strict=True)]
-    lines += [[a, b] for a, b in zip(numbers[:, :-1].ravel(), numbers[:, 1:].ravel(), strict=True)]
-    lines += [[a + len(here), b + len(here)] for a, b in lines]
-    points = np.vstack([here, there]).tolist()
+    pairs = ((numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:]))
+    lines = np.vstack([np.column_stack([a.ravel(), b.ravel()]) for a, b in pairs])
+    lines, points = np.vstack([lines, lines + len(here)]).tolist(), np.vstack([here, there]).tolist()
     thrown = list(range(len(here), 2 * len(here)))
-    lines = [[int(a), int(b)] for a, b in lines]
     return of_lines(points, lines, thrown, (0.3, 0.1, -1.0), 0.05, **contact)
 
 
@@ -87,7 +85,7 @@ def cube(name, position, velocity=(0.0, 0.0, 0.0), **more):
     return refweb.Body(**{"name": name, **own, **more})
 
 
-FLOOR = cube("floor", (0.0, 0.0, -0.5), fixed=True, size=(2.0, 2.0, 1.0), velocity=(0.0, 0.0, 0.0))
+FLOOR = cube("floor", (0.0, 0.0, -0.5), fixed=True, size=(2.0, 2.0, 1.0))
 ON_EDGE = ((1.0, 0.0, 1.0), (0.0, 1.0, 0.0))
 ACROSS = ((0.0, 1.0, 1.0), (-1.0, 0.0, 0.0))
 """The first two axes of a cube that stands on an edge along y, and along x."""

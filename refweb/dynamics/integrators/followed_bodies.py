@@ -32,7 +32,7 @@ class FollowedBodies(FollowedLines):
     def look(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
         for family in self._families:
-            self._note(course, piece, at, THROUGH, family.passing, (family.cells, family.data))
+            self._note(course, piece, at, THROUGH, (family.passing, family.cells, family.data))
 
     def _turned(self, way):
         """By how much points of bodies move as these turn, at most [m]."""

@@ -25,7 +25,48 @@ class Place(NamedTuple):
     x: np.ndarray
 
 
-class FollowedLines:
+class Followed:
+    """Looks at pieces of a step until nothing can have met in them, or they are too short."""
+
+    # What a subclass brings
+
+    def _room(self, bend):
+        """What a bend of the middle leaves open."""
+        raise NotImplementedError
+
+    def _met(self, looked_at, x, way, room) -> np.ndarray | None:
+        """Rows of what may have met on a way from displacement x, None where nothing can have."""
+        raise NotImplementedError
+
+    # What is made of it
+
+    def _note(self, course, piece, at, which, looked_at):
+        """Note in a row of what has met the first that may have in a piece of a step."""
+        if np.isfinite(course.crossings[which, 0]):
+            return
+        begin = Place(course.time, course.x)
+        middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
+        found = self._first(looked_at, begin, middle, end, at, HALVINGS)
+        if found is not None:
+            note_met(which, *found, course.crossings)
+
+    def _first(self, looked_at, begin, middle, end, at, halvings):
+        """(Time from which on two may have met [s], their rows), None where none have."""
+        room = self._room(middle.x - 0.5 * (begin.x + end.x))
+        for first, last in ((begin, middle), (middle, end)):
+            met = self._met(looked_at, first.x, last.x - first.x, room)
+            if met is None:
+                continue
+            if not halvings:
+                return first.time, met
+            halfway = 0.5 * (first.time + last.time)
+            found = self._first(looked_at, first, Place(halfway, at(halfway)), last, at, halvings - 1)
+            if found is not None:
+                return found
+        return None
+
+
+class FollowedLines(Followed):
     """Follows lines that push each other, and their neighbours along the net.
 
     Parameters
@@ -37,7 +78,7 @@ class FollowedLines:
     def __init__(self, system):
         self._families = [family for family in system.families if family.crossing is not None]
         self._places = system.net.nodes
-        self._still, self._met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
+        self._still, self._rows_met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
 
     def soon(self, x, v):
         """Time in which no line comes through another from displacement x and velocity v [s]."""
@@ -48,34 +89,16 @@ class FollowedLines:
         for family in self._families:
             own, beside = family.crossing, (family.crossing.rows, family.crossing.data)
             for which, cells in ((APART, (family.cells, family.data)), (BESIDE, beside)):
-                self._note(course, piece, at, which, own.meets, cells)
+                self._note(course, piece, at, which, (own.meets, *cells))
 
-    def _note(self, course, piece, at, which, meets, cells):
-        """Note in a row of what has met the first that may have in a piece of a step."""
-        if np.isfinite(course.crossings[which, 0]):
-            return
-        begin = Place(course.time, course.x)
-        middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
-        time = self._meeting(meets, cells, begin, middle, end, at, HALVINGS)
-        if time is not None:
-            note_met(which, time, self._met, course.crossings)
+    def _room(self, bend):
+        return self._spread(bend) + self._turned(bend)
 
-    def _meeting(self, meets, cells, begin, middle, end, at, halvings):
-        """Time from which on two may have met [s], None where none have."""
-        bend = middle.x - 0.5 * (begin.x + end.x)
-        room = self._spread(bend) + self._turned(bend)
-        for first, last in ((begin, middle), (middle, end)):
-            way = last.x - first.x
-            open_, most = room + self._turned(way), 2.0 * self._spread(way)
-            if not meets(open_, most, 0.0, 1.0, first.x, way, self._still, self._still, *cells, self._met):
-                continue
-            if not halvings:
-                return first.time
-            halfway = 0.5 * (first.time + last.time)
-            time = self._meeting(meets, cells, first, Place(halfway, at(halfway)), last, at, halvings - 1)
-            if time is not None:
-                return time
-        return None
+    def _met(self, looked_at, x, way, room):
+        meets, cells, data = looked_at
+        open_, most = room + self._turned(way), 2.0 * self._spread(way)
+        came = meets(open_, most, 0.0, 1.0, x, way, self._still, self._still, cells, data, self._rows_met)
+        return self._rows_met if came else None
 
     def _spread(self, way):
         """By how much places are further than the first is, at most [m]."""

@@ -10,15 +10,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .crossings import PAIRS, note_met
-from .followed_bodies import FollowedBodies
-from .followed_lines import HALVINGS, Place
+from .crossings import PAIRS
+from .followed_lines import Followed
 
 TRAVEL = 0.2
 """Largest share of that distance that bodies may come nearer by in a step, or half of what the balls are apart."""
 
 
-class FollowedPairs(FollowedBodies):
+class FollowedPairs(Followed):
     """Follows bodies that push each other.
 
     Parameters
@@ -28,9 +27,7 @@ class FollowedPairs(FollowedBodies):
     """
 
     def __init__(self, system):
-        super().__init__(system)
-        self._families = [family for family in system.families if family.pairs]
-        self._net = system.net
+        self._families, self._net = [family for family in system.families if family.pairs], system.net
 
     def soon(self, x, v):
         """Time in which no body comes much nearer to another from displacement x and velocity v [s]."""
@@ -46,40 +43,21 @@ class FollowedPairs(FollowedBodies):
 
     def look(self, course, piece, at):
         """Note in a course the first pair that may have met in a piece of a step."""
-        if np.isfinite(course.crossings[PAIRS, 0]):
-            return
-        begin = Place(course.time, course.x)
-        middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
         for family in self._families:
-            found = self._first(family, begin, middle, end, at, HALVINGS)
-            if found is not None:
-                time, (one, other) = found
-                note_met(PAIRS, time, np.array([one.row, other.row, -1, -1]), course.crossings)
-                return
+            self._note(course, piece, at, PAIRS, family)
 
-    def _first(self, family, begin, middle, end, at, halvings):
-        """(Time from which on two may have met [s], both), None where none have."""
-        bend = middle.x - 0.5 * (begin.x + end.x)
-        for first, last in ((begin, middle), (middle, end)):
-            pair = self._open(family, first.x, last.x - first.x, bend)
-            if pair is None:
-                continue
-            if not halvings:
-                return first.time, pair
-            halfway = 0.5 * (first.time + last.time)
-            found = self._first(family, first, Place(halfway, at(halfway)), last, at, halvings - 1)
-            if found is not None:
-                return found
-        return None
+    def _room(self, bend):
+        return bend
 
-    def _open(self, family, x, way, bend):
-        """A pair of which it is not certain that it stays apart on a way from displacement x, None where it is."""
-        deep, still = np.zeros((len(family.cells), family.observed)), np.zeros_like(x)
+    def _met(self, looked_at, x, way, room):
+        family, still = looked_at, np.zeros_like(x)
+        deep = np.zeros((len(family.cells), family.observed))
         family.force(0.0, x, still, np.zeros_like(x), family.cells, family.data, deep)
         for pair, (depth, *_) in zip(family.pairs, deep, strict=True):
-            nearer = sum(self._nearer(pair, one) for one in (way, bend))
+            nearer = self._nearer(pair, way) + self._nearer(pair, room)
             if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):
-                return pair
+                one, other = pair
+                return np.array([one.row, other.row, -1, -1])
         return None
 
     def _nearer(self, pair, way):

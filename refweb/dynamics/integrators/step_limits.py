@@ -30,7 +30,7 @@ class StepLimits:
         Lines that touch lines, where any do.
     pairs : refweb.dynamics.integrators.followed_pairs.FollowedPairs, optional
         Bodies that touch bodies, where any do.
-    followed : list of refweb.dynamics.integrators.followed_lines.FollowedLines
+    followed : list of refweb.dynamics.integrators.followed_lines.Followed
         These, and lines that touch bodies.
     """
 
@@ -40,7 +40,7 @@ class StepLimits:
             from .followed_lines import FollowedLines
 
             self.lines = FollowedLines(system)
-        self.followed = [] if self.lines is None else [self.lines]
+        self.followed: list = [] if self.lines is None else [self.lines]
         if any(family.passing is not None for family in system.families):
             from .followed_bodies import FollowedBodies
 

@@ -27,6 +27,8 @@ STIFFER = 4.0
 """Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
 POWER = 2.5
 """Power of an overlap that the energy of lines that cross goes with."""
+PRESCRIBED = "the motion of both is prescribed, and no stiffness of [self_contact] holds them"
+"""What is said of lines that are moved through each other."""
 HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
 """Energy of lines that cross and overlap by `AIM` of the radius, over k r²."""
 
@@ -55,7 +57,7 @@ def would_pass(system, v, nodes):
     mass = 1.0 / (1.0 / heavy[0] + 1.0 / heavy[1]) if np.isfinite(heavy).any() else np.inf
     speed = max(float(np.linalg.norm(v[i] - v[k])) for i in pairs[0] for k in pairs[1])
     if np.isinf(mass):
-        return f"{given}: the motion of both is prescribed, and no stiffness of [self_contact] holds them"
+        return f"{given}: {PRESCRIBED}"
     enough = max(0.5 * mass * speed**2 / (HELD * (0.5 * crossing.touch) ** 2), 2.0 * crossing.stiffness)
     return (
         f"{given}: [self_contact] stiffness = {float(f'{enough:.2g}'):g} would hold what comes at {speed:.3g} m/s, in "
@@ -150,8 +152,8 @@ class Passage:
         names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
         if own.ndim and self._system.supported[self._system.net.cells[own]].all():
             raise SolverError(
-                f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}: the "
-                "motion of both is prescribed, and no stiffness of [self_contact] holds them"
+                f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}: "
+                f"{PRESCRIBED}"
             )
         enough = float(f"{self._stiffness * (overlap / (AIM * radius)) ** POWER:.2g}")
         if self._chosen:

@@ -48,17 +48,23 @@ def probe_of(system, body):
 
 
 def probes_between(system):
-    """Probes of the deepest contact of each pair of bodies, and of the largest speed of a point of a body, by name."""
-    from ..probes import Probe, deepest, surface_speed
+    """Probes of the deepest contact of each pair of bodies, by name."""
+    from ..probes import Probe, deepest
 
     cells = [(i, n) for i, family in enumerate(system.families) for n in range(len(family.pairs))]
-    found: dict = {
+    return {
         ("between", k): Probe(deepest, [n, n + 1], np.zeros((1, 1)), sign=1.0, family=i)
         for k, (i, n) in enumerate(cells)
     }
+
+
+def probe_of_speed(system):
+    """Probe of the largest speed of a point of a body."""
+    from ..probes import Probe, surface_speed
+
     rows, reach = [], []
     for body in system.net.bodies:
         rows += [body.row, -1 if body.spin is None else body.spin]
         fastest = 1.0 if body.turn is None else float(np.linalg.eigvalsh(body.mobility)[-1])
         reach.append([body.extent * fastest if np.isfinite(body.extent) else body.radius])
-    return found | {"body speed": Probe(surface_speed, rows, np.array(reach), sign=1.0)}
+    return Probe(surface_speed, rows, np.array(reach), sign=1.0)
