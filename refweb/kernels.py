@@ -59,9 +59,10 @@ from typing import Any
 
 import numba
 import numba.typed
+from llvmlite.binding import parse_assembly
 from numba import types
 from numba.core import config
-from numba.core.caching import FunctionCache
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime.nrt import rtsys
@@ -157,6 +158,23 @@ class _CacheOfBodies(_CacheByName):
         return *super()._index_key(signature, codegen), "body"
 
 
+class _Entry(CompileResultCacheImpl):
+    """Machine code that is entered from Python alone.
+
+    It is kept without the code that kernels above would be optimized with, which takes three times as long to read.
+    """
+
+    def reduce(self, result):
+        """What is kept: names alone stand in for that code."""
+        (name, kind, code), *rest = super().reduce(result)
+        if kind == "object":
+            made = result.fndesc
+            names = made.mangled_name, made.llvm_cpython_wrapper_name, made.llvm_cfunc_wrapper_name
+            stubs = "\n".join(f'define void @"{stub}"() {{ ret void }}' for stub in names)
+            code = code[0], parse_assembly(stubs).as_bitcode()
+        return (name, kind, code), *rest
+
+
 @contextlib.contextmanager
 def _alone(function):
     """Keep other threads and processes from compiling a function."""
@@ -228,8 +246,10 @@ def _with_body(function, options):
 
     The entry from Python takes apart all that it is given: for kernels that take records of a hundred arrays it is two
     fifths of the time that the explicit loop takes to compile, and only the outermost of them is called from Python.
+    What the entry takes apart it counts references to, also that of a leaf.
     """
-    dispatcher = _with_entry(function, options)
+    dispatcher = _with_entry(function, {**options, "_nrt": True})
+    dispatcher._cache._impl = _Entry(function)
     body = functools.cache(lambda: _compile(lambda function: _body(function, options), function))
     dispatcher.get_call_template = lambda args, kws: body().get_call_template(args, kws)
     dispatcher.get_overload = lambda signature: body().get_overload(signature)
@@ -270,12 +290,16 @@ def _named(function):
     return function
 
 
-def kernel(signature=None, **options) -> Any:
+def kernel(signature=None, leaf=False, **options) -> Any:
     """Compile a function, for any arguments or those of one signature, and keep its machine code on disk.
 
     Products and sums may contract to fused operations; nothing else departs from IEEE arithmetic.
+
+    A ``leaf`` is for kernels to call, and of no signature. It counts no references to arrays, which takes 10 ns an
+    array and call where loops hide that each is given back. So it neither makes nor returns arrays, nor calls what
+    returns any, and has those in lists by `refweb.list_items.item` alone.
     """
-    options = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, **options}
+    options = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, "_nrt": not leaf, **options}
     if signature is None:
         return lambda function: _compile(lambda named: _with_body(named, options), _named(function))
     return lambda function: _OfSignature(_named(function), signature, options)
@@ -302,7 +326,7 @@ def ufunc(signatures) -> Any:
     return lambda function: _compile(numba.vectorize(signatures, cache=True), function)
 
 
-@kernel()
+@kernel(leaf=True)
 def copy_rows(source, target):
     """Copy rows of three numbers; numba's ``target[:] = source`` takes seconds to compile, for its errors."""
     for r in range(source.shape[0]):
@@ -310,7 +334,7 @@ def copy_rows(source, target):
             target[r, k] = source[r, k]
 
 
-@kernel()
+@kernel(leaf=True)
 def inner(one, other):
     """Inner product of two vectors; to read a kernel with numba's own, or its sum or ``in``, imports scipy.linalg."""
     total = 0.0
@@ -319,7 +343,7 @@ def inner(one, other):
     return total
 
 
-@kernel()
+@kernel(leaf=True)
 def among(values, value):
     """Whether a number is among those of a vector."""
     for n in range(values.shape[0]):
@@ -328,7 +352,7 @@ def among(values, value):
     return False
 
 
-@kernel()
+@kernel(leaf=True)
 def sum_of(values):
     """Sum of a vector, one number after another."""
     total = 0.0

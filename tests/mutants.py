@@ -347,11 +347,7 @@ MUTANTS = [
     Mutant("dynamics/integrators/simpson_book", "np.where(self._held, 0.0, v)", "v"),
     Mutant("dynamics/integrators/simpson_book", "s - 1.5 * s**2 + s**3 / 1.5", "s - 1.5 * s**2 + s**3 / 3.0"),
     Mutant("dynamics/integrators/simpson_book", "np.bincount(self._fixed % 3,", "np.bincount(self._fixed // 3 % 3,"),
-    Mutant(
-        "dynamics/integrators/rows",
-        "if inertia.inverse[r, k] > 0.0:\n                p[r, k]",
-        "if inertia.mass[r] > 0.0:\n                p[r, k]",
-    ),
+    Mutant("dynamics/integrators/rows", "if inertia.inverse[r, k] > 0.0 else", "if inertia.mass[r] > 0.0 else"),
     Mutant("dynamics/integrators/energy_book", "DRIFT = 1e-2", "DRIFT = 2e-2"),
     Mutant("dynamics/integrators/energy_book", "work[last] -= 0.5 * (before", "work[last] -= (before"),
     Mutant("dynamics/integrators/averages", "11.0 / 24.0 * d4", "11.0 / 12.0 * d4"),

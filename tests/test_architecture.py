@@ -17,7 +17,7 @@ from refweb.registry import EFFECTS
 from refweb.tables import Table
 
 ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of its docstring
-    ("the ground floor", "accepted errors messages tables kernels memory settings registry", ""),
+    ("the ground floor", "accepted errors messages tables kernels list_items memory settings registry", ""),
     (
         "net",
         "*",

@@ -1,13 +1,18 @@
 """Kernels that capture kernels: names that are theirs alone, and machine code that the next process finds."""
 
+import gc
 import json
 import os
 import subprocess
 import sys
+import weakref
 
+import numba
+import numpy as np
 import pytest
 
 from refweb import kernels
+from refweb.list_items import item
 
 FACTORY = """
 import sys
@@ -179,3 +184,51 @@ def test_of_processes_that_want_a_kernel_at_once_one_compiles_it(tmp_path):
         assert all(process.poll() is None for process in both)
     (tmp_path / "go").write_text("go")
     assert sorted(process.communicate()[0] for process in both) == ["0\n", "1\n"]
+
+
+@kernels.kernel(leaf=True)
+def first_of_all(values):
+    total = 0.0
+    for i in range(len(values)):
+        total += item(values, i)[0, 0]
+    return total
+
+
+@kernels.kernel()
+def call_leaf(values):
+    return first_of_all(values)
+
+
+def test_a_leaf_reads_lists_and_leaves_their_arrays_to_them():
+    arrays = [np.full((2, 3), 1.0), np.full((1, 1), 5.0)]
+    listed = kernels.typed_list(kernels.MATRIX, arrays)
+    assert call_leaf(listed) == call_leaf(listed) == 6.0
+    assert first_of_all(listed) == first_of_all(listed) == 6.0  # by its entry from Python
+    alive = [weakref.ref(array) for array in arrays]
+    assert listed[1][0, 0] == 5.0  # a reference given back once too often would have freed it
+    del arrays, listed
+    gc.collect()
+    assert [one() for one in alive] == [None, None]
+
+
+def test_a_leaf_makes_no_arrays_and_takes_none_from_lists_otherwise():
+    @kernels.kernel(leaf=True)
+    def makes(count):
+        return np.zeros(count).size
+
+    @kernels.kernel(leaf=True)
+    def takes(values):
+        return values[0].size
+
+    @kernels.kernel()
+    def call_makes():
+        return makes(3)
+
+    @kernels.kernel()
+    def call_takes(values):
+        return takes(values)
+
+    with pytest.raises(numba.core.errors.NumbaError):
+        call_makes()
+    with pytest.raises(numba.core.errors.NumbaError):
+        call_takes(kernels.typed_list(kernels.MATRIX, [np.zeros((1, 1))]))

@@ -70,7 +70,7 @@ NEWTON = (
     | {"statics.load_steps", "statics.newton", "statics.bars", "statics.floating", "statics.energy_search"}
 )
 NEWTON |= {"system.conjugate_gradients"}
-DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
+DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book", "list_items"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}

@@ -77,7 +77,7 @@ def times_transposed(m, q):
     )
 
 
-@kernel()
+@kernel(leaf=True)
 def quaternion_rate(w, a, b, c, omega):
     """½ ω q of a quaternion and an angular velocity along the axes of space."""
     p, q, r = 0.5 * omega[0], 0.5 * omega[1], 0.5 * omega[2]
@@ -197,7 +197,7 @@ def _scales(body, net):
     return np.column_stack([np.full(len(lever), 1.0 / place), lever / angle, pull])
 
 
-@kernel()
+@kernel(leaf=True)
 def angular_velocity(n, x, v, turns):
     """ω of a body [rad/s], along the axes of space."""
     m, s, w = matrix_at(x, turns.rows[n, 1], turns.rows[n, 2]), turns.rows[n, 1], turns.mobility[n]
@@ -212,7 +212,7 @@ def angular_velocity(n, x, v, turns):
     )
 
 
-@kernel()
+@kernel(leaf=True)
 def more_kinetic(x, v, turns):
     """Kinetic energy of bodies that turn less ½ I |L/I|² of each [J], which their rows have as all others."""
     total = 0.0
@@ -223,7 +223,7 @@ def more_kinetic(x, v, turns):
     return total
 
 
-@kernel()
+@kernel(leaf=True)
 def note_turns(x, turns):
     """Note the quaternions of bodies ahead of a drift."""
     for n in range(turns.moment.size):
@@ -233,7 +233,7 @@ def note_turns(x, turns):
             turns.before[n, 1 + k] = x[s, k]
 
 
-@kernel()
+@kernel(leaf=True)
 def series(h, n, v, turns, q):
     """Take the quaternion ``q (4,)`` of a free body on by a time h, by one series."""
     room, w, s = turns.room, turns.mobility[n], turns.rows[n, 1]
@@ -279,7 +279,7 @@ def along_principal(n, m, a, turns):
     return times(((e[0, 0], e[0, 1], e[0, 2]), (e[1, 0], e[1, 1], e[1, 2]), (e[2, 0], e[2, 1], e[2, 2])), p)
 
 
-@kernel()
+@kernel(leaf=True)
 def fastest_about(n, u, turns):
     """Angular velocities about its principal axes that a free body comes to, at most [rad/s], by L/I along these.
 
@@ -301,7 +301,7 @@ def fastest_about(n, u, turns):
     return first, second, third
 
 
-@kernel()
+@kernel(leaf=True)
 def turn_on(h, v, x, turns):
     """Turn free bodies by a time h [s] from the quaternions that are noted, and write them to x."""
     for n in range(turns.moment.size):
@@ -338,7 +338,7 @@ def turns_within(s, h, old, x, v, turns, here, speed):
     carry(here, speed, turns)
 
 
-@kernel()
+@kernel(leaf=True)
 def carry(x, v, turns):
     """Write places and velocities of the nodes that bodies carry."""
     for c in range(turns.carried.shape[0]):
@@ -353,7 +353,7 @@ def carry(x, v, turns):
         v[i, 2] = v[b, 2] + w[0] * arm[1] - w[1] * arm[0]
 
 
-@kernel()
+@kernel(leaf=True)
 def hand_on(x, f, turns):
     """Add the forces on nodes that bodies carry, and their moments, to those on the bodies."""
     for c in range(turns.carried.shape[0]):

@@ -11,7 +11,7 @@ from ..kernels import kernel
 from .rotation import along_principal, fastest_about, matrix_at
 
 
-@kernel()
+@kernel(leaf=True)
 def carry_rates(rates, turns):
     """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
 
@@ -24,7 +24,7 @@ def carry_rates(rates, turns):
         rates[turns.rows[n, 1]] += turns.scales[c, 1] * rates[i]
 
 
-@kernel()
+@kernel(leaf=True)
 def pull_rates(rates, f, turns):
     """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
     for c in range(turns.carried.shape[0]):
@@ -33,7 +33,7 @@ def pull_rates(rates, f, turns):
         rates[turns.rows[turns.carried[c, 1], 1]] += 2.0 * turns.scales[c, 2] * pull
 
 
-@kernel()
+@kernel(leaf=True)
 def speeds(n, x, v, turns):
     """Speed of the place of a body, and what its rotation adds to that at its surface while it moves freely, at most.
 
@@ -46,7 +46,7 @@ def speeds(n, x, v, turns):
     return own, far[0] * fastest[0] + far[1] * fastest[1] + far[2] * fastest[2]
 
 
-@kernel()
+@kernel(leaf=True)
 def pushes(n, x, f, turns):
     """Force on a body, and I times what the moment on it gives its surface by rotation over time, at most.
 

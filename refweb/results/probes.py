@@ -68,7 +68,7 @@ def _value(a, data, row, n, component):
     return a[row, component] + data[n, component] if component < MAGNITUDE else _square(a, data, row, n)
 
 
-@kernel()
+@kernel(leaf=True)
 def largest_of(a, data, rows, where):
     """Largest component, or magnitude, of ``a + data`` over some rows.
 
@@ -97,7 +97,7 @@ NODES, LINES = 1, 2
 """Kinds of what `plain_of` tells: the largest magnitude of displacements, the largest of a column over elements."""
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def largest_in(lines, column, first, last):
     """Largest of a column over the elements from ``first`` to ``last`` − 1: four maxima at once."""
     a = b = c = d = -math.inf
@@ -111,7 +111,7 @@ def largest_in(lines, column, first, last):
     return _larger(_larger(a, b), _larger(c, d))
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def farthest(x, first, last):
     """Largest magnitude of x, given in a row, over the rows from ``first`` to ``last`` − 1, four at once."""
     a = b = c = d = -math.inf
@@ -127,7 +127,7 @@ def farthest(x, first, last):
     return math.sqrt(_larger(_larger(a, b), _larger(c, d)))
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def _size(x, q):
     return x[q] * x[q] + x[q + np.uint64(1)] * x[q + np.uint64(1)] + x[q + np.uint64(2)] * x[q + np.uint64(2)]
 

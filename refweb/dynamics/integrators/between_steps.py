@@ -16,7 +16,7 @@ from ...kernels import copy_rows, inner, kernel
 from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
-from .extremes import EDGE, Extremes, correction, look, look_at_sums, take_over, time_of_top
+from .extremes import EDGE, Extremes, correction, look, look_at, look_at_sums, take_over, time_of_top
 from .nearby import show_near
 from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
 
@@ -155,14 +155,14 @@ def show_again(now, inside, model, observed, running):
 def take_peak(t, now, smooth, inside, total, extremes, model, observed, running):
     """Take over what exceeds its extreme at a state between the last three looks, which ``inside`` holds."""
     (x, v, f), lines, where = (inside.state[0], inside.state[1], inside.state[2]), inside.lines, np.zeros(2, np.int64)
-    probes, rows, data, signs = observed.probes, observed.rows, observed.data, observed.signs
+    signs = observed.signs
     for i in observed.followed:
-        value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+        value = look_at(i, t, x, v, f, lines, observed, where)
         if signs[i] * value > signs[i] * extremes.values[i]:
-            take_over(i, value, t, x, v, f, lines, where, probes[i], rows[i], data[i], extremes)
+            take_over(i, value, t, x, v, f, lines, observed, where, extremes)
             extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
     if observed.sums.shape[0]:
-        first, here = len(probes), total.copy()  # events are to see that of the step
+        first, here = len(observed.probes), total.copy()  # events are to see that of the step
         book_within(t, now, x, v, smooth, here, model, running)
         for i in range(first, signs.size):
             value = inner(observed.sums[i - first], here)

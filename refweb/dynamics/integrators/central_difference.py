@@ -19,6 +19,7 @@ import numpy as np
 
 from ...effects.base import blind_to_carried
 from ...errors import InputError, NoEnd, OpenBook, SolverError
+from ...kernels import MATRIX, typed_list
 from .averages import begin_averages
 from .between_steps import LOOKS
 from .energy_book import DRIFT, least_energy, refuse_open
@@ -243,7 +244,8 @@ class CentralDifference(Integrator):
         clock["least"] = self._least
         changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
-        carried = course.power, np.zeros((2, changing)), course.crossings
+        touches = typed_list(MATRIX, [np.empty((0, self._model.rubbed.width))])
+        carried = course.power, np.zeros((2, changing)), course.crossings, touches
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
     def advance(self, course: ExplicitCourse, times):

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import OpenBook
 from ...kernels import ENERGY, among, kernel, sum_of
+from ...list_items import item
 from ...net.net import AXIAL_STIFFNESS, LENGTH
 from ...net.rotation import more_kinetic
 
@@ -38,7 +39,7 @@ def refuse_open(course, limit, remedy):
         raise OpenBook(f"{drift}, limit {limit:g}: {remedy}", course.drift)
 
 
-@kernel()
+@kernel(leaf=True)
 def book_energies(t, x, v, mass, turns, cells, data, energies, energy_outs, book, working, total):
     """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
 
@@ -48,8 +49,8 @@ def book_energies(t, x, v, mass, turns, cells, data, energies, energy_outs, book
     count = len(energies)
     total[count], total[count + 1] = 0.0, book[count]
     for i in range(count):
-        energies[i](t, x, cells[i], data[i], energy_outs[i])
-        total[i] = sum_of(energy_outs[i])
+        item(energies, i)(t, x, item(cells, i), item(data, i), item(energy_outs, i))
+        total[i] = sum_of(item(energy_outs, i))
         if working[i] > 0:
             total[count + 1] += book[i]
         elif working[i] < 0:
@@ -76,14 +77,22 @@ def begin_powers(t, x, v, extra, families, solved, known, power):
         power[i] = sum_of(families.outs[i][:, column])
 
 
-@kernel(forceinline=True)
-def book_powers(t, h, x, v, extra, power, work, powers, forces, cells, data, outs):
+@kernel(leaf=True, forceinline=True)
+def act(i, t, x, v, f, families):
+    """Add the force of a family, by its number, to f."""
+    cells, data, out = item(families.cells, i), item(families.data, i), item(families.outs, i)
+    item(families.forces, i)(t, x, v, f, cells, data, out)
+
+
+@kernel(leaf=True)
+def book_powers(t, h, x, v, extra, power, work, families):
     """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
+    powers = families.powers
     for n in range(powers.shape[0]):
         i, column = powers[n, 0], powers[n, 1]
         if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
-            forces[i](t, x, v, extra, cells[i], data[i], outs[i])
-        gained = sum_of(outs[i][:, column])
+            act(i, t, x, v, extra, families)
+        gained = sum_of(item(families.outs, i)[:, column])
         work[i] += 0.5 * h * (power[i] + gained)
         power[i] = gained
 
@@ -103,7 +112,7 @@ def book_potential(sign, t, x, families, work):
         work[i] += sign * sum_of(families.stored[i])
 
 
-@kernel()
+@kernel(leaf=True)
 def own_energy(total, working):
     """Sum of the energies in ``total`` that are no potential of work, and of the kinetic energy [J]."""
     energy = 0.0
@@ -113,7 +122,7 @@ def own_energy(total, working):
     return energy + total[working.size]
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def note_motion(driven, mass, x, v, f, before):
     """Note position, force and kinetic energy of the rows whose motion is prescribed, ahead of a step."""
     for d in range(driven.size):
@@ -123,7 +132,7 @@ def note_motion(driven, mass, x, v, f, before):
             before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def book_motion(driven, mass, x, v, f, before, work):
     """Add the work of prescribed motion in a step: what the kinetic energy gained and the forces took."""
     last = work.size - 1
@@ -134,16 +143,16 @@ def book_motion(driven, mass, x, v, f, before, work):
             work[last] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True)
 def book_lengths(t, x, reels, was, length_force, work):
     """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
-    reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
+    item(reels.by_length, 0)(t, x, reels.nodes, reels.lines, length_force[1])
     for c in range(reels.lengths.size):
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
         length_force[0, c] = length_force[1, c]
 
 
-@kernel()
+@kernel(leaf=True)
 def drifts_away(clock, energy, stored, work, limit):
     """Note energy, largest energy and drift of a row; whether the run is not to go on.
 

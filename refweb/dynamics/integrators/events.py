@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import inner, kernel
+from .extremes import look_at
 
 EVENT = np.dtype(
     [
@@ -75,18 +76,18 @@ def starts_above(event, value):
         event.time = 0.0
 
 
-@kernel(forceinline=True)
-def note_events(t, h, x, v, f, lines, events, where, probes, rows, data, sums, total):
+@kernel(leaf=True)
+def note_events(t, h, x, v, f, lines, events, where, observed, total):
     """Note what happens at the end of a step of size h; whether that ends the run."""
     ended = False
     for e in range(events.shape[0]):
         event = events[e]
         if event.time == math.inf:
             i = event.slot
-            if i < len(probes):
-                value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+            if i < len(observed.probes):
+                value = look_at(i, t, x, v, f, lines, observed, where)
             else:
-                value = inner(sums[i - len(probes)], total)
+                value = inner(observed.sums[i - len(observed.probes)], total)
             if crosses(event, value):
                 event.time, event.width = t, h
                 ended = ended or event.stop > 0

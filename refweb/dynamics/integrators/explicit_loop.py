@@ -1,9 +1,9 @@
 """The compiled loop of explicit dynamics: steps of kicks and drifts, and history rows.
 
 Its pieces stand beside their equations: `refweb.dynamics.integrators.step` moves, ``energy_book`` books work,
-``extremes`` and ``events`` look, ``step_bound`` says how long a step may be. A piece that calls kernels counts
-references to all its arrays, some 0.1 µs a call, as much as two lines take, also where it finds nothing to do: forces
-and looks of a plain step, which every scene has, stand in the loop itself, which asks once what a scene has none of.
+``extremes`` and ``events`` look, ``step_bound`` says how long a step may be. What every step and every row of a plain
+scene goes through counts no references to arrays, see `refweb.kernels.kernel`: else these would take a third of the
+time of a cable of 100 elements. The loop asks once what a scene has none of.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ import math
 import numpy as np
 
 from ...kernels import copy_rows, kernel
+from ...list_items import item
 from ...net.rotation import hand_on
 from ...net.rotation_bounds import pushes, speeds
 from ...results.probes import PLACE
 from .averages import average, look_for_means
 from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
 from .energy_book import (
+    act,
     begin_powers,
     book_energies,
     book_lengths,
@@ -29,11 +31,11 @@ from .energy_book import (
     note_motion,
 )
 from .events import ended_by, note_events
-from .extremes import begin_anew, correct_within, look, note_time, plain_value, take_over, turns_back
+from .extremes import begin_anew, correct_within, look, look_at, note_time, plain_value, take_over, turns_back
 from .guard import LEAST, SHORTER, TOLD, comes_through, foreseen, look_back_at_drift, passes
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, push_on, set_push
-from .nearby import bits_of, covered, exchange, follow_near, reach_all, show_near, spread_of
+from .nearby import covered, follow_near, reach_all, show_near, spread_of
 from .rows import energies_now, write_row
 from .step import (
     add_forces,
@@ -45,13 +47,15 @@ from .step import (
     note_lengths,
     note_state,
     plain_kick,
+    room_for_forces,
+    room_for_numbers,
     rubbing_kick,
     set_lengths,
     set_reaction,
     turn_supports,
     viscous_kick,
 )
-from .step_bound import safe_step
+from .step_bound import safe_step, step_by_elements
 
 HELD = -2
 """What the loop returns where lines would pass whatever the step."""
@@ -121,36 +125,27 @@ def look_again(now, h, fresh, smooth, inside, total, model, observed, running):
     return smooth
 
 
-@kernel()
+@kernel(leaf=True, forceinline=True)
 def begin_forces(t, changing, extra, reaction, push, model, running):
     """Write powers, force of supports and push from outside at the time t that steps begin at."""
+    set_reaction(model.inertia.held, running.f.reshape(-1), reaction)
+    if model.families.powers.shape[0] or changing or model.outside.pushing.size:
+        begin_more(t, changing, extra, push, model, running)
+
+
+@kernel()
+def begin_more(t, changing, extra, push, model, running):
+    """Write powers, forces of natural lengths and push from outside."""
     x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
     if running.clock[0].begun == 0:
         begin_powers(t, x, v, extra, families, model.rubbed.families, running.clock[0].nsteps > 0, running.power)
     if changing:
         reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
-    set_reaction(model.inertia.held, running.f.reshape(-1), reaction)
     if outside.pushing.size:
         set_push(t, x, v, outside, families, extra, push)
 
 
-@kernel(forceinline=True)
-def room_for_numbers(rows, driven):
-    """Room for a place, for three vectors, and for states of rows whose motion is prescribed."""
-    place, before, aside = np.zeros(2, dtype=np.int64), np.empty((driven, 7)), np.empty((rows * (driven > 0), 3))
-    return place, np.zeros(3), np.zeros(3), np.zeros(3), before, aside
-
-
-@kernel(forceinline=True)
-def room_for_forces(rows, changing, pushing, model):
-    """Room for forces that do not stay, twice where any are asked for, for natural lengths, and for what touches."""
-    families, rubbed = model.families, model.rubbed
-    more = families.powers.shape[0] + families.viscous.size + rubbed.families.size > 0 or pushing
-    extra, lengths = np.zeros((rows * more, 3)), np.empty(model.reels.lengths.size * changing)
-    return extra, np.empty_like(extra), lengths, np.empty((0, rubbed.width))
-
-
-@kernel(forceinline=True)
+@kernel(leaf=True)
 def change_lengths(t, x, reels, was, lines, length_force, work):
     """Give what changes its natural lengths at time t, and book the work of that."""
     note_lengths(reels, was)
@@ -161,24 +156,38 @@ def change_lengths(t, x, reels, was, lines, length_force, work):
 @kernel()
 def take_steps(count, h, changing, scheme, model, observed, running, total):
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
+    return step_on(count, h, changing, scheme, model, observed, running, total, room_for_steps(scheme, model, running))
+
+
+@kernel()
+def room_for_steps(scheme, model, running):
+    """Room for what does not stay: numbers, forces, and a look inside of a step."""
+    rows, clock = running.x.shape[0], running.clock[0]
+    looks = clock.nsteps + clock.begun == 0 or scheme.drifts.size > 1
+    inside = room_inside(rows * looks, model.families.outs[0])
+    return room_for_numbers(rows, model.inertia.driven.size), room_for_forces(rows, model), inside
+
+
+@kernel(leaf=True)
+def step_on(count, h, changing, scheme, model, observed, running, total, room):
+    """As `take_steps`, with room for what does not stay."""
+    (where, reaction, known, push, before, aside), (extra, half, was), inside = room
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
-    probes, probe_rows, probe_data, sums = observed.probes, observed.rows, observed.data, observed.sums
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    where, reaction, known, push, before, aside = room_for_numbers(x.shape[0], driven.size)
-    lines, first, cells_of_lines, data_of_lines = outs[0], forces[0], cells[0], data[0]
+    lines, first = item(families.outs, 0), item(families.forces, 0)
+    cells_of_lines, data_of_lines = item(families.cells, 0), item(families.data, 0)
     near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
     pushing, pushed, length_force = model.outside.pushing.size > 0, running.ledger.pushed, running.length_force
-    extra, half, was, touches = room_for_forces(x.shape[0], changing, pushing, model)
-    stages, kicks, drifts, looked = scheme.drifts.size - 1, scheme.kicks * h, scheme.drifts * h, extremes.looked
+    stages, looked = scheme.drifts.size - 1, extremes.looked
+    kick, drift, last = scheme.kicks[stages] * h, scheme.drifts[stages] * h, scheme.kicks[stages + 1] * h
+    sums, bits = observed.sums, flat_v[: 3 * model.inertia.linear * (near and not stages)].view(np.int64)
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
-    bits, inside = bits_of(flat_v, model, stages > 0), room_inside(x.shape[0] * looks, lines)
     guarded, moves = model.guard.families.size + model.walls.families.size > 0, driven.size + len(motions.kernels) > 0
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
@@ -187,61 +196,59 @@ def take_steps(count, h, changing, scheme, model, observed, running, total):
             note_state(x, v, f, inverse, inside.before)
         if stages and not inner_stages(now, h, scheme, model, running, reaction, push, extra):
             return step - 1
-        if guarded and passes(now - h, kicks[stages], drifts[stages], stages, model, running):
+        if guarded and passes(now - h, kick, drift, stages, model, running):
             return step - 1
         note_motion(driven, mass, x, v, f, before)
-        move(kicks[stages], drifts[stages], flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
+        move(kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
         if stages:
-            book_potential(-1.0, now - kicks[stages + 1], x, families, work)
+            book_potential(-1.0, now - last, x, families, work)
         if moves:
             move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            change_lengths(now, x, reels, was, data[0], length_force, work)
+            change_lengths(now, x, reels, was, data_of_lines, length_force, work)
         if near:
-            follow_near(drifts[0], x, v, bits, before, model.inertia, nearby, families)
+            follow_near(drift, x, v, bits, before, model.inertia, nearby, families)
             look_back_at_drift(now - h, model, running)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:
-            forces[i](now, x, v, f, cells[i], data[i], outs[i])
+            act(i, now, x, v, f, families)
         if near:
             show_near(nearby, families)
         hand_over(x, f, turns)
         if rubbing.size:
-            touches = rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, touches, model)
+            rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.touches, model)
         elif viscous.size:
-            viscous_kick(now, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs, turns)
+            viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
-            plain_kick(kicks[stages + 1], flat_inverse, flat_v, flat_f, x, v, turns)
+            plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
         if powers.shape[0] and not stages:
-            book_powers(now, h, x, v, extra, power, work, powers, forces, cells, data, outs)
+            book_powers(now, h, x, v, extra, power, work, families)
         book_motion(driven, mass, x, v, f, before, work)
-        give_reaction(kicks[stages], kicks[stages + 1], held, flat_f, reaction, impulse)
+        give_reaction(kick, last, held, flat_f, reaction, impulse)
         if pushing:
-            push_on(now, kicks[stages], kicks[stages + 1], x, v, model.outside, families, extra, push, pushed)
+            push_on(now, kick, last, x, v, model.outside, families, extra, push, pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, inside, where, total, model, observed, running)
         turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
         note_time(looked, now)
         for i in followed:
             if not plain_value(i, flat_x, lines, plain, scales, known):
-                known[0] = probes[i](now, x, v, f, lines, probe_rows[i], probe_data[i], where)
+                known[0] = look_at(i, now, x, v, f, lines, observed, where)
             turned = turns_back(i, known[0], signs[i], values[i], recent, ending) or turned
             if signs[i] * known[0] > signs[i] * values[i]:
-                take_over(i, known[0], now, x, v, f, lines, where, probes[i], probe_rows[i], probe_data[i], extremes)
+                take_over(i, known[0], now, x, v, f, lines, observed, where, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
             looks = look_again(now, h, step == fresh, stages > 0, inside, total, model, observed, running)
         if averaged:
             average(now, x, v, f, lines, where, stages > 0, observed, running.averages, extremes)
-        if events.size and note_events(
-            now, h, x, v, f, lines, events, where, probes, probe_rows, probe_data, sums, total
-        ):
+        if events.size and note_events(now, h, x, v, f, lines, events, where, observed, total):
             return step
     return count
 
 
-@kernel()
+@kernel(leaf=True)
 def steps_until(end, changing, scheme, model, running):
     """Number of steps that the bound, or the step size, asks for until ``end``, not yet rounded."""
     interval, time = end - running.clock[0].time, running.clock[0].time
@@ -264,17 +271,11 @@ def steps_until(end, changing, scheme, model, running):
     reach_all(reach, running.x, model.nearby, model.families)
     if not model.nearby.at.shape[0] or covered(0.5 * reach, running.x, model.nearby, model.families):
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
-    families, cells, data = model.families, model.families.cells.copy(), model.families.data.copy()
-    more, first = len(cells) - len(data), 2 * len(data) - len(cells)
-    for m in range(more):
-        cells[m], data[m] = cells[first + m], data[first + m]
-    exchange(model.nearby, families, cells, data)
-    bound = safe_step(time, end, changing, reach, fastest, running.x, f, model)
-    exchange(model.nearby, families, cells, data)
+    bound = step_by_elements(time, end, changing, reach, fastest, model, running)
     return interval / (scheme.safety * bound)
 
 
-@kernel()
+@kernel(leaf=True)
 def plan(end, changing, scheme, model, running):
     """Begin the way to ``end``: note the state there, and plan its steps; whether they are few enough."""
     clock, before, span = running.clock[0], running.before, end - running.clock[0].time
@@ -294,7 +295,7 @@ def plan(end, changing, scheme, model, running):
     return True
 
 
-@kernel()
+@kernel(leaf=True)
 def end_of_steps(corners, time, row):
     """The next corner of a table behind a time, not beyond ``row``; either is met within rounding."""
     first, behind = 0, corners.size
@@ -320,7 +321,8 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
     on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.guard`.
     """
     clock, events, reels, left = running.clock[0], running.events, model.reels, breath
-    total, stopped = np.zeros(running.work.size + 2), ended_by(events)
+    total, stopped, room = np.zeros(running.work.size + 2), ended_by(events), room_for_steps(scheme, model, running)
+    momenta = np.empty_like(running.v)
     for n in range(times.size):
         if reels.lengths.size and not clock.begun:
             set_lengths(clock.time, reels, model.families.data[0])
@@ -336,7 +338,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
             if halved > 0.0 and not begun:
                 add_half_steps(-halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             count = min(clock.planned - begun, max(left, 1))
-            taken = take_steps(count, clock.step, changing, scheme, model, observed, running, total)
+            taken = step_on(count, clock.step, changing, scheme, model, observed, running, total, room)
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
@@ -359,7 +361,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
                 if not math.isfinite(largest):
                     break
                 clock.largest = max(clock.largest, largest)
-        energy, stored = write_row(history[n], model, observed, running, total)
+        energy, stored = write_row(history[n], model, observed, running, total, room[0][0], momenta)
         if drifts_away(clock, energy, stored, total[-2], limit):
             return n
         if stopped:

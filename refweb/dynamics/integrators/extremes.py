@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...kernels import inner, kernel
+from ...list_items import item
 from ...results.probes import NODES, PLACE, farthest, largest_in
 
 EDGE = 2.0**-16
@@ -61,13 +62,13 @@ class Extremes(NamedTuple):
         return cls(values, np.zeros(len(values)), places, np.zeros(len(values)), recent, np.array([np.nan, np.nan, 0]))
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def note_time(looked, t):
     """Note the time of a look."""
     looked[0], looked[1], looked[2] = looked[1], looked[2], t
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def turns_back(i, value, sign, extreme, recent, ending):
     """Note a value at a look; whether it may be that a peak above the extreme lies a little before.
 
@@ -111,7 +112,7 @@ def correction(extremes, i, sign, t, value, smooth):
     return sign * value - max(sign * recent[0], sign * recent[1], sign * recent[2])
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def plain_value(i, x, lines, plain, scales, known):
     """Write the value of a plain probe, see `refweb.results.probes.plain_of`, to ``known[0]``; whether it is one.
 
@@ -129,25 +130,32 @@ def plain_value(i, x, lines, plain, scales, known):
     return kind > 0
 
 
-@kernel()
-def take_over(i, value, t, x, v, f, lines, where, probe, rows, data, extremes):
+@kernel(leaf=True, forceinline=True)
+def look_at(i, t, x, v, f, lines, observed, where):
+    """Value of a probe, by its number."""
+    rows, data = item(observed.rows, i), item(observed.data, i)
+    return item(observed.probes, i)(t, x, v, f, lines, rows, data, where)
+
+
+@kernel(leaf=True)
+def take_over(i, value, t, x, v, f, lines, observed, where, extremes):
     """Take over a value of a probe that exceeds its extreme, with its time and place."""
     where[1] = PLACE
-    probe(t, x, v, f, lines, rows, data, where)
+    look_at(i, t, x, v, f, lines, observed, where)
     extremes.values[i], extremes.times[i], extremes.places[i], where[1] = value, t, where[0], 0
     extremes.corrections[i] = 0.0
 
 
-@kernel()
+@kernel(leaf=True)
 def look(t, x, v, f, lines, where, observed, extremes, ending):
     """Look at all probes that are followed, and take over what exceeds its extreme; whether any may turn back."""
-    probes, rows, data, signs, turned = observed.probes, observed.rows, observed.data, observed.signs, False
+    signs, turned = observed.signs, False
     note_time(extremes.looked, t)
     for i in observed.followed:
-        value = probes[i](t, x, v, f, lines, rows[i], data[i], where)
+        value = look_at(i, t, x, v, f, lines, observed, where)
         turned = turns_back(i, value, signs[i], extremes.values[i], extremes.recent, ending) or turned
         if signs[i] * value > signs[i] * extremes.values[i]:
-            take_over(i, value, t, x, v, f, lines, where, probes[i], rows[i], data[i], extremes)
+            take_over(i, value, t, x, v, f, lines, observed, where, extremes)
     return turned
 
 

@@ -31,6 +31,7 @@ from numba.typed import List
 
 from ...errors import OpenBook
 from ...kernels import IMPULSE, INDICES, MATRIX, kernel, typed_list
+from ...list_items import item
 from ...net.net import AXIAL_STIFFNESS
 
 CLOSURE = 1e-6
@@ -143,12 +144,12 @@ def kept_axes(system):
     return normals[:1] if np.abs(np.cross(normals, normals[0])).max() <= ROUNDINGS else np.zeros((0, 3))
 
 
-@kernel()
+@kernel(leaf=True)
 def impulse_until(t, x, outside, total):
     """Write the impulse of all that has a formula, but for a constant, to ``total (3,)``."""
     total[:] = 0.0
     for i in range(len(outside.impulses)):
-        outside.impulses[i](t, x, outside.cells[i], outside.data[i], total)
+        item(outside.impulses, i)(t, x, item(outside.cells, i), item(outside.data, i), total)
 
 
 @kernel()

@@ -24,6 +24,7 @@ from numba import types
 from numba.typed import List
 
 from ...kernels import INDICES, MATRIX, VECTOR, copy_rows, kernel, typed_list
+from ...list_items import item
 from ...net.rotation_bounds import speeds
 
 LASTS = 64.0
@@ -235,17 +236,11 @@ def look_at_all(system, model):
     skin["depth"] = np.inf
 
 
-@kernel(forceinline=True)
-def bits_of(v, model, idle):
-    """The velocities of all places, in a row, as whole numbers; none where it is ``idle`` or nothing acts nearby."""
-    return v[: 0 if idle or not model.nearby.families.size else 3 * model.inertia.linear].view(np.int64)
-
-
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def show_near(nearby, families):
     """Write what the chosen cells show where it is looked for, among that of all cells."""
     if nearby.skin[0].depth < math.inf:
-        ask(SHOW, families.outs[0], nearby, families)
+        ask(SHOW, item(families.outs, 0), nearby, families)
 
 
 @kernel()
@@ -263,7 +258,7 @@ def take_pairs(x, nearby, families):
         skin.lasts = min(2.0 * skin.lasts, MANY)
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def reach_all(reach, x, nearby, families):
     """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
 
@@ -278,7 +273,7 @@ def reach_all(reach, x, nearby, families):
         ask(TAKE, x, nearby, families)
 
 
-@kernel()
+@kernel(leaf=True)
 def covered(way, x, nearby, families):
     """Whether the pairs that are listed are all that can touch by coming nearer by a way [m].
 
@@ -308,7 +303,7 @@ def exchange(nearby, families, cells, data):
         families.data[i], data[m] = data[m], families.data[i]
 
 
-@kernel(fastmath={"contract", "nnan", "nsz"})
+@kernel(leaf=True, fastmath={"contract", "nnan", "nsz"})
 def spread_of(rows):
     """Root of the sum of the squares of the ranges of three columns: no two rows differ by more."""
     a0 = a1 = a2 = -math.inf
@@ -331,13 +326,13 @@ def spread_since(x, at):
     return spread_of(way)
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True)
 def follow_near(drift, x, v, bits, before, inertia, nearby, families):
     """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
 
-    ``bits`` are the velocities of places as whole numbers, see `bits_of`. Motion that is prescribed is held against the
-    places ``before``; to that of a body is added what its rotation adds at its surface. States between the last three
-    steps are covered as well, which is what is looked at for peaks.
+    ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. Motion that
+    is prescribed is held against the places ``before``; to that of a body is added what its rotation adds at its
+    surface. States between the last three steps are covered as well, which is what is looked at for peaks.
     """
     if not bits.size:
         return

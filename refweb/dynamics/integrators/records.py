@@ -83,6 +83,8 @@ class Inertia(NamedTuple):
         Mass of each row [kg], or inertia [kg m²] behind the first ``linear`` rows.
     inverse : ndarray, shape (rows, 3)
         Its inverse, 0 where a support holds.
+    rates : ndarray, shape (2, rows)
+        Space for what bounds stiffness and damping of each row.
     moving, held, driven : ndarray of int
         Rows that are free somewhere, supported components 3 · row + axis, and rows whose motion is prescribed.
     linear : int
@@ -93,6 +95,7 @@ class Inertia(NamedTuple):
 
     mass: np.ndarray
     inverse: np.ndarray
+    rates: np.ndarray
     moving: np.ndarray
     held: np.ndarray
     driven: np.ndarray
@@ -106,7 +109,9 @@ class Inertia(NamedTuple):
         inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
         moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
-        return cls(net.mass, inverse, moving, held, driven, system.rows - net.spins, Turns.of(net))
+        return cls(
+            net.mass, inverse, np.empty((2, system.rows)), moving, held, driven, system.rows - net.spins, Turns.of(net)
+        )
 
 
 class Families(NamedTuple):
@@ -354,6 +359,8 @@ class Running(NamedTuple):
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)
         What has met, see `refweb.dynamics.integrators.integrator.Course`.
+    touches : List
+        One array, room for what touches and is solved for.
     """
 
     clock: np.ndarray
@@ -370,3 +377,4 @@ class Running(NamedTuple):
     power: np.ndarray
     length_force: np.ndarray
     crossings: np.ndarray
+    touches: List

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...kernels import kernel
+from ...list_items import item
 from .averages import write_means
 from .energy_book import book_energies, own_energy
+from .extremes import look_at
 from .momentum_book import note_momentum
 
 
-@kernel()
+@kernel(leaf=True)
 def energies_now(model, running, total):
     """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
     clock, families = running.clock[0], model.families
@@ -25,19 +25,18 @@ def energies_now(model, running, total):
     return own_energy(total, families.working), stored
 
 
-@kernel()
-def write_row(row, model, observed, running, total):
+@kernel(leaf=True)
+def write_row(row, model, observed, running, total, where, p):
     """Write time, probes, energies, work, step size, momentum and impulses; hold momentum against these.
 
-    Returns the energy, and the sum of all energies without regard to sign [J].
+    Returns the energy, and the sum of all energies without regard to sign [J]. There is room for a place and for
+    momenta.
     """
     clock, families, inertia, v = running.clock[0], model.families, model.inertia, running.v
-    where, at = np.zeros(2, dtype=np.int64), 1
+    lines, at = item(families.outs, 0), 1
     row[0] = clock.time
     for i in range(len(observed.probes)):
-        row[at] = observed.probes[i](
-            clock.time, running.x, v, running.f, families.outs[0], observed.rows[i], observed.data[i], where
-        )  # fmt: skip
+        row[at] = look_at(i, clock.time, running.x, v, running.f, lines, observed, where)
         at += 1
     write_means(row, observed.windows, running.averages, running.extremes)
     energy, stored = energies_now(model, running, total)
@@ -45,10 +44,8 @@ def write_row(row, model, observed, running, total):
     for i in range(total.size):
         row[at] = total[i]
         at += 1
-    p = np.zeros_like(v)
     for r in range(v.shape[0]):
         for k in range(3):
-            if inertia.inverse[r, k] > 0.0:
-                p[r, k] = inertia.mass[r] * v[r, k]
+            p[r, k] = inertia.mass[r] * v[r, k] if inertia.inverse[r, k] > 0.0 else 0.0
     note_momentum(clock.time, running.x, p, running.impulse, model.outside, running.ledger, 0.0, row[at:])
     return energy, stored

@@ -9,6 +9,7 @@ import numpy as np
 from ...kernels import copy_rows, kernel, sum_of
 from ...net.net import LENGTH
 from ...net.rotation import carry, hand_on, note_turns, turn_on
+from .energy_book import act
 from .rubbed import meet_all
 
 ROUNDS = 100
@@ -25,7 +26,7 @@ SETTLED = 1e-12
 """Change of velocities, over the fastest and over what other forces give, at which sweeps over contacts end."""
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def kick_and_drift(kick, drift, inverse, x, v, f):
     """v ← v + kick f/m, x ← x + drift v, and no force, for all components in a row."""
     for q in range(x.size):
@@ -35,7 +36,7 @@ def kick_and_drift(kick, drift, inverse, x, v, f):
         f[q] = 0.0
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
     """As `kick_and_drift`, where bodies may turn."""
     if turns.moment.size:
@@ -45,14 +46,14 @@ def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
         turn_on(drift, v, x, turns)
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def last_kick(kick, inverse, v, f):
     """v ← v + kick f/m, for all components in a row."""
     for q in range(v.size):
         v[q] += kick * inverse[q] * f[q]
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
     """As `last_kick`, where bodies may carry nodes."""
     last_kick(kick, inverse, flat_v, flat_f)
@@ -60,7 +61,7 @@ def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
         carry(x, v, turns)
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def hand_over(x, f, turns):
     """Add forces on nodes that bodies carry to those on the bodies."""
     if turns.carried.shape[0]:
@@ -75,7 +76,7 @@ def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def set_reaction(held, f, reaction):
     """Write the force of the supports on the net, which takes that on them away, to ``reaction``; f in a row."""
     for k in range(3):
@@ -85,14 +86,14 @@ def set_reaction(held, f, reaction):
         reaction[q % np.uint64(3)] -= f[q]
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def give_impulse(time, reaction, impulse):
     """Add the impulse of a force over a time."""
     for k in range(3):
         impulse[k] += time * reaction[k]
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def give_reaction(before, behind, held, f, reaction, impulse):
     """Add the impulse of the supports in two kicks, a time ahead of a drift and one behind it; f in a row."""
     give_impulse(before, reaction, impulse)
@@ -100,8 +101,8 @@ def give_reaction(before, behind, held, f, reaction, impulse):
     give_impulse(behind, reaction, impulse)
 
 
-@kernel(forceinline=True)
-def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, data, outs, turns):
+@kernel(leaf=True)
+def viscous_kick(t, h, x, v, f, inverse, half, extra, families, turns):
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
 
     Forces that depend on velocity see that at the end of the step; the kick, thereby implicit, stays adjoint to the
@@ -115,8 +116,8 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
     for _ in range(ROUNDS):
         extra[:] = 0.0
         carry(x, v, turns)
-        for i in viscous:
-            forces[i](t, x, v, extra, cells[i], data[i], outs[i])
+        for i in families.viscous:
+            act(i, t, x, v, extra, families)
         hand_on(x, extra, turns)
         change = fastest = 0.0
         for q in range(flat_v.size):
@@ -136,16 +137,16 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, viscous, forces, cells, da
 
 
 @kernel()
-def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
+def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, room, model):
     """As `viscous_kick`, where losses of contact are solved for: they need no bound.
 
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
-    the first begins without a memory of another. It writes the power of what rubs, and returns room for what touches.
+    the first begins without a memory of another. It writes the power of what rubs; ``room`` holds what touches.
     """
     families, rubbed, turns = model.families, model.rubbed, model.inertia.turns
     forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
     ends = np.zeros(rubbed.families.size, dtype=np.int64)
-    touches = meet_all(h, x, v, inverse, families, rubbed, touches, ends)
+    touches = room[0] = meet_all(h, x, v, inverse, families, rubbed, room[0], ends)
     count, begin = ends[-1], 0
     copy_rows(v, half)
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
@@ -191,10 +192,9 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, touches, model):
     for m in range(rubbed.families.size):
         rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], outs[rubbed.families[m]])
         begin = ends[m]
-    return touches
 
 
-@kernel(forceinline=True)
+@kernel()
 def move_supports(t, h, x, v, f, aside, kernels, cells, data, outs):
     """Write prescribed positions at the end of a step, and velocities in it: at its end they may jump."""
     for i in range(len(kernels)):
@@ -231,7 +231,7 @@ def turn_supports(t, model, running):
     return turned
 
 
-@kernel()
+@kernel(leaf=True)
 def note_lengths(reels, was):
     """Write natural lengths that change."""
     for c in range(was.size):
@@ -249,7 +249,7 @@ def set_lengths(t, reels, lines):
         lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
 
 
-@kernel()
+@kernel(leaf=True)
 def note_state(x, v, f, inverse, old):
     """Write position, velocity and acceleration, of which a long step begins."""
     for r in range(x.shape[0]):
@@ -292,3 +292,19 @@ def interpolate_kicks(s, h, old, x, v, inverse, f, here, speed):
             a0, a1 = old[2, q, k], inverse[q, k] * f[q, k]
             here[q, k] = old[0, q, k] + s * (x[q, k] - old[0, q, k]) - bend0 * a0 - bend1 * a1
             speed[q, k] = old[1, q, k] + way * (v[q, k] - old[1, q, k]) + rate0 * a0 + rate1 * a1
+
+
+@kernel()
+def room_for_numbers(rows, driven):
+    """Room for a place, for three vectors, and for states of rows whose motion is prescribed."""
+    place, before, aside = np.zeros(2, dtype=np.int64), np.empty((driven, 7)), np.empty((rows * (driven > 0), 3))
+    return place, np.zeros(3), np.zeros(3), np.zeros(3), before, aside
+
+
+@kernel()
+def room_for_forces(rows, model):
+    """Room for forces that do not stay, twice where any are asked for, and for natural lengths."""
+    families, pushing = model.families, model.outside.pushing.size
+    more = families.powers.shape[0] + families.viscous.size + model.rubbed.families.size + pushing > 0
+    extra, lengths = np.zeros((rows * more, 3)), np.empty(model.reels.lengths.size)
+    return extra, np.empty_like(extra), lengths

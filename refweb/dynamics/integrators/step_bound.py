@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...kernels import BOUND, kernel
+from ...list_items import item
 from ...net.rotation_bounds import carry_rates, pull_rates
+from .nearby import exchange
 from .step import set_lengths
 
 
-@kernel()
-def step_bound(reach, speed, x, f, inertia, families, rates):
+@kernel(leaf=True)
+def step_bound(reach, speed, x, f, inertia, families):
     """Largest stable step [s], 2/ω (√(1 + ζ²) − ζ); infinite where nothing vibrates.
 
     It is that of all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most, while forces f
-    act at x. ``rates`` is room for a number a row.
+    act at x.
     """
-    mass, cells, data, viscous = inertia.mass, families.cells, families.data, families.viscous
-    rates[:] = 0.0
+    mass, viscous, rates, losses = inertia.mass, families.viscous, inertia.rates[0], inertia.rates[1]
+    inertia.rates[:] = 0.0
     for i in range(len(families.bounds)):
-        families.bounds[i](reach, speed, x, mass, rates, cells[i], data[i])
+        item(families.bounds, i)(reach, speed, x, mass, rates, item(families.cells, i), item(families.data, i))
     carry_rates(rates, inertia.turns)
     pull_rates(rates, f, inertia.turns)
     if not viscous.size:
@@ -29,9 +29,10 @@ def step_bound(reach, speed, x, f, inertia, families, rates):
         for r in inertia.moving:
             rate = max(rate, rates[r] / mass[r])
         return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
-    losses, step = np.zeros(rates.size), math.inf
+    step = math.inf
     for n in range(viscous.size):
-        families.dampings[n](reach, speed, x, mass, losses, cells[viscous[n]], data[viscous[n]])
+        cells, data = item(families.cells, viscous[n]), item(families.data, viscous[n])
+        item(families.dampings, n)(reach, speed, x, mass, losses, cells, data)
     carry_rates(losses, inertia.turns)
     for r in inertia.moving:
         rate, loss = rates[r] / mass[r], losses[r] / mass[r]
@@ -41,18 +42,37 @@ def step_bound(reach, speed, x, f, inertia, families, rates):
 
 
 @kernel()
+def shorten(t, model):
+    """Give lines their natural lengths at time t."""
+    set_lengths(t, model.reels, model.families.data[0])
+
+
+@kernel(leaf=True)
 def safe_step(start, end, changing, reach, speed, x, f, model):
     """Step that is stable from ``start`` to ``end`` [s], also where natural lengths change.
 
     They are looked at at all corners of their factors: in between a length is a product of positive linear functions of
     time, and stiffness, which goes with its inverse, is largest at an end.
     """
-    bound, rates = math.inf, np.empty(x.shape[0])
+    bound = math.inf
     for corner in model.reels.corners:
         if changing and (start < corner < end or corner == math.inf) or corner == -math.inf:
             if changing:
-                set_lengths(min(max(corner, start), end), model.reels, model.families.data[0])
-            bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.families, rates))
+                shorten(min(max(corner, start), end), model)
+            bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.families))
+    return bound
+
+
+@kernel()
+def step_by_elements(start, end, changing, reach, speed, model, running):
+    """As `safe_step`, where pairs that are listed are not all that can touch: by the elements themselves."""
+    families, cells, data = model.families, model.families.cells.copy(), model.families.data.copy()
+    more, first = len(cells) - len(data), 2 * len(data) - len(cells)
+    for m in range(more):
+        cells[m], data[m] = cells[first + m], data[first + m]
+    exchange(model.nearby, families, cells, data)
+    bound = safe_step(start, end, changing, reach, speed, running.x, running.f, model)
+    exchange(model.nearby, families, cells, data)
     return bound
 
 

@@ -1,6 +1,8 @@
 """Records of the compiled loop: numba types the first of each class alone, so all others must have its types."""
 
+import gc
 import tomllib
+import weakref
 from pathlib import Path
 
 import numba
@@ -8,6 +10,8 @@ import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
+from refweb.dynamics.simulation import Simulation
+from refweb.solution import Solution
 
 SCENES = Path(refweb.__file__).parent / "scenes"
 
@@ -40,3 +44,32 @@ def test_every_record_of_a_class_has_the_same_types(name, changes, monkeypatch):
     given["solve"].update(changes)
     with pytest.raises(Seen):
         refweb.run(refweb.Scene.from_dict(given))
+
+
+@pytest.mark.parametrize(
+    "name, changes",
+    [
+        ("square-impact", {}),
+        ("square-impact", {"method": "explicit"}),
+        ("spin-deployment", {}),
+        ("published-throw", {}),
+        ("capture-stage", {}),
+    ],
+)
+def test_what_a_run_has_used_is_free_behind_it(name, changes):
+    """Leaves count no references: one that is taken and not given back would keep an array for ever."""
+    given = tomllib.loads((SCENES / f"{name}.toml").read_text())
+    given["solve"].update(changes)
+    scene = refweb.Scene.load(name) if not changes else refweb.Scene.from_dict(given)
+    simulation = Simulation(scene, scene.build(), Solution(scene))
+    integrator, times = simulation.integrator, simulation.schedule.times
+    course = integrator.start(*simulation.begin.motion)
+    for end in (times[1], 1.01 * times[1]):
+        integrator.advance(course, [end])
+    model, running = integrator._model, integrator._running(course)
+    used = [course.x, course.v, course.force, course.before, course.work, course.extremes.values, *integrator._outs]
+    used += [model.inertia.inverse, model.inertia.rates, model.families.still, running.clock]
+    alive = [weakref.ref(array) for array in used]
+    del simulation, integrator, course, model, running, used
+    gc.collect()
+    assert [one() for one in alive] == [None] * len(alive)
