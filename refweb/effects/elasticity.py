@@ -40,20 +40,48 @@ def kernels(law, gradients, weights):
     points, nodes = len(gradients), len(gradients[0])
     flat = tuple(value for row in gradients for value in row)
 
+    @kernel()
+    def pull_at(x, cells, data, c, q):
+        """(dx/dξ, w T/|dx/dξ|, T, ε) at quadrature point q of element c."""
+        p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
+        axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
+        own = law_of(law, data, c)
+        tension = prepared_stress(own, e, axial, slack, smooth, data[c, G0], data[c, R0])
+        return p0, p1, p2, weights[q] * tension * inverse, tension, e
+
+    @kernel()
+    def give(f, cells, c, pull, out):
+        """Add the forces of an element of one point, and write what it shows."""
+        p0, p1, p2, scale, tension, e = pull
+        pull_together(f, cells, c, 0, nodes, flat, scale, p0, p1, p2)
+        out[c, TENSION], out[c, STRAIN] = tension, e
+
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             largest = stretched = 0.0
             for q in range(points):
-                p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
-                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                own = law_of(law, data, c)
-                tension = prepared_stress(own, e, axial, slack, smooth, data[c, G0], data[c, R0])
+                p0, p1, p2, scale, tension, e = pull_at(x, cells, data, c, q)
                 if q == 0 or tension > largest:
                     largest, stretched = tension, e
-                pull_together(f, cells, c, q, nodes, flat, weights[q] * tension * inverse, p0, p1, p2)
+                pull_together(f, cells, c, q, nodes, flat, scale, p0, p1, p2)
             out[c, TENSION] = largest
             out[c, STRAIN] = stretched
+
+    @kernel(FORCE)
+    def force_of_four(t, x, v, f, cells, data, out):
+        """The same of elements of one point, four at once: what one waits for, the others use."""
+        whole = cells.shape[0] // 4 * 4
+        for n in range(0, whole, 4):
+            i, j, k, m = np.uint64(n), np.uint64(n + 1), np.uint64(n + 2), np.uint64(n + 3)
+            first, second = pull_at(x, cells, data, i, 0), pull_at(x, cells, data, j, 0)
+            third, fourth = pull_at(x, cells, data, k, 0), pull_at(x, cells, data, m, 0)
+            give(f, cells, i, first, out)
+            give(f, cells, j, second, out)
+            give(f, cells, k, third, out)
+            give(f, cells, m, fourth, out)
+        for n in range(whole, cells.shape[0]):
+            give(f, cells, np.uint64(n), pull_at(x, cells, data, np.uint64(n), 0), out)
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -115,7 +143,7 @@ def kernels(law, gradients, weights):
                 total += weights[q] * (energy_density(own, e, axial, slack, smooth) - pulled)
             out[c] = total
 
-    return force, energy, stiffness, bound, every_strain, length_force
+    return force_of_four if points == 1 else force, energy, stiffness, bound, every_strain, length_force
 
 
 def of(net):

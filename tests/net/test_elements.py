@@ -234,3 +234,20 @@ def test_line_of_zero_length(law, start, moved):
     for definite in (True, False):
         K = net_system.pattern.matrix(net_system.stiffness(0.0, u, definite=definite)).toarray()
         assert np.isfinite(K).all() and K[0, 0] > 0.0
+
+
+@pytest.mark.parametrize("law", LAWS, ids=str)
+def test_lines_taken_together_pull_as_each_alone(law):
+    """Four at once, and what is left of them: whatever their number, forces are those of the lines one by one."""
+    net = skew_system(law)
+    force, x, none = net.families[0].force, displacement(3), np.zeros((6, 3))
+    cells, data = net.net.cells, net.net.line_data
+    assert len(cells) > 8
+    for count in range(len(cells) + 1):
+        together, alone, shown, one = none.copy(), none.copy(), np.zeros((count, 2)), np.zeros((1, 2))
+        force(0.0, x, none, together, cells[:count], data[:count], shown)
+        for c in range(count):
+            force(0.0, x, none, alone, cells[c : c + 1], data[c : c + 1], one)
+            # the same products, which either may contract with sums
+            assert shown[c] == pytest.approx(one[0], rel=1e-14, abs=1e-14 * np.abs(data[c]).max())
+        np.testing.assert_allclose(together, alone, rtol=0.0, atol=TIGHT * max(np.abs(alone).max(), 1e-300))
