@@ -1,7 +1,8 @@
 """Memory that a scene takes, estimated before anything large is made.
 
-Measured on square webs of 760 to 80 000 lines, beside some 200 MB of libraries: statics 4 to 5 kB for each element,
-factors included, which grow a little faster; explicit steps below 1 kB.
+Measured on webs of 760 to 2 million lines, beside some 200 MB of libraries: statics 4 to 5 kB for each element up to
+80 000, factors included, which grow a little faster, 6.4 kB of 750 000 in hexagons and 6.2 kB of 2 million in squares;
+explicit steps below 1 kB.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import sys
 
 from .errors import InputError
 
-BYTES_EXPLICIT, BYTES_IMPLICIT, BYTES_PER_BODY = 1e3, 6e3, 3e2
+BYTES_EXPLICIT, BYTES_IMPLICIT, BYTES_PER_BODY = 1e3, 6.5e3, 3e2
 """Bytes for each element of order 1: of explicit methods and of others, and for each body that it may touch."""
 BYTES_PER_ROW, NUMBERS_PER_ROW = 24, 24
 """Bytes of a number of a history row, of the run and of its twin and while they are put together; and how many numbers

@@ -121,7 +121,7 @@ def test_estimates_of_memory(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 1e9)
     many = 'kind = "window"\nmesh = "square"\nrows = 300\ncolumns = 300\nside = 0.1'
     write(tmp_path, many)
-    refused(tmp_path, capsys, "[web] 179400 lines", "need about 1.08 GB of memory, must be ≤ 1 GB")
+    refused(tmp_path, capsys, "[web] 179400 lines", "need about 1.17 GB of memory, must be ≤ 1 GB")
     write(tmp_path, WINDOW.replace("3", "30"), "[cable.groups]".replace("[cable.groups]", ""))
     text = (tmp_path / "scene.toml").read_text().replace("density = 200.0", "density = 200.0\nsubdivide = 1000")
     (tmp_path / "scene.toml").write_text(text)
