@@ -31,7 +31,8 @@ all its digits, which it loses when positions are the unknowns.
                ``inverse`` as in `MEET`; its rows are written to ``met``
 `WATCH`        ``(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells that are
                looked at when their turn comes: ``due`` has the way of all drifts after which that is, behind them that
-               way itself and what it may come to with those that are ``chosen``, the last of which is their number
+               way itself, what it may come to with those that are ``chosen``, the last of which is their number, and
+               how far the turn of the next is at least
 `SOON`         ``(x, v, cells, data)``: time in which no cell comes much nearer [s]
 =============  ==========================================================================================
 

@@ -207,7 +207,7 @@ def step_on(count, h, changing, scheme, model, observed, running, total, room):
         if changing:
             change_lengths(now, x, reels, was, data_of_lines, length_force, work)
         if near:
-            follow_near(drift, x, v, bits, before, model.inertia, nearby, families)
+            follow_near(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
         first(now, x, v, f, cells_of_lines, data_of_lines, lines)
         for i in still:

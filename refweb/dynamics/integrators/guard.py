@@ -7,6 +7,8 @@ not taken but cut to `SHORTER` of it, until the next row or corner of a table. W
 is stable is left, the run ends. Of neighbours along the net, which do not push each other, it is told when the first
 two meet.
 
+A look finds how far rows may go until another is due: as long as the ways of drifts are less together, none is taken.
+
 A step of higher order has several drifts, and cannot be taken back behind the first. It is looked at before as if it
 were one of order 2, and cut likewise; what comes through in one of its drifts nevertheless is told of.
 
@@ -26,9 +28,10 @@ import numpy as np
 from numba.typed import List
 
 from ...kernels import INDICES, INTEGERS, MATRIX, MEETS, VECTOR, WATCH, kernel, typed_list
+from ...list_items import item
 from ...net.rotation_bounds import beside_places
 from .crossings import APART, BESIDE, THROUGH, note_met
-from .nearby import near_of, spread_of
+from .nearby import goes_freely, near_of, spread_of
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
@@ -38,8 +41,12 @@ CALM = 2.0
 """Way of a drift that is not looked at before, over that of the last, at most; above, it is told of."""
 TOLD, KEPT_APART, FORESEEN = 0, 1, 2
 """Where lines would pass, they are told of, the drift is not taken, or the step is not begun and nothing is told of."""
-FAR = 0.02
-"""Way over the distance of touch above which it is looked at more closely."""
+FEW = 16.0
+"""Number of drifts that what is open does for, below which their ways are looked at more closely."""
+WAY = 2.0 * math.sqrt(3.0)
+"""Way by which two rows come nearer to each other, over that of the largest component, at most."""
+PAST, UNTIL, DUE = -3, -2, -1
+"""Numbers behind the turns of neighbours: way that rows have gone [m], up to which some are chosen, of the next."""
 
 
 class Guard(NamedTuple):
@@ -57,6 +64,8 @@ class Guard(NamedTuple):
         Distance at which lines touch [m].
     met : ndarray of int, shape (4,)
         Rows of the last two lines that would have met.
+    left : ndarray, shape (2,)
+        Way that rows may go until lines are looked at, and that which they have gone since they were [m].
     """
 
     families: np.ndarray
@@ -69,6 +78,7 @@ class Guard(NamedTuple):
     chosen: List
     touch: float
     met: np.ndarray
+    left: np.ndarray
 
     @classmethod
     def of(cls, system):
@@ -82,10 +92,11 @@ class Guard(NamedTuple):
             watches=typed_list(WATCH, [one.watch for one in own]),
             rows=typed_list(INDICES, [one.rows for one in own]),
             data=typed_list(MATRIX, [one.data for one in own]),
-            due=typed_list(VECTOR, [np.zeros(len(one.rows) + 2) for one in own]),
+            due=typed_list(VECTOR, [np.zeros(len(one.rows) + 3) for one in own]),
             chosen=typed_list(INTEGERS, [np.zeros(len(one.rows) + 1, dtype=np.int64) for one in own]),
             touch=max((one.touch for one in own), default=0.0),
             met=np.zeros(4, dtype=np.int64),
+            left=np.zeros(2),
         )
 
 
@@ -136,12 +147,12 @@ class Walls(NamedTuple):
         )
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def _larger(a, b):
     return b if b > a else a
 
 
-@kernel(fastmath={"contract", "nnan", "nsz"})
+@kernel(leaf=True, fastmath={"contract", "nnan", "nsz"})
 def largest_of(kick, v, f, inverse, share):
     """Largest component of velocities, by a ``share`` of 0 or 1, with what a kick adds to them: four maxima at once."""
     a = b = c = d = 0.0
@@ -159,9 +170,35 @@ def largest_of(kick, v, f, inverse, share):
 
 @kernel()
 def look_anew(guard):
-    """Look at all neighbours when they come next: rows may be anywhere."""
+    """Look at all lines when they come next: rows may be anywhere."""
+    guard.left[:] = 0.0
     for m in range(guard.families.size):
         guard.due[m][:] = 0.0
+
+
+@kernel(leaf=True)
+def way_among(drift, kick, v, f, inverse):
+    """Way by which two rows may come nearer to each other in a drift behind a kick, by how unlike velocities are."""
+    return abs(drift) * (spread_of(v.reshape(-1, 3)) + WAY * largest_of(kick, v, f, inverse, 0.0))
+
+
+@kernel(leaf=True, forceinline=True)
+def open_ahead(kick, drift, model, running):
+    """Whether a drift behind a kick leads no further than the last look found open; rows are seen as going it then.
+
+    The largest component of a velocity is written to the skin of what is near.
+    """
+    left, skin, size = model.guard.left, model.nearby.skin[0], 3 * model.inertia.linear
+    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
+    skin.fastest = largest_of(kick, v, f, inverse, 1.0)
+    way = WAY * abs(drift) * skin.fastest
+    if FEW * way > left[0]:
+        way = min(way, way_among(drift, kick, v, f, inverse))
+    if not way < left[0]:
+        return False
+    left[0] -= way
+    left[1] += way
+    return True
 
 
 @kernel(forceinline=True)
@@ -174,7 +211,7 @@ def near_cells(way, i, place, model):
     return families.cells[i], families.data[i]
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def deepest_of(shown):
     """Largest of what a family shows, 0 where that is nothing."""
     deep = 0.0
@@ -183,12 +220,12 @@ def deepest_of(shown):
     return deep
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def calm(walls, nearby, families):
     """Whether a drift behind another need not be looked at before, for bodies alone that do not turn."""
     skin, left = nearby.skin[0], math.inf
     for m in range(walls.families.size):
-        deep = deepest_of(families.outs[walls.families[m]])
+        deep = deepest_of(item(families.outs, walls.families[m]))
         left = min(left, walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0))
     walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
     return walls.left[0] > 0.0
@@ -204,7 +241,7 @@ def look_back_at_bodies(time, model, running):
             note_met(THROUGH, time, walls.met, running.crossings)
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def look_back_at_drift(time, model, running):
     """Look back at the drift from a time on where it was not looked at before, and led further than it might."""
     if model.walls.left.size:
@@ -212,12 +249,16 @@ def look_back_at_drift(time, model, running):
             look_back_at_bodies(time, model, running)
 
 
-@kernel(forceinline=True)
+@kernel(leaf=True, forceinline=True)
 def passes(time, kick, drift, stages, model, running):
-    """Whether the last drift of a step, behind a kick and some ``stages``, is not to be taken, see `comes_through`."""
-    if model.guard.families.size + model.walls.families.size == 0:
-        return False
-    if stages + model.guard.families.size + model.inertia.turns.moment.size == 0:
+    """Whether the last drift of a step, behind a kick and some ``stages``, is not to be taken, see `comes_through`.
+
+    What a look finds open does for drifts in which rows go as their velocities say.
+    """
+    if goes_freely(model):
+        if open_ahead(kick, drift, model, running):
+            return False
+    elif stages + model.guard.families.size + model.inertia.turns.moment.size == 0:
         if calm(model.walls, model.nearby, model.families):
             return False
     return comes_through(time, kick, drift, TOLD if stages else KEPT_APART, model, running)
@@ -237,41 +278,44 @@ def comes_through(time, kick, drift, then, model, running):
 
     What is ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
     """
-    linear, touch = model.inertia.linear, model.guard.touch
-    size = 3 * linear
+    touch, size, left = model.guard.touch, 3 * model.inertia.linear, model.guard.left
     v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
-    way = 2.0 * math.sqrt(3.0) * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
-    if touch > 0.0 and way > FAR * touch:
-        more = 2.0 * math.sqrt(3.0) * largest_of(kick, v, f, inverse, 0.0)
-        way = min(way, abs(drift) * (spread_of(running.v[:linear]) + more))
+    way = WAY * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
+    if touch > 0.0 and FEW * way > touch:
+        way = min(way, way_among(drift, kick, v, f, inverse))
     if not way < math.inf:
         return False
     came = passes_lines(time, way, kick, drift, then, model, running) if touch > 0.0 else False
     if model.walls.families.size:
         came = passes_bodies(time, way, kick, drift, then, model, running) or came
     if came:
-        running.clock[0].held = 1
+        running.clock[0].held, left[0] = 1, 0.0
     return came
 
 
 @kernel()
 def passes_lines(time, way, kick, drift, then, model, running):
-    """Whether lines that push each other would meet."""
+    """Whether lines that push each other would meet; where the drift is taken, it is found what is open behind it."""
     guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
-    inverse = model.inertia.inverse
+    inverse, left = model.inertia.inverse, math.inf
     for m in range(guard.families.size):
-        i = guard.families[m]
-        if not way + deepest_of(families.outs[i]) < guard.touch:
+        i, due = guard.families[m], guard.due[m]
+        room = guard.touch - deepest_of(families.outs[i]) - way
+        if not room > 0.0:
             cells, data = near_cells(way - guard.touch, i, guard.places[m], model)
             if guard.meets[m](0.0, way, kick, drift, x, v, f, inverse, cells, data, guard.met):
                 came = then != TOLD
                 if then == TOLD:
                     note_met(APART, time, guard.met, running.crossings)
-        if not came and then != FORESEEN and guard.watches[m](
-            0.0, way, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], guard.due[m], guard.chosen[m],
-            guard.met,
+        due[PAST] += guard.left[1]
+        if came or then == FORESEEN:
+            continue
+        if guard.watches[m](
+            0.0, way, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], due, guard.chosen[m], guard.met
         ):  # fmt: skip
             note_met(BESIDE, time, guard.met, running.crossings)
+        left = min(left, room, due[DUE] - due[PAST])
+    guard.left[0], guard.left[1] = 0.0 if then == FORESEEN else left, 0.0
     return came
 
 
@@ -286,7 +330,10 @@ def passes_bodies(time, way, kick, drift, then, model, running):
     for m in range(walls.families.size):
         i = walls.families[m]
         deep = deepest_of(families.outs[i])
-        if (walls.shown[m] * deep if deep > 0.0 else 0.0) + way + room < walls.most[m]:
+        left = walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0) - way - room
+        if model.guard.families.size:
+            model.guard.left[0] = 0.0 if model.inertia.turns.moment.size else min(model.guard.left[0], left)
+        if left > 0.0:
             continue
         cells, data = near_cells(way + room, i, walls.places[m], model)
         if walls.meets[m](room, way, kick, drift, x, v, f, inverse, cells, data, walls.met):

@@ -60,24 +60,23 @@ SKIN = np.dtype(
             "unknown",
             "top",
             "fastest",
+            "widest",
         ],
-        "formats": [*(8 * [float]), np.int64, np.int64, np.int64, float],
-        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80],
+        "formats": [*(8 * [float]), np.int64, np.int64, np.int64, float, float],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80, 88],
     }
 )
 """Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
 bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
 of steps that a list of pairs is to last; the longest of all ways of a step [m]; number of steps of which that is known,
 and above which a list is made, 0 from the start of a run on; the largest component of a velocity, as a whole number and
-as what it is [m/s]."""
-TAKE, SHOW = 0, 1
-"""What is asked for: the cells within the skin, all where it is infinitely deep, or to show what those show."""
+as what it is [m/s]; largest depth around pairs [m], infinite where none are found."""
 NOWHERE = np.zeros((0, 3))
 """Displacements where none are looked at."""
 _lists = (types.ListType(item) for item in (INDICES, MATRIX, MATRIX, VECTOR))
-SWAP = types.void(types.int64, types.int64, types.int64, types.float64, MATRIX, *_lists)
-"""``(what, i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the
-lists of `refweb.dynamics.integrators.records.Families`."""
+SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *_lists)
+"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the lists
+of `refweb.dynamics.integrators.records.Families`, for those within a skin, or all where it is infinitely deep."""
 
 
 class Nearby(NamedTuple):
@@ -93,26 +92,23 @@ class Nearby(NamedTuple):
         How long what is chosen will do.
     at : ndarray, shape (rows, 3)
         Displacement at which pairs were found [m]; no rows where none are found.
-    widest : float
-        Largest depth of the skin around pairs [m].
     """
 
     swaps: List
     families: np.ndarray
     skin: np.ndarray
     at: np.ndarray
-    widest: float
 
     @classmethod
     def of(cls, system):
         """Those of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
-        skin["depth"], skin["lasts"], skin["unknown"] = np.inf, MANY, COVERED
+        skin["depth"], skin["lasts"] = np.inf, MANY
         swaps = typed_list(SWAP, [swap_for(system.families[i]) for i in near])
         pairs = any(family.finder is not None for family in system.families)
         at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
-        widest = WIDEST * float(system.net.natural_length.mean())
-        return cls(swaps, np.array(near, dtype=np.int64), skin, at, widest)
+        skin["widest"] = WIDEST * float(system.net.natural_length.mean()) if pairs else np.inf
+        return cls(swaps, np.array(near, dtype=np.int64), skin, at)
 
     def without(self):
         """That of no families."""
@@ -150,15 +146,10 @@ def swap_of(near):
     """
 
     @kernel(SWAP)
-    def swap(what, i, m, depth, x, cells, data, outs, stored):
-        more, own = len(cells) - len(data), outs[i]
+    def swap(i, m, depth, x, cells, data, outs, stored):
+        more = len(cells) - len(data)
         whole, numbers = len(data) - more + m, len(data) + m
-        all_cells, all_data, shown, chosen_before = cells[whole], data[whole], outs[whole], cells[numbers]
-        if what == SHOW:
-            for n in range(chosen_before.shape[0]):
-                for k in range(own.shape[1]):
-                    shown[chosen_before[n, 0], k] = own[n, k]
-            return
+        all_cells, all_data, shown = cells[whole], data[whole], outs[whole]
         if depth == math.inf:
             cells[i], data[i], outs[i], stored[i] = all_cells, all_data, shown, stored[whole]
             cells[numbers] = np.empty((0, 1), dtype=np.int32)
@@ -178,26 +169,13 @@ def swap_of(near):
 
 @functools.cache
 def swap_pairs_of(pairs):
-    """As `swap_of`, of a family whose cells are elements: they are swapped for the pairs that ``pairs`` finds.
-
-    What an element shows is the largest value of its pairs, or the smallest where these are below 0.
-    """
+    """As `swap_of`, of a family whose cells are elements: they are swapped for the pairs that ``pairs`` finds."""
 
     @kernel(SWAP)
-    def swap(what, i, m, depth, x, cells, data, outs, stored):
-        more, own = len(cells) - len(data), outs[i]
+    def swap(i, m, depth, x, cells, data, outs, stored):
+        more = len(cells) - len(data)
         whole, numbers = len(data) - more + m, len(data) + m
-        shown, chosen_before = outs[whole], cells[numbers]
-        if what == SHOW:
-            for n in range(chosen_before.shape[0]):
-                for k in range(shown.shape[1]):
-                    shown[chosen_before[n, 0], k] = shown[chosen_before[n, 1], k] = 0.0
-            for n in range(chosen_before.shape[0]):
-                for e in range(2):
-                    for k in range(shown.shape[1]):
-                        if abs(own[n, k]) > abs(shown[chosen_before[n, e], k]):
-                            shown[chosen_before[n, e], k] = own[n, k]
-            return
+        shown = outs[whole]
         if depth == math.inf:
             cells[i], data[i], outs[i], stored[i] = cells[whole], data[whole], shown, stored[whole]
             cells[numbers] = np.empty((0, 1), dtype=np.int32)
@@ -211,13 +189,47 @@ def swap_pairs_of(pairs):
 
 
 @kernel()
-def ask(what, x, nearby, families):
-    """Swap the cells of all families for those within the skin at displacement x, or write what these show."""
+def take(x, nearby, families):
+    """Swap the cells of all families for those within the skin at displacement x."""
     for m in range(nearby.families.size):
         nearby.swaps[m](
-            what, nearby.families[m], m, nearby.skin[0].depth, x, families.cells, families.data, families.outs,
+            nearby.families[m],
+            m,
+            nearby.skin[0].depth,
+            x,
+            families.cells,
+            families.data,
+            families.outs,
             families.stored,
-        )  # fmt: skip
+        )
+
+
+@kernel(leaf=True)
+def show_near(nearby, families):
+    """Write what the chosen cells show where it is looked for, among that of all cells.
+
+    What an element shows is the largest value of its pairs, or the smallest where these are below 0.
+    """
+    if not nearby.skin[0].depth < math.inf:
+        return
+    size, whole = nearby.families.size, len(families.data)
+    for m in range(size):
+        own, shown = item(families.outs, nearby.families[m]), item(families.outs, whole - size + m)
+        chosen = item(families.cells, whole + m)
+        if chosen.shape[1] == 1:
+            for n in range(chosen.shape[0]):
+                for k in range(own.shape[1]):
+                    shown[chosen[n, 0], k] = own[n, k]
+            continue
+        for n in range(chosen.shape[0]):
+            for k in range(shown.shape[1]):
+                shown[chosen[n, 0], k] = shown[chosen[n, 1], k] = 0.0
+        for n in range(chosen.shape[0]):
+            for k in range(shown.shape[1]):
+                value = own[n, k]
+                for e in range(2):
+                    if abs(value) > abs(shown[chosen[n, e], k]):
+                        shown[chosen[n, e], k] = value
 
 
 def forget(model, begun):
@@ -231,23 +243,16 @@ def look_at_all(system, model):
     if skin["depth"] < np.inf:
         for m, i in enumerate(near_of(system)):
             swap_for(system.families[i])(
-                TAKE, i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
+                i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
             )
     skin["depth"] = np.inf
-
-
-@kernel(leaf=True, forceinline=True)
-def show_near(nearby, families):
-    """Write what the chosen cells show where it is looked for, among that of all cells."""
-    if nearby.skin[0].depth < math.inf:
-        ask(SHOW, item(families.outs, 0), nearby, families)
 
 
 @kernel()
 def take_pairs(x, nearby, families):
     """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
     copy_rows(x[: nearby.at.shape[0]], nearby.at)
-    ask(TAKE, x, nearby, families)
+    take(x, nearby, families)
     skin, pairs, elements = nearby.skin[0], 0, 0
     for m in range(nearby.families.size):
         pairs += families.cells[nearby.families[m]].shape[0]
@@ -270,7 +275,7 @@ def reach_all(reach, x, nearby, families):
         return
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf
-        ask(TAKE, x, nearby, families)
+        take(x, nearby, families)
 
 
 @kernel(leaf=True)
@@ -326,46 +331,62 @@ def spread_since(x, at):
     return spread_of(way)
 
 
+@kernel(leaf=True, forceinline=True)
+def goes_freely(model):
+    """Whether lines push each other, and all places go as their velocities say: none is moved or carried."""
+    inertia = model.inertia
+    return model.guard.families.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
+
+
 @kernel(leaf=True)
-def follow_near(drift, x, v, bits, before, inertia, nearby, families):
+def follow_near(drift, x, v, bits, before, model):
     """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
 
-    ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. Motion that
-    is prescribed is held against the places ``before``; to that of a body is added what its rotation adds at its
-    surface. States between the last three steps are covered as well, which is what is looked at for peaks.
+    ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
+    is known where a guard has looked for it. Motion that is prescribed is held against the places ``before``; to that
+    of a body is added what its rotation adds at its surface. States between the last three steps are covered as well,
+    which is what is looked at for peaks. Of pairs the ways relative to each other are taken where a skin as deep as may
+    be is used up in few steps otherwise.
     """
     if not bits.size:
         return
-    skin, most, pairs, driven = nearby.skin[0], np.int64(0), nearby.at.shape[0] > 0, inertia.driven
-    for q in range(bits.size):
-        most = max(most, bits[q] & SIGN)
-    skin.top = most
+    skin, most, driven, turns = model.nearby.skin[0], np.int64(0), model.inertia.driven, model.inertia.turns
+    if not goes_freely(model):
+        for q in range(bits.size):
+            most = max(most, bits[q] & SIGN)
+        skin.top = most
     way = abs(drift) * skin.fastest
     for d in range(driven.size):
         for k in range(3):
             way = max(way, abs(x[driven[d], k] - before[d, k]))
     way *= 2.0 * math.sqrt(3.0)
-    if pairs and FEWEST * way > nearby.widest and not driven.size:
+    if FEWEST * way > skin.widest and not driven.size:
         way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
     turned = 0.0
-    for n in range(inertia.turns.moment.size):
-        turned = max(turned, speeds(n, x, v, inertia.turns)[1])
+    for n in range(turns.moment.size):
+        turned = max(turned, speeds(n, x, v, turns)[1])
     way += 2.0 * abs(drift) * turned
     skin.earlier, skin.before, skin.last = skin.before, skin.last, way
     skin.longest = max(skin.longest, way)
     skin.used += way
     skin.steps += 1
     if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
-        recent = skin.last + skin.before + skin.earlier
-        if pairs:
-            if skin.depth < math.inf:
-                skin.used = spread_since(x, nearby.at) + recent
-                if skin.used + way <= KEPT_UP_TO * skin.depth:
-                    return
-            near = way if driven.size else abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
-            skin.depth = max(min(skin.lasts * near, nearby.widest), 4.0 * recent)
-            skin.used = 0.0
-            take_pairs(x, nearby, families)
-            return
+        choose(drift, x, v, driven.size > 0, model.nearby, model.families)
+
+
+@kernel()
+def choose(drift, x, v, driven, nearby, families):
+    """Choose anew what is near, behind a drift that led to x at velocities v, where motion is ``driven`` or is not."""
+    skin = nearby.skin[0]
+    way, recent = skin.last, skin.last + skin.before + skin.earlier
+    if not nearby.at.shape[0]:
         skin.depth, skin.used = max(LASTS * way, 4.0 * recent, min(skin.wished, LONGEST * way)), 0.0
-        ask(TAKE, x, nearby, families)
+        take(x, nearby, families)
+        return
+    if skin.depth < math.inf:
+        skin.used = spread_since(x, nearby.at) + recent
+        if skin.used + way <= KEPT_UP_TO * skin.depth:
+            return
+    near = way if driven else abs(drift) * spread_of(v[: nearby.at.shape[0]])
+    skin.depth, skin.used = max(min(skin.lasts * near, skin.widest), 4.0 * recent), 0.0
+    take_pairs(x, nearby, families)

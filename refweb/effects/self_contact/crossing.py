@@ -128,18 +128,21 @@ def watch(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, me
                 chosen[chosen[count]] = c
                 chosen[count] += 1
         due[count + 1] = until
+    next_one = until
     for n in range(chosen[count]):
         c = chosen[n]
         if due[c] > past + way + room:
+            next_one = min(next_one, due[c])
             continue
         near, joined = room + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
         ways = ways_of(cells, c, kick, drift, v, f, inverse)
         closed, start, _ = meet(near, place_of(x, cells, data, c), ways, joined)
         due[c] = past + start
+        next_one = min(next_one, due[c])
         if closed and data[c, SCALE] > 0.0 and not came:
             note(cells, c, met)
             came = True
-    due[count] = past + way
+    due[count], due[count + 2] = past + way, next_one
     return came
 
 

@@ -120,14 +120,13 @@ def test_far_from_a_body_few_lines_are_looked_at():
     assert everything == 2 * 8 * 7 and skin["depth"] == np.inf  # whoever comes next looks at all
     family = solver.system.families[1]
     swap, arrays = nearby.swap_of(family.near), (lists.cells, lists.data, lists.outs, lists.stored)
-    swap(nearby.TAKE, 1, 0, 0.05, course.x, *arrays)
+    swap(1, 0, 0.05, course.x, *arrays)
     chosen = lists.cells[-1][:, 0]
     assert 0 < len(chosen) < 0.5 * everything
     np.testing.assert_array_equal(lists.cells[1], family.cells[chosen])
     np.testing.assert_array_equal(lists.data[1], family.data[chosen])
-    lists.outs[1][:] = 1.0
-    swap(nearby.SHOW, 1, 0, 0.05, course.x, *arrays)
+    lists.outs[1][:], skin["depth"] = 1.0, 0.05
+    nearby.show_near(model.nearby, lists)
     np.testing.assert_array_equal(np.flatnonzero(lists.outs[-1][:, 0]), chosen)
-    skin["depth"] = 0.05
     nearby.look_at_all(solver.system, model)
     assert len(lists.cells[1]) == len(lists.outs[1]) == len(lists.stored[1]) == everything
