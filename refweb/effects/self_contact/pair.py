@@ -84,7 +84,8 @@ def apart(place, touch):
 def angle_factor(n, first, last, touch):
     """(f, the product of the natural lengths), n = u × w, see `refweb.effects.self_contact.press`."""
     area = first * last
-    return math.sqrt(dot(n, n) / (area * area) + touch * touch / area), area
+    inverse = 1.0 / area
+    return math.sqrt(inverse * (dot(n, n) * inverse + touch * touch)), area
 
 
 @kernel(forceinline=True)

@@ -80,66 +80,67 @@ def slopes_of_factor(u, w, n, f, area):
 
 @kernel(forceinline=True)
 def crossed(place, n, of):
-    """(J, its slopes by p, u and w, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
+    """(J, its slopes, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
 
     Of a crossing at the places s and t of both infinite lines, a distance h apart, R = c² − h² and N = |u × w|, the
     overlap is (R/N²)^½ |w| long to either side along the first element, and the same of the other:
 
         J = (8/15) κ R^(5/2) (L |w| + L' |u|)/N.
+
+    The slopes are numbers a, b, α and β: ∂J/∂p = a n, ∂J/∂u = w × (a p + b n) + α u, and ∂J/∂w = (a p + b n) × u + β w.
     """
-    (p, u, w), touch, zero = place, of.touch, (0.0, 0.0, 0.0)
+    (p, u, w), touch = place, of.touch
     uu, uw, ww, nn, pn = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, n)
     room = touch * touch * nn - pn * pn
     if not (room > 0.0 and nn > 0.0):
-        return 0.0, zero, zero, zero, math.inf
-    inverse = 1.0 / nn
+        return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
+    first, other = math.sqrt(uu), math.sqrt(ww)
+    one = 1.0 / (nn * first * other)  # of three numbers by one division: those and roots are most of the time
+    inverse, short = one * first * other, one * nn
     room *= inverse
-    first, other, half = math.sqrt(uu), math.sqrt(ww), math.sqrt(room * inverse)
+    half = math.sqrt(room * inverse)
     d, e = dot(u, p), dot(w, p)
-    s, t, along = (uw * e - ww * d) * inverse, (uu * e - uw * d) * inverse, half * abs(uw)
-    wide, high = max(half * other, (along + touch) / first), max(half * first, (along + touch) / other)
+    s, t, along = (uw * e - ww * d) * inverse, (uu * e - uw * d) * inverse, half * abs(uw) + touch
+    wide, high = max(half * other, along * other * short), max(half * first, along * first * short)
     if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
-        return 0.0, zero, zero, zero, math.inf
+        return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
     size = of.length * other + of.other * first
-    j = 8.0 / 15.0 * of.scale * room * room * half * size
-    steep, share = 5.0 * pn * inverse / room, j / (first * other * size)
-    by_p, turn = -steep * j, (steep * pn - 1.0) * j * inverse
-    own, more = of.other * other * share, of.length * first * share
-    wp, pu, wn, nu = cross(w, p), cross(p, u), cross(w, n), cross(n, u)
-    return (
-        j,
-        (by_p * n[0], by_p * n[1], by_p * n[2]),
-        (
-            by_p * wp[0] + turn * wn[0] + own * u[0],
-            by_p * wp[1] + turn * wn[1] + own * u[1],
-            by_p * wp[2] + turn * wn[2] + own * u[2],
-        ),
-        (
-            by_p * pu[0] + turn * nu[0] + more * w[0],
-            by_p * pu[1] + turn * nu[1] + more * w[1],
-            by_p * pu[2] + turn * nu[2] + more * w[2],
-        ),
-        pn * pn * inverse,
-    )
+    scale = 8.0 / 15.0 * of.scale * room * half
+    j, by_p, share = scale * room * size, -5.0 * scale * pn * inverse * size, scale * room * short
+    turn = -(by_p * pn + j) * inverse
+    return j, by_p, turn, of.other * other * share, of.length * first * share, pn * pn * inverse
 
 
 @kernel()
 def forces_of(place, of):
     """(How deep a pair that may touch overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes)."""
-    n = cross(place.u, place.w)
-    j, by_p, by_u, by_w, square = crossed(place, n, of)
-    if j == 0.0:
-        j, g0, g1, g2, g3 = overlap(place, of)
-        if j == 0.0:
-            return NOT_SEEN, NO_PUSH
-        square = nearest(place.p, place.u, place.w)[2]
-    else:
-        g0 = by_p[0] - by_u[0], by_p[1] - by_u[1], by_p[2] - by_u[2]
-        g1, g3 = by_u, by_w
-        g2 = -by_p[0] - by_w[0], -by_p[1] - by_w[1], -by_p[2] - by_w[2]
+    p, u, w = place
+    n = cross(u, w)
     f, area = angle_factor(n, of.length, of.other, of.touch)
+    j, by_p, turn, own, more, square = crossed(place, n, of)
+    if j == 0.0:
+        return forces_near_ends(place, n, f, area, of)
+    a, b, own, more = f * by_p, f * turn + j / (f * area * area), f * own, f * more
+    m = a * p[0] + b * n[0], a * p[1] + b * n[1], a * p[2] + b * n[2]
+    q, r = cross(w, m), cross(m, u)
+    q = q[0] + own * u[0], q[1] + own * u[1], q[2] + own * u[2]
+    r = r[0] + more * w[0], r[1] + more * w[1], r[2] + more * w[2]
+    return max(of.touch - math.sqrt(square), 0.0), (
+        (q[0] - a * n[0], q[1] - a * n[1], q[2] - a * n[2]),
+        (-q[0], -q[1], -q[2]),
+        (r[0] + a * n[0], r[1] + a * n[1], r[2] + a * n[2]),
+        (-r[0], -r[1], -r[2]),
+    )
+
+
+@kernel(forceinline=True)
+def forces_near_ends(place, n, f, area, of):
+    """The same of a pair that overlaps near an end, or does not."""
+    j, g0, g1, g2, g3 = overlap(place, of)
+    if j == 0.0:
+        return NOT_SEEN, NO_PUSH
     by_u, by_w = slopes_of_factor(place.u, place.w, n, f, area)
-    return max(of.touch - math.sqrt(max(square, 0.0)), 0.0), (
+    return max(of.touch - math.sqrt(max(nearest(place.p, place.u, place.w)[2], 0.0)), 0.0), (
         (j * by_u[0] - f * g0[0], j * by_u[1] - f * g0[1], j * by_u[2] - f * g0[2]),
         (-j * by_u[0] - f * g1[0], -j * by_u[1] - f * g1[1], -j * by_u[2] - f * g1[2]),
         (j * by_w[0] - f * g2[0], j * by_w[1] - f * g2[1], j * by_w[2] - f * g2[2]),

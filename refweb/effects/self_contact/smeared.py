@@ -95,36 +95,78 @@ def pieces(length, y, rate, across, turn, touch):
     return (3, (low, inner, outer, high)) if low < outer < high else (2, (low, inner, high, high))
 
 
+@kernel(forceinline=True)
+def step_at(x):
+    """(S, S') at x, without a branch."""
+    x = min(max(x, -1.0), 1.0)
+    return 0.5 + x * (0.75 - 0.25 * x * x), 0.75 - 0.75 * x * x
+
+
+@kernel(forceinline=True)
+def with_point(sums, q, weight, of_depth, of_place):
+    """Sums over Gauss points with another at q: of I, of half its pulls, and of its slopes along the other element."""
+    deep, place = of_depth[0] - q * (of_depth[1] + q * of_depth[2]), of_place[0] + q * of_place[1]
+    (near, rise), (far, fall) = step_at(place), step_at(place - of_place[2])
+    pull = weight * deep * (near - far)
+    energy = weight * deep * deep
+    tilt = energy * (rise - fall)
+    return (
+        sums[0] + deep * pull,
+        sums[1] + pull,
+        sums[2] + q * pull,
+        sums[3] + q * q * pull,
+        sums[4] + tilt,
+        sums[5] + q * tilt,
+        sums[6] + energy * fall,
+    )
+
+
 @kernel()
 def first(p, u, w, touch):
     """(I, its gradients by the two nodes of the first element and by the second node of the other).
 
     That by the first node of the other is the negative of their sum. p is the first node of the first element from the
     first node of the other.
+
+    With q the place from the middle of what overlaps, and d there, ∂I is the integral of −4 W (c² − D) (d + q d')
+    and of e ∂W, so that sums over Gauss points of these, times 1, q and q², are all that it takes.
     """
-    total = 0.0
-    f0 = f1 = f2 = g0 = g1 = g2 = h0 = h1 = h2 = 0.0
-    if dot(w, w) > (SHORT * touch) ** 2:
-        length, unit, y0, rate, across, turn = along(p, u, w)
-        count, ends = pieces(length, y0, rate, across, turn, touch)
-        for n in range(count):
-            low, span = ends[n], ends[n + 1] - ends[n]
-            for i in range(4):
-                s = low + span * PLACES[i]
-                weight, y = span * WEIGHTS[i], y0 + s * rate
-                d0, d1, d2 = across[0] + s * turn[0], across[1] + s * turn[1], across[2] + s * turn[2]
-                deep = touch * touch - (d0 * d0 + d1 * d1 + d2 * d2)
-                near, far = step_of(y / touch), step_of((y - length) / touch)
-                own, energy = near[0] - far[0], weight * deep * deep
-                total += own * energy
-                pull, tilt = -4.0 * weight * own * deep, energy * (near[1] - far[1]) / touch
-                x0, x1, x2 = pull * d0 + tilt * unit[0], pull * d1 + tilt * unit[1], pull * d2 + tilt * unit[2]
-                rest = 1.0 - s
-                f0, f1, f2 = f0 + rest * x0, f1 + rest * x1, f2 + rest * x2
-                g0, g1, g2 = g0 + s * x0, g1 + s * x1, g2 + s * x2
-                a, b = (tilt - pull * y) / length, energy * far[1] / touch
-                h0, h1, h2 = h0 + a * d0 + b * unit[0], h1 + a * d1 + b * unit[1], h2 + a * d2 + b * unit[2]
-    return total, (f0, f1, f2), (g0, g1, g2), (h0, h1, h2)
+    zero = (0.0, 0.0, 0.0)
+    if not dot(w, w) > (SHORT * touch) ** 2:
+        return 0.0, zero, zero, zero
+    length, unit, y0, rate, across, turn = along(p, u, w)
+    count, ends = pieces(length, y0, rate, across, turn, touch)
+    if count == 0:
+        return 0.0, zero, zero, zero
+    middle, inverse = 0.5 * (ends[0] + ends[count]), 1.0 / touch
+    d = across[0] + middle * turn[0], across[1] + middle * turn[1], across[2] + middle * turn[2]
+    y, room, half, square = y0 + middle * rate, touch * touch - dot(d, d), 2.0 * dot(d, turn), dot(turn, turn)
+    quadratic, rates = (room, half, square), (inverse * y, inverse * rate, inverse * length)
+    sums = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(count):
+        low, span = ends[n] - middle, ends[n + 1] - ends[n]
+        sums = with_point(sums, low + PLACES[0] * span, WEIGHTS[0] * span, quadratic, rates)
+        sums = with_point(sums, low + PLACES[1] * span, WEIGHTS[1] * span, quadratic, rates)
+        sums = with_point(sums, low + PLACES[2] * span, WEIGHTS[2] * span, quadratic, rates)
+        sums = with_point(sums, low + PLACES[3] * span, WEIGHTS[3] * span, quadratic, rates)
+    total, pull0, pull1, pull2, tilt0, tilt1, end = sums
+    pull0, pull1, pull2 = -4.0 * pull0, -4.0 * pull1, -4.0 * pull2
+    tilt0, tilt1, end, short = inverse * tilt0, inverse * tilt1, inverse * end, 1.0 / length
+    a, b = short * (tilt0 - y * pull0 - rate * pull1), short * (tilt1 - y * pull1 - rate * pull2)
+    x0, z0 = pull0 * d[0] + pull1 * turn[0] + tilt0 * unit[0], pull1 * d[0] + pull2 * turn[0] + tilt1 * unit[0]
+    x1, z1 = pull0 * d[1] + pull1 * turn[1] + tilt0 * unit[1], pull1 * d[1] + pull2 * turn[1] + tilt1 * unit[1]
+    x2, z2 = pull0 * d[2] + pull1 * turn[2] + tilt0 * unit[2], pull1 * d[2] + pull2 * turn[2] + tilt1 * unit[2]
+    rest = 1.0 - middle
+    return (
+        total,
+        (rest * x0 - z0, rest * x1 - z1, rest * x2 - z2),
+        (middle * x0 + z0, middle * x1 + z1, middle * x2 + z2),
+        (
+            a * d[0] + b * turn[0] + end * unit[0],
+            a * d[1] + b * turn[1] + end * unit[1],
+            a * d[2] + b * turn[2] + end * unit[2],
+        ),
+    )
 
 
 @kernel(forceinline=True)
