@@ -270,6 +270,9 @@ MUTANTS = [
     Mutant(
         "dynamics/integrators/guard", "if then != TOLD and walls.met[3] == 0:", "if walls.met[3] == 0 and then == TOLD:"
     ),
+    Mutant("dynamics/integrators/guard", "    left[0] -= way\n", ""),
+    Mutant("dynamics/integrators/guard", "min(left, room, due[DUE] - due[PAST])", "min(left, room)"),
+    Mutant("dynamics/integrators/guard", "due[PAST] += guard.left[1]", "due[PAST] += 0.0"),
     Mutant("dynamics/integrators/guard", "CALM * skin.last < left", "CALM * skin.last < 20.0 * left"),
     Mutant(
         "dynamics/integrators/guard", "return comes_through(time, 0.5 * h, h, FORESEEN, model, running)", "return False"

@@ -578,6 +578,21 @@ def test_a_step_in_which_lines_would_pass_is_cut():
         refweb.run(free_lines(speed=1e5, stiffness=1.0, duration=1e-5), progress=False)
 
 
+def test_a_look_leaves_no_more_open_than_lines_are_apart():
+    """Drifts take up what a look finds, so that it does for some; what is left is not above the distance of lines."""
+    system, times = free_lines(speed=0.1, gap=0.03, stiffness=0.1).build(), np.linspace(0.0, 0.5, 26)[1:]
+    solver = INTEGRATORS["central-difference"].integrator_of(
+        refweb.Dynamic(duration=0.5, safety=0.1), system, (), (), ()
+    )
+    left, apart = np.zeros((2, len(times)))
+    for n, time in enumerate(times):
+        course = solver.start()
+        solver.advance(course, [time])
+        ends = (system.net.points + course.x)[system.net.cells]
+        left[n], apart[n] = solver._model.guard.left[0], distance(*ends)
+    assert (left <= apart).all() and (left > 0.0).all() and apart.min() < 9e-3 and course.nsteps > 500
+
+
 def test_load_steps_are_not_certified():
     scene = strings()
     moved = scene.replace(

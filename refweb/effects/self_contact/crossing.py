@@ -27,7 +27,7 @@ MEETING = 1e-9
 """Distance at which centre lines meet, over that at which lines touch."""
 LOOKS = 200
 """Largest number of looks at the motion of a pair; one that is not decided by then counts as meeting."""
-AHEAD = 16.0
+AHEAD = 64.0
 """Number of ways that what is looked at in turn is chosen for."""
 TRAVEL = 0.2
 """Largest share of the distance of touch that lines may come nearer by in an implicit step, or half of what they are
@@ -122,7 +122,7 @@ def watch(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, me
     count = cells.shape[0]
     past, until, came = due[count], due[count + 1], False
     if past + way + room >= until:  # choose those whose turn comes soon
-        until, chosen[count] = past + AHEAD * (way + room), 0
+        until, chosen[count] = past + AHEAD * (way + room) if count else math.inf, 0
         for c in range(count):
             if due[c] <= until:
                 chosen[chosen[count]] = c
