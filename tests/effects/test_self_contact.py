@@ -536,6 +536,15 @@ def test_neighbours_that_swing_through_each_other_are_named(method, third):
     assert clear.passage["lines"] == "certified" and not clear.warnings
 
 
+@pytest.mark.parametrize("velocity", [0.75, 0.8, 0.9, 1.0])
+def test_neighbours_are_looked_at_when_their_turn_comes(velocity):
+    """Where a look at lines does for many small steps, neighbours that meet in one of them are told of in that one."""
+    told = refweb.run(swept(True, (0.0, -velocity, 0.0), safety=0.05), progress=False)
+    step = 0.2 / told.solver["nsteps"]
+    time = float(re.search(r"lines 0 and 1 came to lie on each other at t = (\S+) s", told.passage["lines"])[1])
+    assert 0.14 / velocity - 2.0 * step < time <= 0.14 / velocity + step and step < 2e-4
+
+
 def free_lines(method="central-difference", speed=1.0, gap=0.05, stiffness=1e4, duration=0.1, **solve):
     """Two lines of 1 m that float, crossed, of which the upper one comes down."""
     points = [(-0.5, 0, 0), (0.5, 0, 0), (0, -0.5, gap), (0, 0.5, gap)]
