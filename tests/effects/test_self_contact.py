@@ -602,6 +602,21 @@ def test_a_look_leaves_no_more_open_than_lines_are_apart():
     assert (left <= apart).all() and (left > 0.0).all() and apart.min() < 9e-3 and course.nsteps > 500
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_lines_that_are_parallel_to_rounding_push_each_other(seed):
+    """u × w is what rounding leaves, in any direction: no plane tells such lines apart. Equal lines exchange speeds."""
+    rng = np.random.default_rng(seed)
+    along, aside = np.linalg.qr(rng.normal(size=(3, 2)))[0].T
+    points = [0.0 * along, along, 0.3 * along - 0.02 * aside, 1.3 * along - 0.02 * aside]
+    scene = free_lines(stiffness=20.0, duration=0.2, safety=0.1)
+    lines = refweb.Inline(points=[p.tolist() for p in points], lines=[(0, 1), (2, 3)], supports=[])
+    speed = refweb.Velocity(node=[2, 3], value=tuple((0.3 * aside).tolist()))
+    solution = refweb.run(scene.replace(web=lines, effects=(scene.effects[0], speed)), progress=False)
+    assert solution.passage["lines"] == "certified" and solution.lines["overlap"] > 1e-4
+    ends = np.array(points) + solution.state.x
+    assert ((ends[2:] - ends[0]) @ aside < 0.0).all()  # where they came from
+
+
 def test_load_steps_are_not_certified():
     scene = strings()
     moved = scene.replace(

@@ -296,6 +296,8 @@ def covered(way, x, nearby, families):
         return False
     skin.depth, skin.used = depth, 0.0
     take_pairs(x, nearby, families)
+    for m in range(nearby.families.size):  # how deep the pairs are is not known before the next forces
+        item(families.outs, nearby.families[m])[:, 0] = math.inf
     return True
 
 

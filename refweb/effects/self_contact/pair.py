@@ -21,6 +21,9 @@ ENDS, RUBBING, APART = 5, 11, 13
 """First columns of the data of an element, behind the same but `OTHER`: reference positions of its nodes, μ and v_s,
 and numbers of the elements that it does not touch, being within the distance of touch along the net, −1 for none."""
 
+ROUNDING = 1e-15
+"""Error of a cross product over the lengths of its factors, at most."""
+
 
 class Place(NamedTuple):
     """Where a pair is: vectors u and w of both elements, p from the first node of the other to that of the first."""
@@ -69,15 +72,20 @@ def place_of(x, cells, data, c):
 
 @kernel(forceinline=True)
 def apart(place, touch):
-    """Whether a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to."""
+    """Whether a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to.
+
+    Of lines that are parallel to rounding u × w is what rounding leaves, in any direction: an error of `ROUNDING` |u||w|
+    is allowed for, by (a + b)² ≤ 1.01 a² + 101 b².
+    """
     p, u, w = place
+    uu, ww = dot(u, u), dot(w, w)
     m = p[0] + 0.5 * (u[0] - w[0]), p[1] + 0.5 * (u[1] - w[1]), p[2] + 0.5 * (u[2] - w[2])
     # within √2 touch of each other, and (a + b + c)² ≤ 3 (a² + b² + c²)
-    if dot(m, m) > 0.75 * (dot(u, u) + dot(w, w)) + 6.0 * touch * touch:
+    if dot(m, m) > 0.75 * (uu + ww) + 6.0 * touch * touch:
         return True
     n = cross(u, w)
     off = dot(p, n)
-    return off * off > touch * touch * dot(n, n)
+    return off * off > 1.01 * touch * touch * dot(n, n) + 101.0 * ROUNDING**2 * dot(p, p) * uu * ww
 
 
 @kernel(forceinline=True)
