@@ -74,7 +74,7 @@ def place_of(x, cells, data, c):
 def apart(place, touch):
     """Whether a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to.
 
-    Of lines that are parallel to rounding u × w is what rounding leaves, in any direction: an error of `ROUNDING` |u||w|
+    Of lines parallel to rounding u × w is what rounding leaves, in any direction. An error of `ROUNDING` |u||w|
     is allowed for, by (a + b)² ≤ 1.01 a² + 101 b².
     """
     p, u, w = place
