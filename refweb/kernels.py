@@ -200,19 +200,12 @@ def _compiled_once(dispatcher):
     return dispatcher
 
 
-class _OfSignature:
-    """A kernel of one signature, compiled where it is first called or listed: nobody asks for a tangent in vain."""
+class _Kernel:
+    """A kernel that numba sees where it is first called, listed or compiled into another: nobody asks for all."""
 
     def __init__(self, function, signature, options):
         self.py_func = function
-
-        def compiled(function):
-            dispatcher = _with_entry(function, options)
-            dispatcher.compile(signature)
-            dispatcher.disable_compile()
-            return dispatcher
-
-        self._compiled = functools.cache(lambda: _compile(compiled, function))
+        self._compiled = functools.cache(lambda: _compile(_with_body, function, signature, options))
 
     def __call__(self, *arguments):
         return self._compiled()(*arguments)
@@ -229,39 +222,48 @@ class _OfSignature:
         return self._compiled()
 
 
-def _with_entry(function, options):
+def _dispatcher(function, options, cache):
+    """A dispatcher that compiles `_alone`, with its machine code in a cache."""
     dispatcher: Any = numba.njit(**options)(function)
-    dispatcher._cache = (_CacheByName if function.__closure__ else _Cache)(function)
-    return _compiled_once(dispatcher)
+    dispatcher._cache = cache(function)
+    _compiled_once(dispatcher)
+    return dispatcher
 
 
-def _body(function, options):
+def _of_signature(dispatcher, signature):
+    """A dispatcher of one signature, where one is given."""
+    if signature is not None:
+        dispatcher.compile(signature)
+        dispatcher.disable_compile()
+    return dispatcher
+
+
+def _body(function, signature, options):
     bare = {**options, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    dispatcher: Any = numba.njit(**bare)(function)
-    dispatcher._cache = _CacheOfBodies(function)
-    return _compiled_once(dispatcher)
+    return _of_signature(_dispatcher(function, bare, _CacheOfBodies), signature)
 
 
-def _with_body(function, options):
-    """A kernel that Python and kernels may call: these its body alone, which is compiled apart.
+def _with_body(function, signature, options):
+    """A kernel that Python, lists and kernels may call: these its body alone, which is compiled apart.
 
     The entry from Python takes apart all that it is given: for kernels that take records of a hundred arrays it is two
     fifths of the time that the explicit loop takes to compile, and only the outermost of them is called from Python.
     What the entry takes apart it counts references to, also that of a leaf.
     """
-    dispatcher = _with_entry(function, {**options, "_nrt": True})
+    cache = _CacheByName if function.__closure__ else _Cache
+    dispatcher = _dispatcher(function, {**options, "_nrt": True}, cache)
     dispatcher._cache._impl = _Entry(function)
-    body = functools.cache(lambda: _compile(lambda function: _body(function, options), function))
+    body = functools.cache(lambda: _compile(_body, function, signature, options))
     dispatcher.get_call_template = lambda args, kws: body().get_call_template(args, kws)
     dispatcher.get_overload = lambda signature: body().get_overload(signature)
-    return dispatcher
+    return _of_signature(dispatcher, signature)
 
 
-def _compile(decorator, function) -> Any:
+def _compile(decorator, *arguments) -> Any:
     default = _config.CACHE_DIR
     _config.CACHE_DIR = _folder or default
     try:
-        return decorator(function)
+        return decorator(*arguments)
     finally:
         _config.CACHE_DIR = default
 
@@ -277,7 +279,7 @@ def _content(code):
 
 def _told(value):
     """What tells a captured value apart from all others, the same in every process."""
-    if not isinstance(value, Dispatcher | _OfSignature):
+    if not isinstance(value, Dispatcher | _Kernel):
         return repr(value)
     function = value.py_func
     return f"{function.__module__}.{function.__qualname__} {_content(function.__code__)}"
@@ -301,9 +303,7 @@ def kernel(signature=None, leaf=False, **options) -> Any:
     returns any, and has those in lists by `refweb.list_items.item` alone.
     """
     options = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True, "_nrt": not leaf, **options}
-    if signature is None:
-        return lambda function: _compile(lambda named: _with_body(named, options), _named(function))
-    return lambda function: _OfSignature(_named(function), signature, options)
+    return lambda function: _Kernel(_named(function), signature, options)
 
 
 def record(cls):
@@ -363,16 +363,18 @@ def sum_of(values):
 
 
 @functools.cache
-def _list_of(item):
-    @kernel()
-    def empty():
-        return numba.typed.List.empty_list(item)
+def _grown(item):
+    """What appends one item to a list of its type, and begins that where there is none; nothing for no item."""
+    kind = types.ListType(item)
 
-    @kernel(types.void(types.ListType(item), item))
-    def append(values, one):
-        values.append(one)
+    @kernel(kind(types.Optional(kind), types.Optional(item)))
+    def grown(values, one):
+        longer = numba.typed.List.empty_list(item) if values is None else values
+        if one is not None:
+            longer.append(one)
+        return longer
 
-    return empty, append
+    return grown
 
 
 def typed_list(item, values) -> Any:
@@ -381,8 +383,8 @@ def typed_list(item, values) -> Any:
     It is filled by compiled functions of explicit signature, whose machine code is kept on disk as well; numba's own
     list methods are compiled anew in every process.
     """
-    empty, append = _list_of(types.FunctionType(item) if isinstance(item, Signature) else item)
-    result = empty()
+    grown = _grown(types.FunctionType(item) if isinstance(item, Signature) else item)
+    result = grown(None, None)
     for value in values:
-        append(result, value.listed() if isinstance(value, _OfSignature) else value)
+        grown(result, value.listed() if isinstance(value, _Kernel) else value)
     return result

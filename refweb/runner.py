@@ -190,7 +190,7 @@ def _refine(scene, solution):
 
 def _before(kept, summary, system, versions):
     """Warnings of a run that goes on; refuses a checkpoint that is none of this system."""
-    known = {"row", "accuracy", "repeated", "missing", "shares", "run_time"}
+    known = {"row", "accuracy", "repeated", "missing", "shares", "run"}
     if not known <= kept.keys() or kept.get("positions", np.zeros(0)).shape != (system.rows, 3):
         raise InputError("checkpoint.npz is not that of a run that scene.toml leads to: use refweb run")
     yield from summary["warnings"]

@@ -107,6 +107,19 @@ def checkpoint(folder, name, remedy=""):
         raise InputError(f"{name} checkpoint.npz is not what a run of refweb writes ({reason})") from None
 
 
+def record_of(arrays):
+    """Arrays by name as one array, a record with a field for each: a file takes some 0.05 ms for an array."""
+    record = np.zeros((), [(name, array.dtype, array.shape) for name, array in arrays.items()])
+    for name, array in arrays.items():
+        record[name] = array
+    return record
+
+
+def fields_of(record):
+    """The arrays that `record_of` was given; numbers as arrays of no dimension."""
+    return {name: np.array(record[name]) for name in record.dtype.names}
+
+
 _STATE = ("positions", "displacements", "velocities", "bodies")
 
 

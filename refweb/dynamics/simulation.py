@@ -13,7 +13,7 @@ from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import Standing, follow
 from .history import Watch
-from .initial_state import Start, equilibrium, remarks_on, stored
+from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
 from .integrators.crossings import APART, BESIDE, THROUGH
 from .integrators.integrator import MAX_STEPS_PER_ROW, Course
 from .schedule import FEW_CORNERS, Schedule, blocks
@@ -228,8 +228,7 @@ class Simulation:
         """The course at its start, or where its checkpoint has it, and the number of the row ahead."""
         if self._kept is None:
             return self.integrator.start(*self.begin.motion), 0
-        own = {key.removeprefix("run_"): array for key, array in self._kept.items() if key.startswith("run_")}
-        course, row = self.integrator.load(own), int(self._kept["row"])
+        course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
         self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
@@ -303,7 +302,7 @@ class Simulation:
         if folder is None:
             self.solution.frames.append((number, state))
             return
-        kept = {f"run_{name}": array for name, array in self.integrator.save(course).items()}
+        kept = {"run": record_of(self.integrator.save(course))}
         kept |= {f"begin_{name}": array for name, array in self.begin._asdict().items() if array is not None}
         if self.begin_of_twin is not None:
             kept |= {f"twin_begin_{name}": array for name, array in zip("xv", self.begin_of_twin.motion, strict=True)}

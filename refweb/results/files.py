@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-import functools
+import itertools
 import os
 import pathlib
-import tempfile
+
+_numbers = itertools.count()
 
 
 def write_atomically(path, write):
     """Call ``write(file name)`` for a file beside ``path`` and move it there."""
-    handle, name = tempfile.mkstemp(prefix=".refweb-", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
+    name = path.with_name(f".refweb-{os.getpid()}-{next(_numbers)}{path.suffix}")
     try:
-        write(name)
-        os.chmod(name, 0o666 & ~_umask())
+        write(str(name))
         os.replace(name, path)
     except BaseException:
-        pathlib.Path(name).unlink(missing_ok=True)
+        name.unlink(missing_ok=True)
         raise
-
-
-@functools.cache
-def _umask():
-    """The process's mask of permissions, which can only be read by setting it."""
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask
 
 
 def write_text(path, text):

@@ -316,14 +316,15 @@ class Folder:
         """Add frames, each a row number and its time, to ``web.pvd``."""
         for row, time in frames:
             names = ["web", *(body.name for body in bodies)]
-            self._listed += [(time, part, name, f"frames/{name}_{row:06d}.vtu") for part, name in enumerate(names)]
+            self._listed += [
+                f'    <DataSet timestep="{number(time)}" group="" part="{part}" name={quoted(name)} '
+                f"file={quoted(f'frames/{name}_{row:06d}.vtu')}/>\n"
+                for part, name in enumerate(names)
+            ]
         self._list_frames()
 
     def _list_frames(self):
-        rows = "".join(
-            f'    <DataSet timestep="{number(time)}" group="" part="{part}" name={quoted(name)} file={quoted(path)}/>\n'
-            for time, part, name, path in self._listed
-        )
+        rows = "".join(self._listed)
         with self._written():
             write_text(
                 self.path / "web.pvd",

@@ -10,7 +10,7 @@ import tomli_w
 
 import refweb
 from refweb.__main__ import main
-from refweb.dynamics.initial_state import stored
+from refweb.dynamics.initial_state import fields_of, record_of, stored
 
 GRAVITY = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
 PULL = (0.3, 0.0, -2.0)
@@ -487,3 +487,18 @@ def test_a_folder_that_does_not_say_how_bodies_stood_is_refused(tmp_path):
     np.savez(path, **arrays)
     with pytest.raises(refweb.InputError, match='does not say which axes body "box" began with: run that again'):
         refweb.run(tumbler(tmp_path / "old"))
+
+
+def test_a_record_of_arrays_gives_them_back(tmp_path):
+    """Of any type and shape, without entries, of no dimension and of records, through a file without pickles."""
+    event = np.zeros(2, dtype=[("time", float), ("slot", int)])
+    event["time"] = np.inf, -0.0
+    given = {"x": np.arange(6.0).reshape(2, 3), "none": np.zeros((0, 1025)), "name": np.array("run"), "event": event}
+    given |= {"count": np.array(7), "held": np.array([True, False]), "few": event[:0]}
+    np.savez(tmp_path / "kept.npz", run=record_of(given))
+    with np.load(tmp_path / "kept.npz") as kept:
+        found = fields_of(kept["run"])
+    assert list(found) == list(given)
+    for name, array in given.items():
+        assert found[name].dtype == array.dtype and found[name].shape == array.shape
+        assert found[name].tobytes() == array.tobytes()

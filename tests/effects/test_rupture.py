@@ -244,7 +244,7 @@ def test_a_torn_run_resumes(tmp_path, method):
     with pytest.raises(KeyboardInterrupt):
         refweb.run(scene, out=killed, progress=stop)
     with np.load(killed / "checkpoint.npz") as kept:
-        assert len(kept["broken"]) and len(kept["run_broken_elements"]) == len(kept["broken"])
+        assert len(kept["broken"]) and len(kept["run"]["broken_elements"]) == len(kept["broken"])
     resumed = refweb.resume(killed)
     if method == "central-difference":
         assert (

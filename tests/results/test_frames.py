@@ -4,6 +4,7 @@ import gc
 import math
 import re
 import weakref
+import zlib
 
 import meshio
 import numpy as np
@@ -183,3 +184,16 @@ def test_meshio_reads_arrays_of_any_size(tmp_path, seed):
         np.testing.assert_array_equal(read.point_data[name], values)
     head = (tmp_path / "one.vtu").read_bytes().split(vtu_file.MARK)[0].decode()
     assert [int(offset) % 4 == 0 for offset in re.findall(r'offset="(\d+)"', head)] == [True] + 11 * [False]
+
+
+@pytest.mark.parametrize("what", ["digits", "repeated", "zeros", "mixed", "short"])
+def test_blocks_are_whole_however_they_are_compressed(what):
+    """Numbers whose digits are all their own are no more than 3 % longer than as zlib has them at the same level."""
+    random = np.random.default_rng(1)
+    digits, repeated = random.normal(size=4000), np.tile(random.normal(size=40), 100)
+    mixed = np.concatenate([digits, repeated])
+    values = {"digits": digits, "repeated": repeated, "zeros": np.zeros(4000), "mixed": mixed, "short": digits[:1]}
+    data = values[what].tobytes()
+    for cut in (None, 0, 1, 39):
+        assert zlib.decompress(vtu_file._compressed(data, cut)) == data
+    assert len(vtu_file._compressed(data)) <= 1.03 * len(zlib.compress(data, vtu_file.LEVEL))
