@@ -31,7 +31,7 @@ from ...kernels import INDICES, INTEGERS, MATRIX, MEETS, VECTOR, WATCH, kernel, 
 from ...list_items import item
 from ...net.rotation_bounds import beside_places
 from .crossings import APART, BESIDE, THROUGH, note_met
-from .nearby import goes_freely, near_of, spread_of
+from .nearby import WAY, goes_freely, near_of, spread_of
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
@@ -43,10 +43,9 @@ TOLD, KEPT_APART, FORESEEN = 0, 1, 2
 """Where lines would pass, they are told of, the drift is not taken, or the step is not begun and nothing is told of."""
 FEW = 16.0
 """Number of drifts that what is open does for, below which their ways are looked at more closely."""
-WAY = 2.0 * math.sqrt(3.0)
-"""Way by which two rows come nearer to each other, over that of the largest component, at most."""
-PAST, UNTIL, DUE = -3, -2, -1
-"""Numbers behind the turns of neighbours: way that rows have gone [m], up to which some are chosen, of the next."""
+PAST, DUE = -3, -1
+"""Numbers behind the turns of neighbours: way that rows have gone [m], and that of the next turn; between them is the
+way up to which some are chosen."""
 
 
 class Guard(NamedTuple):

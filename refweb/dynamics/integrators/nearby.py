@@ -40,6 +40,8 @@ KEPT_UP_TO = 0.7
 """Share of a skin around pairs that may be used up where a list is kept."""
 COVERED = 3
 """Number of steps whose ways are known before a list is made: peaks are looked for in that many."""
+WAY = 2.0 * math.sqrt(3.0)
+"""Way by which two rows come nearer to each other, over that of the largest component, at most."""
 SHARE = 0.999
 """Share of a skin that may be used up: the rest is for rounding."""
 SIGN = np.int64(0x7FFFFFFFFFFFFFFF)
@@ -191,17 +193,10 @@ def swap_pairs_of(pairs):
 @kernel()
 def take(x, nearby, families):
     """Swap the cells of all families for those within the skin at displacement x."""
+    depth = nearby.skin[0].depth
     for m in range(nearby.families.size):
-        nearby.swaps[m](
-            nearby.families[m],
-            m,
-            nearby.skin[0].depth,
-            x,
-            families.cells,
-            families.data,
-            families.outs,
-            families.stored,
-        )
+        i = nearby.families[m]
+        nearby.swaps[m](i, m, depth, x, families.cells, families.data, families.outs, families.stored)
 
 
 @kernel(leaf=True)
@@ -361,7 +356,7 @@ def follow_near(drift, x, v, bits, before, model):
     for d in range(driven.size):
         for k in range(3):
             way = max(way, abs(x[driven[d], k] - before[d, k]))
-    way *= 2.0 * math.sqrt(3.0)
+    way *= WAY
     if FEWEST * way > skin.widest and not driven.size:
         way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
     turned = 0.0

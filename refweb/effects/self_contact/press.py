@@ -95,8 +95,9 @@ def crossed(place, n, of):
     if not (room > 0.0 and nn > 0.0):
         return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
     first, other = math.sqrt(uu), math.sqrt(ww)
-    one = 1.0 / (nn * first * other)  # of three numbers by one division: those and roots are most of the time
-    inverse, short = one * first * other, one * nn
+    both = first * other
+    one = 1.0 / (nn * both)  # of three numbers by one division: those and roots are most of the time
+    inverse, short = one * both, one * nn
     room *= inverse
     half = math.sqrt(room * inverse)
     d, e = dot(u, p), dot(w, p)
@@ -135,12 +136,15 @@ def forces_of(place, of):
 
 @kernel(forceinline=True)
 def forces_near_ends(place, n, f, area, of):
-    """The same of a pair that overlaps near an end, or does not."""
+    """The same of a pair that overlaps near an end, or does not: lines may meet far from both segments."""
+    square = nearest(place.p, place.u, place.w)[2]
+    if square > (REACH * of.touch) ** 2:
+        return NOT_SEEN, NO_PUSH
     j, g0, g1, g2, g3 = overlap(place, of)
     if j == 0.0:
         return NOT_SEEN, NO_PUSH
     by_u, by_w = slopes_of_factor(place.u, place.w, n, f, area)
-    return max(of.touch - math.sqrt(max(nearest(place.p, place.u, place.w)[2], 0.0)), 0.0), (
+    return max(of.touch - math.sqrt(square), 0.0), (
         (j * by_u[0] - f * g0[0], j * by_u[1] - f * g0[1], j * by_u[2] - f * g0[2]),
         (-j * by_u[0] - f * g1[0], -j * by_u[1] - f * g1[1], -j * by_u[2] - f * g1[2]),
         (j * by_w[0] - f * g2[0], j * by_w[1] - f * g2[1], j * by_w[2] - f * g2[2]),
@@ -174,7 +178,9 @@ def energy_of(place, of):
     """Energy of a pair that may touch [J]."""
     n = cross(place.u, place.w)
     j = crossed(place, n, of)[0]
-    return angle_factor(n, of.length, of.other, of.touch)[0] * (j if j > 0.0 else overlap(place, of)[0])
+    if j == 0.0 and not nearest(place.p, place.u, place.w)[2] > (REACH * of.touch) ** 2:
+        j = overlap(place, of)[0]
+    return angle_factor(n, of.length, of.other, of.touch)[0] * j
 
 
 @kernel(forceinline=True)

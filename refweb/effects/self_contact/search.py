@@ -110,15 +110,19 @@ def strangers(a, b, cells, data):
 
 
 @kernel(forceinline=True)
-def near_each_other(reach, m, n, rows):
-    """Whether two elements are nearer than a reach, by their boxes first."""
-    d = rows[m, 0] - rows[n, 0], rows[m, 1] - rows[n, 1], rows[m, 2] - rows[n, 2]
+def boxes_meet(reach, m, n, rows):
+    """Whether the boxes of two elements are nearer than a reach."""
+    out = abs(rows[m, 0] - rows[n, 0]) > reach + abs(rows[m, 3]) + abs(rows[n, 3])
+    out |= abs(rows[m, 1] - rows[n, 1]) > reach + abs(rows[m, 4]) + abs(rows[n, 4])  # three looks and one branch
+    out |= abs(rows[m, 2] - rows[n, 2]) > reach + abs(rows[m, 5]) + abs(rows[n, 5])
+    return not out
+
+
+@kernel(forceinline=True)
+def segments_meet(reach, m, n, rows):
+    """Whether two elements are nearer than a reach."""
     g, h = (rows[m, 3], rows[m, 4], rows[m, 5]), (rows[n, 3], rows[n, 4], rows[n, 5])
-    out = abs(d[0]) > reach + abs(g[0]) + abs(h[0])
-    out |= abs(d[1]) > reach + abs(g[1]) + abs(h[1])  # three looks and one branch
-    out |= abs(d[2]) > reach + abs(g[2]) + abs(h[2])
-    if out:
-        return False
+    d = rows[m, 0] - rows[n, 0], rows[m, 1] - rows[n, 1], rows[m, 2] - rows[n, 2]
     p = d[0] - g[0] + h[0], d[1] - g[1] + h[1], d[2] - g[2] + h[2]
     u, w = (2.0 * g[0], 2.0 * g[1], 2.0 * g[2]), (2.0 * h[0], 2.0 * h[1], 2.0 * h[2])
     return nearest(p, u, w)[2] < reach * reach
@@ -152,12 +156,13 @@ def fill(reach, count, start, order, rows, cells, data, found):
             ranges[0, 0] = m + 1
             for part in range(beside):
                 for n in range(ranges[part, 0], ranges[part, 1]):
-                    if near_each_other(reach, m, n, rows):
-                        a, b = min(order[m], order[n]), max(order[m], order[n])
-                        if strangers(a, b, cells, data):
-                            if amount < found.shape[0]:
-                                found[amount, 0], found[amount, 1] = a, b
-                            amount += 1
+                    if not boxes_meet(reach, m, n, rows):
+                        continue
+                    a, b = min(order[m], order[n]), max(order[m], order[n])
+                    if strangers(a, b, cells, data) and segments_meet(reach, m, n, rows):
+                        if amount < found.shape[0]:
+                            found[amount, 0], found[amount, 1] = a, b
+                        amount += 1
     return amount
 
 

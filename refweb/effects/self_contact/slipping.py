@@ -17,10 +17,11 @@ spread to the nodes as s takes their velocities, so that it keeps momentum and a
 line take no moment about it, so friction has none either: lines turn freely about themselves, and one that is wound
 around a straight line is held no more than over a pulley that turns, whatever μ is. A friction that held it would have
 to leave the moment 2 r F of each contact to a torsion that elements without thickness do not have, and would brake nets
-that turn as a whole. N is the push of the
-overlap, whatever damping adds to it. Lines that lie along each other slide along themselves alone: across, such lines
-roll, as nothing resists their turning about themselves. 1 + `ALIKE` c²/(L L'), of the distance of touch c, stands for
-the ones of G, so that this is the limit.
+that turn as a whole.
+
+N is the push of the overlap, whatever damping adds to it. Lines that lie along each other slide along themselves alone:
+across, such lines roll, as nothing resists their turning about themselves. 1 + `ALIKE` c²/(L L'), of the distance of
+touch c, stands for the ones of G, so that this is the limit.
 
 In explicit kicks friction is solved for contact by contact, see `refweb.effects.kicks`, along the two directions
 between which J M⁻¹ Jᵀ has no mixed term. Tangents of N by differences steer iterations of implicit methods alone.

@@ -45,24 +45,28 @@ SHORT = 1e-9
 
 
 @kernel(forceinline=True)
-def step_of(x):
-    """(S, S', S'') at x."""
-    if x <= -1.0:
-        return 0.0, 0.0, 0.0
-    if x >= 1.0:
-        return 1.0, 0.0, 0.0
-    return 0.5 + x * (0.75 - 0.25 * x * x), 0.75 * (1.0 - x * x), -1.5 * x
+def step_at(x):
+    """(S, S') at x, without a branch."""
+    x = min(max(x, -1.0), 1.0)
+    return 0.5 + x * (0.75 - 0.25 * x * x), 0.75 - 0.75 * x * x
+
+
+@kernel(forceinline=True)
+def bend_at(x):
+    """S'' at x."""
+    return -1.5 * x if abs(x) < 1.0 else 0.0
 
 
 @kernel(forceinline=True)
 def along(p, u, w):
-    """(M, ŵ, y, y', p − y ŵ, and its derivative) at the first node of u, p being that from the first node of w."""
+    """(M, 1/M, ŵ, y, y', p − y ŵ, and its derivative) at the first node of u, p being that from the first node of w."""
     length = math.sqrt(dot(w, w))
-    unit = w[0] / length, w[1] / length, w[2] / length
+    short = 1.0 / length
+    unit = short * w[0], short * w[1], short * w[2]
     y, rate = dot(p, unit), dot(u, unit)
     across = p[0] - y * unit[0], p[1] - y * unit[1], p[2] - y * unit[2]
     turn = u[0] - rate * unit[0], u[1] - rate * unit[1], u[2] - rate * unit[2]
-    return length, unit, y, rate, across, turn
+    return length, short, unit, y, rate, across, turn
 
 
 @kernel()
@@ -96,15 +100,8 @@ def pieces(length, y, rate, across, turn, touch):
 
 
 @kernel(forceinline=True)
-def step_at(x):
-    """(S, S') at x, without a branch."""
-    x = min(max(x, -1.0), 1.0)
-    return 0.5 + x * (0.75 - 0.25 * x * x), 0.75 - 0.75 * x * x
-
-
-@kernel(forceinline=True)
 def with_point(sums, q, weight, of_depth, of_place):
-    """Sums over Gauss points with another at q: of I, of half its pulls, and of its slopes along the other element."""
+    """Sums over Gauss points with another at q: of I, of W (c² − D) times 1, q and q², and of e times slopes of W."""
     deep, place = of_depth[0] - q * (of_depth[1] + q * of_depth[2]), of_place[0] + q * of_place[1]
     (near, rise), (far, fall) = step_at(place), step_at(place - of_place[2])
     pull = weight * deep * (near - far)
@@ -134,7 +131,7 @@ def first(p, u, w, touch):
     zero = (0.0, 0.0, 0.0)
     if not dot(w, w) > (SHORT * touch) ** 2:
         return 0.0, zero, zero, zero
-    length, unit, y0, rate, across, turn = along(p, u, w)
+    length, short, unit, y0, rate, across, turn = along(p, u, w)
     count, ends = pieces(length, y0, rate, across, turn, touch)
     if count == 0:
         return 0.0, zero, zero, zero
@@ -151,7 +148,7 @@ def first(p, u, w, touch):
         sums = with_point(sums, low + PLACES[3] * span, WEIGHTS[3] * span, quadratic, rates)
     total, pull0, pull1, pull2, tilt0, tilt1, end = sums
     pull0, pull1, pull2 = -4.0 * pull0, -4.0 * pull1, -4.0 * pull2
-    tilt0, tilt1, end, short = inverse * tilt0, inverse * tilt1, inverse * end, 1.0 / length
+    tilt0, tilt1, end = inverse * tilt0, inverse * tilt1, inverse * end
     a, b = short * (tilt0 - y * pull0 - rate * pull1), short * (tilt1 - y * pull1 - rate * pull2)
     x0, z0 = pull0 * d[0] + pull1 * turn[0] + tilt0 * unit[0], pull1 * d[0] + pull2 * turn[0] + tilt1 * unit[0]
     x1, z1 = pull0 * d[1] + pull1 * turn[1] + tilt0 * unit[1], pull1 * d[1] + pull2 * turn[1] + tilt1 * unit[1]
@@ -185,7 +182,7 @@ def add_second(p, u, w, touch, scale, definite, order, block):
     """
     if not dot(w, w) > (SHORT * touch) ** 2:
         return
-    length, unit, y0, rate, across, turn = along(p, u, w)
+    length, short, unit, y0, rate, across, turn = along(p, u, w)
     count, ends = pieces(length, y0, rate, across, turn, touch)
     for k in range(count):
         low, span = ends[k], ends[k + 1] - ends[k]
@@ -193,31 +190,32 @@ def add_second(p, u, w, touch, scale, definite, order, block):
             s = low + span * PLACES[point]
             weight, y = scale * span * WEIGHTS[point], y0 + s * rate
             d = across[0] + s * turn[0], across[1] + s * turn[1], across[2] + s * turn[2]
-            deep, part = touch * touch - dot(d, d), y / length
-            near, far = step_of(y / touch), step_of((y - length) / touch)
+            deep, part = touch * touch - dot(d, d), short * y
+            place, past = y / touch, (y - length) / touch
+            near, far = step_at(place), step_at(past)
             own, e, steep = weight * (near[0] - far[0]), deep * deep, -2.0 * deep
             by_y, by_m = weight * (near[1] - far[1]) / touch, weight * far[1] / touch
-            yy, mm = weight * (near[2] - far[2]) / touch**2, -weight * far[2] / touch**2
+            yy, mm = weight * (bend_at(place) - bend_at(past)) / touch**2, -weight * bend_at(past) / touch**2
             if definite:
                 e = steep = 0.0
             of_p, of_w = (1.0 - s, s, -1.0, 0.0), (0.0, 0.0, -1.0, 1.0)
             for i in range(3):
                 for j in range(3):
                     # ∇y = (ŵ, d/M), ∇M = (0, ŵ), ∇D = (2 d, −2 τ d), each for p and for w
-                    y_p, y_w, d_p, d_w = unit[i], d[i] / length, 2.0 * d[i], -2.0 * part * d[i]
-                    z_p, z_w, e_p, e_w = unit[j], d[j] / length, 2.0 * d[j], -2.0 * part * d[j]
+                    y_p, y_w, d_p, d_w = unit[i], short * d[i], 2.0 * d[i], -2.0 * part * d[i]
+                    z_p, z_w, e_p, e_w = unit[j], short * d[j], 2.0 * d[j], -2.0 * part * d[j]
                     flat = (1.0 if i == j else 0.0) - unit[i] * unit[j]
                     slope, mixed = own * steep, by_y * steep
                     pp = yy * e * y_p * z_p + mixed * (y_p * e_p + d_p * z_p) + 2.0 * own * d_p * e_p
                     pp += 2.0 * slope * flat
                     pw = yy * e * y_p * z_w + mixed * (y_p * e_w + d_p * z_w) + 2.0 * own * d_p * e_w
-                    pw += (-mm * e * y_p + by_m * steep * d_p) * unit[j] + by_y * e * flat / length
-                    pw -= 2.0 * slope * (unit[i] * d[j] / length + part * flat)
+                    pw += (-mm * e * y_p + by_m * steep * d_p) * unit[j] + by_y * e * short * flat
+                    pw -= 2.0 * slope * (unit[i] * short * d[j] + part * flat)
                     ww = yy * e * y_w * z_w + mixed * (y_w * e_w + d_w * z_w) + 2.0 * own * d_w * e_w
                     ww += mm * e * (unit[i] * unit[j] - y_w * unit[j] - unit[i] * z_w)
-                    ww += by_m * (steep * (d_w * unit[j] + unit[i] * e_w) + e * flat / length)
-                    bent = (unit[i] * d[j] + d[i] * unit[j]) / length
-                    ww -= by_y * e * (bent + part * flat) / length
+                    ww += by_m * (steep * (d_w * unit[j] + unit[i] * e_w) + e * short * flat)
+                    bent = (unit[i] * d[j] + d[i] * unit[j]) * short
+                    ww -= by_y * e * (bent + part * flat) * short
                     ww += 2.0 * slope * (part * bent + part * part * flat - y_w * z_w)
                     add_product(block, of_p, of_p, pp, i, j, order)
                     add_product(block, of_p, of_w, pw, i, j, order)
