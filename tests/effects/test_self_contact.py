@@ -105,6 +105,16 @@ def test_forces_are_the_gradient_and_keep_momenta():
         assert np.abs(np.cross(pair.points + x, force).sum(axis=0)).max() <= 1e-14 * size
 
 
+@pytest.mark.parametrize("beyond, height", [(0.25, 0.05), (0.12, 0.17), (0.15, 0.19), (0.19, 0.19)])
+def test_what_reaches_past_an_end_pushes_further_than_lines_are_thick(beyond, height):
+    """Segments that are apart by up to √2 of the distance of touch have an energy; differences of 1e-6 as above."""
+    pair = Pair(lines(1.3, height, 0.5 + beyond))
+    force, deep = pair.force()
+    assert deep == 0.0 and pair.energy() > 0.0
+    found = by_differences(pair.energy, REST, 1e-6)
+    np.testing.assert_allclose(found, -force.ravel(), atol=1e-5 * np.abs(force).max())
+
+
 def test_tangents_are_those_of_the_forces():
     for pair, x, v in some_pairs():
         stiffness = pair.tangent(press.stiffness, x, v)
