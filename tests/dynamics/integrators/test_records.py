@@ -84,6 +84,7 @@ def test_aligned_copies_begin_with_a_line_of_the_cache(shape):
     for first in range(3):
         values = whole[first : first + np.prod(shape, dtype=int)].reshape(shape)
         copy = aligned(values)
-        assert (not copy.size or copy.ctypes.data % LINE == 0) and copy.dtype == values.dtype and copy.flags.c_contiguous
+        assert not copy.size or copy.ctypes.data % LINE == 0
+        assert copy.dtype == values.dtype and copy.flags.c_contiguous
         np.testing.assert_array_equal(copy, values)
         assert not np.shares_memory(copy, whole)
