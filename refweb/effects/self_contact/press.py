@@ -47,25 +47,50 @@ NO_PUSH = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
 @kernel(forceinline=True)
-def overlap(place, of):
-    """(J, its gradients by the nodes), E = f J; the gradients are in the order of the pair."""
-    p, u, w = place
-    one, a, b, d = first(p, u, w, of.touch)
-    other, e, g, h = first((-p[0], -p[1], -p[2]), w, u, of.touch)
+def overlap(p, u, w, n, s, t, of):
+    """(J, its slopes by ½ p·p, p·u, p·w, ½ u·u, u·w and ½ w·w), E = f J, see `first`."""
+    uu, uw, ww, nn, pp, pu, pw = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, p), dot(p, u), dot(p, w)
+    one, a = first(pp, pu, pw, uw, ww, nn, s, t, of.touch)
+    other, b = first(pp, -pw, -pu, uw, uu, nn, t, s, of.touch)
     own, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.other
-    first_node = (
-        own * a[0] - more * (e[0] + g[0] + h[0]),
-        own * a[1] - more * (e[1] + g[1] + h[1]),
-        own * a[2] - more * (e[2] + g[2] + h[2]),
+    return own * one + more * other, (
+        own * a[0] + more * b[0],
+        own * a[1] - more * b[2],
+        own * a[2] - more * b[1],
+        own * a[3] + more * b[5],
+        own * a[4] + more * b[4],
+        own * a[5] + more * b[3],
     )
-    second = own * b[0] + more * h[0], own * b[1] + more * h[1], own * b[2] + more * h[2]
-    third = (
-        more * e[0] - own * (a[0] + b[0] + d[0]),
-        more * e[1] - own * (a[1] + b[1] + d[1]),
-        more * e[2] - own * (a[2] + b[2] + d[2]),
+
+
+@kernel(forceinline=True)
+def to_nodes(p, u, w, s, t, slopes):
+    """Gradients by the four nodes of what has such slopes."""
+    a, b, c, d, e, g = slopes
+    by_p = a * p[0] + b * u[0] + c * w[0], a * p[1] + b * u[1] + c * w[1], a * p[2] + b * u[2] + c * w[2]
+    by_u = (
+        b * p[0] + d * u[0] + e * w[0] + s * by_p[0],
+        b * p[1] + d * u[1] + e * w[1] + s * by_p[1],
+        b * p[2] + d * u[2] + e * w[2] + s * by_p[2],
     )
-    last = more * g[0] + own * d[0], more * g[1] + own * d[1], more * g[2] + own * d[2]
-    return own * one + more * other, first_node, second, third, last
+    by_w = (
+        c * p[0] + e * u[0] + g * w[0] - t * by_p[0],
+        c * p[1] + e * u[1] + g * w[1] - t * by_p[1],
+        c * p[2] + e * u[2] + g * w[2] - t * by_p[2],
+    )
+    return (
+        (by_p[0] - by_u[0], by_p[1] - by_u[1], by_p[2] - by_u[2]),
+        by_u,
+        (-by_p[0] - by_w[0], -by_p[1] - by_w[1], -by_p[2] - by_w[2]),
+        by_w,
+    )
+
+
+@kernel(forceinline=True)
+def between(place, s, t):
+    """Vector from the share t of the other element to the share s of the first."""
+    p, u, w = place
+    return p[0] + s * u[0] - t * w[0], p[1] + s * u[1] - t * w[1], p[2] + s * u[2] - t * w[2]
 
 
 @kernel(forceinline=True)
@@ -137,19 +162,16 @@ def forces_of(place, of):
 @kernel(forceinline=True)
 def forces_near_ends(place, n, f, area, of):
     """The same of a pair that overlaps near an end, or does not: lines may meet far from both segments."""
-    square = nearest(place.p, place.u, place.w)[2]
+    s, t, square = nearest(place.p, place.u, place.w)
     if square > (REACH * of.touch) ** 2:
         return NOT_SEEN, NO_PUSH
-    j, g0, g1, g2, g3 = overlap(place, of)
+    p, u, w = between(place, s, t), place.u, place.w
+    j, (a, b, c, d, e, g) = overlap(p, u, w, n, s, t, of)
     if j == 0.0:
         return NOT_SEEN, NO_PUSH
-    by_u, by_w = slopes_of_factor(place.u, place.w, n, f, area)
-    return max(of.touch - math.sqrt(square), 0.0), (
-        (j * by_u[0] - f * g0[0], j * by_u[1] - f * g0[1], j * by_u[2] - f * g0[2]),
-        (-j * by_u[0] - f * g1[0], -j * by_u[1] - f * g1[1], -j * by_u[2] - f * g1[2]),
-        (j * by_w[0] - f * g2[0], j * by_w[1] - f * g2[1], j * by_w[2] - f * g2[2]),
-        (-j * by_w[0] - f * g3[0], -j * by_w[1] - f * g3[1], -j * by_w[2] - f * g3[2]),
-    )
+    f, turn = -f, -j / (f * area * area)
+    e, d, g = f * e - turn * dot(u, w), f * d + turn * dot(w, w), f * g + turn * dot(u, u)
+    return max(of.touch - math.sqrt(square), 0.0), to_nodes(p, u, w, s, t, (f * a, f * b, f * c, d, e, g))
 
 
 @kernel(forceinline=True)
@@ -178,8 +200,10 @@ def energy_of(place, of):
     """Energy of a pair that may touch [J]."""
     n = cross(place.u, place.w)
     j = crossed(place, n, of)[0]
-    if j == 0.0 and not nearest(place.p, place.u, place.w)[2] > (REACH * of.touch) ** 2:
-        j = overlap(place, of)[0]
+    if j == 0.0:
+        s, t, square = nearest(place.p, place.u, place.w)
+        if not square > (REACH * of.touch) ** 2:
+            j = overlap(between(place, s, t), place.u, place.w, n, s, t, of)[0]
     return angle_factor(n, of.length, of.other, of.touch)[0] * j
 
 
@@ -260,10 +284,13 @@ def add_all_second(x, cells, data, c, definite, block):
     add_second(back, w, u, of.touch, half * of.other, definite, (2, 3, 0, 1), block)
     if definite:
         return
-    j, g0, g1, g2, g3 = overlap(place, of)
-    slopes = np.empty((4, 3))
-    for k in range(3):
-        slopes[0, k], slopes[1, k], slopes[2, k], slopes[3, k] = g0[k], g1[k], g2[k], g3[k]
+    s, t, _ = nearest(p, u, w)
+    q = between(place, s, t)
+    j, by_products = overlap(q, u, w, n, s, t, of)
+    by_nodes, slopes = to_nodes(q, u, w, s, t, by_products), np.empty((4, 3))
+    for m in range(4):
+        for k in range(3):
+            slopes[m, k] = by_nodes[m][k]
     by_u, by_w = slopes_of_factor(u, w, n, f, area)
     add_turning(block, place, j, slopes, by_u, by_w, f, area)
 

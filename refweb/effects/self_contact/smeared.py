@@ -69,20 +69,26 @@ def along(p, u, w):
     return length, short, unit, y, rate, across, turn
 
 
-@kernel()
-def pieces(length, y, rate, across, turn, touch):
-    """(Number of the pieces on which the integrand is a polynomial, their ends).
+@kernel(forceinline=True)
+def comes_near(quadratic):
+    """Whether c² − D, by its numbers, see `pieces`, may be above 0 within a length of 1 to either side."""
+    deep, half, square = quadratic
+    return deep > 0.0 or (deep + 2.0 * abs(half) > 0.0 and half * half + square * deep > 0.0)
 
-    They are handed over as numbers: a call that takes an array counts references to it, as long as a piece takes.
+
+@kernel()
+def pieces(low, high, length, y, rate, quadratic, touch):
+    """(Number of the pieces of low to high on which the integrand is a polynomial, their ends).
+
+    There y + s rate is how far along the other element a point is, and the three numbers of ``quadratic`` are a, b and
+    c of c² − D = a − 2 b s − c s². Ends are handed over as numbers: a call that takes an array counts references to
+    it, as long as a piece takes.
     """
-    square, half, over = dot(turn, turn), dot(across, turn), dot(across, across) - touch * touch
-    root = half * half - square * over
-    if root <= 0.0 and over >= 0.0:
-        return 0, NOWHERE
-    low, high = 0.0, 1.0
+    deep, half, square = quadratic
+    root = half * half + square * deep
     if square > 0.0:
         q = -(half + math.copysign(math.sqrt(max(root, 0.0)), half))
-        one, other = q / square, (over / q if q != 0.0 else math.inf)
+        one, other = q / square, (-deep / q if q != 0.0 else math.inf)
         low, high = max(low, min(one, other)), min(high, max(one, other))
     if not low < high:
         return 0, NOWHERE
@@ -100,10 +106,10 @@ def pieces(length, y, rate, across, turn, touch):
 
 
 @kernel(forceinline=True)
-def with_point(sums, q, weight, of_depth, of_place):
+def with_point(sums, q, weight, quadratic, y, rate, length):
     """Sums over Gauss points with another at q: of I, of W (c² − D) times 1, q and q², and of e times slopes of W."""
-    deep, place = of_depth[0] - q * (of_depth[1] + q * of_depth[2]), of_place[0] + q * of_place[1]
-    (near, rise), (far, fall) = step_at(place), step_at(place - of_place[2])
+    deep, place = quadratic[0] - q * (2.0 * quadratic[1] + q * quadratic[2]), y + q * rate
+    (near, rise), (far, fall) = step_at(place), step_at(place - length)
     pull = weight * deep * (near - far)
     energy = weight * deep * deep
     tilt = energy * (rise - fall)
@@ -119,51 +125,41 @@ def with_point(sums, q, weight, of_depth, of_place):
 
 
 @kernel()
-def first(p, u, w, touch):
-    """(I, its gradients by the two nodes of the first element and by the second node of the other).
+def first(pp, pu, pw, uw, ww, nn, s, t, touch):
+    """(I, its slopes by ½ p·p, p·u, p·w, ½ u·u, u·w and ½ w·w), the products of vectors and nn = |u × w|².
 
-    That by the first node of the other is the negative of their sum. p is the first node of the first element from the
-    first node of the other.
+    p is from the point at the share t of the other element to that at the share s of the first; any two will do, and
+    where both are near each other nothing cancels. With q the place from there on, I depends on the products by
 
-    With q the place from the middle of what overlaps, and d there, ∂I is the integral of −4 W (c² − D) (d + q d')
-    and of e ∂W, so that sums over Gauss points of these, times 1, q and q², are all that it takes.
+        y = t M + p·ŵ + q u·ŵ,      D = p·p − (p·ŵ)² + 2 q (p·u − p·ŵ u·ŵ) + q² (u·u − (u·ŵ)²),
+
+    and on M itself, so that sums over Gauss points of W (c² − D), times 1, q and q², and of e ∂W are all that it takes:
+    no vector is.
     """
-    zero = (0.0, 0.0, 0.0)
-    if not dot(w, w) > (SHORT * touch) ** 2:
-        return 0.0, zero, zero, zero
-    length, short, unit, y0, rate, across, turn = along(p, u, w)
-    count, ends = pieces(length, y0, rate, across, turn, touch)
+    zero, times_ww = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ((touch * touch - pp) * ww + pw * pw, pu * ww - pw * uw, nn)
+    if not (ww > (SHORT * touch) ** 2 and comes_near(times_ww)):
+        return 0.0, zero
+    length = math.sqrt(ww)
+    short, inverse = 1.0 / length, 1.0 / touch
+    z, rate, unit = short * pw, short * uw, short * short
+    quadratic, y = (unit * times_ww[0], unit * times_ww[1], unit * nn), t * length + z
+    count, ends = pieces(-s, 1.0 - s, length, y, rate, quadratic, touch)
     if count == 0:
-        return 0.0, zero, zero, zero
-    middle, inverse = 0.5 * (ends[0] + ends[count]), 1.0 / touch
-    d = across[0] + middle * turn[0], across[1] + middle * turn[1], across[2] + middle * turn[2]
-    y, room, half, square = y0 + middle * rate, touch * touch - dot(d, d), 2.0 * dot(d, turn), dot(turn, turn)
-    quadratic, rates = (room, half, square), (inverse * y, inverse * rate, inverse * length)
+        return 0.0, zero
+    along, change, span_of_w = inverse * y, inverse * rate, inverse * length
     sums = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(count):
-        low, span = ends[n] - middle, ends[n + 1] - ends[n]
-        sums = with_point(sums, low + PLACES[0] * span, WEIGHTS[0] * span, quadratic, rates)
-        sums = with_point(sums, low + PLACES[1] * span, WEIGHTS[1] * span, quadratic, rates)
-        sums = with_point(sums, low + PLACES[2] * span, WEIGHTS[2] * span, quadratic, rates)
-        sums = with_point(sums, low + PLACES[3] * span, WEIGHTS[3] * span, quadratic, rates)
+        low, span = ends[n], ends[n + 1] - ends[n]
+        sums = with_point(sums, low + PLACES[0] * span, WEIGHTS[0] * span, quadratic, along, change, span_of_w)
+        sums = with_point(sums, low + PLACES[1] * span, WEIGHTS[1] * span, quadratic, along, change, span_of_w)
+        sums = with_point(sums, low + PLACES[2] * span, WEIGHTS[2] * span, quadratic, along, change, span_of_w)
+        sums = with_point(sums, low + PLACES[3] * span, WEIGHTS[3] * span, quadratic, along, change, span_of_w)
     total, pull0, pull1, pull2, tilt0, tilt1, end = sums
     pull0, pull1, pull2 = -4.0 * pull0, -4.0 * pull1, -4.0 * pull2
     tilt0, tilt1, end = inverse * tilt0, inverse * tilt1, inverse * end
-    a, b = short * (tilt0 - y * pull0 - rate * pull1), short * (tilt1 - y * pull1 - rate * pull2)
-    x0, z0 = pull0 * d[0] + pull1 * turn[0] + tilt0 * unit[0], pull1 * d[0] + pull2 * turn[0] + tilt1 * unit[0]
-    x1, z1 = pull0 * d[1] + pull1 * turn[1] + tilt0 * unit[1], pull1 * d[1] + pull2 * turn[1] + tilt1 * unit[1]
-    x2, z2 = pull0 * d[2] + pull1 * turn[2] + tilt0 * unit[2], pull1 * d[2] + pull2 * turn[2] + tilt1 * unit[2]
-    rest = 1.0 - middle
-    return (
-        total,
-        (rest * x0 - z0, rest * x1 - z1, rest * x2 - z2),
-        (middle * x0 + z0, middle * x1 + z1, middle * x2 + z2),
-        (
-            a * d[0] + b * turn[0] + end * unit[0],
-            a * d[1] + b * turn[1] + end * unit[1],
-            a * d[2] + b * turn[2] + end * unit[2],
-        ),
-    )
+    by_z, by_rate = tilt0 - z * pull0 - rate * pull1, tilt1 - z * pull1 - rate * pull2
+    by_length = (end + t * tilt0) * length - z * by_z - rate * by_rate
+    return total, (pull0, pull1, short * by_z, pull2, short * by_rate, unit * by_length)
 
 
 @kernel(forceinline=True)
@@ -183,7 +179,10 @@ def add_second(p, u, w, touch, scale, definite, order, block):
     if not dot(w, w) > (SHORT * touch) ** 2:
         return
     length, short, unit, y0, rate, across, turn = along(p, u, w)
-    count, ends = pieces(length, y0, rate, across, turn, touch)
+    quadratic = touch * touch - dot(across, across), dot(across, turn), dot(turn, turn)
+    if not comes_near(quadratic):
+        return
+    count, ends = pieces(0.0, 1.0, length, y0, rate, quadratic, touch)
     for k in range(count):
         low, span = ends[k], ends[k + 1] - ends[k]
         for point in range(4):
