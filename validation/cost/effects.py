@@ -8,8 +8,9 @@ and peaks, without files and without a twin. CPU time, minimum of several warm r
 thread. Steps are as each scene has them.
 
 Of lines that touch lines there are the nanoseconds of a candidate, a pair that does not touch, and of one that does.
-The folded net is the worst there is: each line of one layer lies across lines of the other, some thousand pairs at
-once, with the lines 20 mm thick that are 100 mm long, and with 2 mm.
+Each line of one layer of a folded net lies across lines of the other, some thousand pairs at once, with lines 20 mm
+thick that are 100 mm long, and with 2 mm. A net that is folded onto itself, each line on its like, is the worst there
+is: each element touches seven of the other layer, and along the whole of one.
 
 What is never executed costs nothing: valgrind counts the instructions of the plain web's steps and rows, once with the
 package as it is and once with a copy of it in which every module that this run has not loaded is deleted, all effects
@@ -161,19 +162,23 @@ def on_a_table():
     return {name: Scene.from_dict(one) for name, one in scene.items()}
 
 
-def folded(folder, radius, size=24, side=0.1):
-    """A net folded in two along a line that is none of its own, the layers 1.6 radii apart, and the same untouched."""
+def folded(folder, radius, gap=1.6, onto=False, size=24, side=0.1):
+    """A net folded in two, its layers some radii apart, and the same untouched.
+
+    It is folded along a line that is none of its own, or ``onto`` itself, so that each line lies on another.
+    """
     points = np.array([(side * i, side * j, 0.0) for i in range(size + 1) for j in range(size + 1)])
     numbers = np.arange((size + 1) ** 2).reshape(size + 1, size + 1)
     pairs = ((numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:]))
-    across = np.array([1.0, -0.3, 0.0]) / np.hypot(1.0, 0.3)
-    over = (points - [0.5 * size * side + 0.037, 0.5 * size * side, 0.0]) @ across
+    across = np.array([1.0, 0.0 if onto else -0.3, 0.0]) / np.hypot(1.0, 0.0 if onto else 0.3)
+    over = (points - [0.5 * size * side + (0.0 if onto else 0.037), 0.5 * size * side, 0.0]) @ across
     places = 0.98 * (points - 2.0 * np.outer(np.maximum(over, 0.0), across))
-    places[:, 2] = np.where(over > 0.0, 1.6 * radius, 0.0)
-    path = pathlib.Path(folder) / f"folded_{radius:g}.csv"
+    places[:, 2] = np.where(over > 0.0, gap * radius, 0.0)
+    path = pathlib.Path(folder) / f"folded_{radius:g}_{gap:g}_{onto}.csv"
     np.savetxt(path, places, delimiter=",", header="x,y,z", comments="")
     plain = PLAIN | {
-        "title": f"a net folded in two, radius {1e3 * radius:g} mm",
+        "title": f"a net folded {'onto itself' if onto else 'in two'}, radius {1e3 * radius:g} mm"
+        + ("" if gap < 2.0 else ", apart"),
         "web": {
             "kind": "inline",
             "points": points.tolist(),
@@ -285,13 +290,12 @@ def main():
     above = 0
     with tempfile.TemporaryDirectory() as folder:
         groups = {"square web, thrown": scenes(folder), "web on a table": on_a_table()}
-        for radius in (1e-2, 1e-3):
-            some = folded(folder, radius)
-            groups |= {some["plain"].title: some}
+        for radius, gap, onto in ((1e-2, 1.6, False), (1e-3, 1.6, False), (1e-3, 1.6, True), (1e-3, 2.2, True)):
+            some = folded(folder, radius, gap, onto)
+            title = some["plain"].title
+            groups |= {title: some}
             pairs, touching, push, apart = of_pairs(some["self contact"])
-            print(
-                f"{some['plain'].title}: {pairs} pairs, of which {touching} touch, {push:.0f} ns; apart {apart:.0f} ns"
-            )
+            print(f"{title}: {pairs} pairs, of which {touching} touch, {push:.0f} ns; apart {apart:.0f} ns")
         for title, some in groups.items():
             print(f"{title:32}{'per element-step':>18}{'ratio':>8}{'steps':>8}")
             for name, cost, ratio, steps in measure(some):

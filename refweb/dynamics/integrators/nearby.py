@@ -216,12 +216,14 @@ def show_near(nearby, families):
                 for k in range(own.shape[1]):
                     shown[chosen[n, 0], k] = own[n, k]
             continue
-        for n in range(chosen.shape[0]):
+        for e in range(shown.shape[0]):
             for k in range(shown.shape[1]):
-                shown[chosen[n, 0], k] = shown[chosen[n, 1], k] = 0.0
+                shown[e, k] = 0.0
         for n in range(chosen.shape[0]):
             for k in range(shown.shape[1]):
                 value = own[n, k]
+                if value == 0.0:
+                    continue
                 for e in range(2):
                     if abs(value) > abs(shown[chosen[n, e], k]):
                         shown[chosen[n, e], k] = value
