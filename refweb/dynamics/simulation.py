@@ -219,7 +219,7 @@ class Simulation:
         """Forget what was computed, for a run at another value of the knob, that of ``standing``."""
         self.integrator, self._tables, self._compared = self.integrator_at(self.standing.knob), [], []
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
-        self._through = _through_of(self.system)
+        self._through, self._silent = _through_of(self.system), _silent_of(self.system)
         self.solution.frames.clear()
         if folder is not None:
             folder.restart(self.solution.summary())
@@ -230,6 +230,8 @@ class Simulation:
             return self.integrator.start(*self.begin.motion), 0
         course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
+        if self._silent is not None:
+            self._silent.take(self._kept.get("silent", ()))
         self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
@@ -247,7 +249,8 @@ class Simulation:
                 chosen = self.scene.settled().chosen
                 self._lines = Passage(self.system, self._unfollowed(), "self_contact" in chosen)
             self._lines.note(deepest[0], course.crossings[[APART, BESIDE]])
-            self._lines.refuse(*deepest)
+            overlap, time, cell = deepest
+            self._lines.refuse(overlap, f"t = {time:.6g} s", cell)
 
     def _unfollowed(self):
         """Why lines that touch lines are not followed, None where they are."""
@@ -307,6 +310,8 @@ class Simulation:
         if self.begin_of_twin is not None:
             kept |= {f"twin_begin_{name}": array for name, array in zip("xv", self.begin_of_twin.motion, strict=True)}
         kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
+        if self._silent is not None:
+            kept["silent"] = self._silent.kept()
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
     def remarks(self):

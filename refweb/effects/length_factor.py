@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..kernels import LINES, kernel
@@ -15,6 +17,12 @@ def scale(t, lines, cells, data):
     factor = interpolate(t, data[0], 0, 2, 1)[0]
     for c in range(cells.shape[0]):
         lines[cells[c, 0], LENGTH] *= factor
+
+
+def shortened(net, lines, table):
+    """The net whose ``shortest`` has heard of a factor as in `scaled`."""
+    own = np.where(np.isin(net.line, lines), min(factor for _, factor in table), 1.0)
+    return replace(net, shortest=net.shortest * own)
 
 
 def scaled(net, lines, table):

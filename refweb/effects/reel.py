@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import InputError
 from ..tables import Several, Table, nodes, rows, table
-from .length_factor import scaled
+from .length_factor import scaled, shortened
 
 
 @table
@@ -44,6 +44,10 @@ class Reel(Table):
         for i, (_, factor) in enumerate(self.factor):
             if not factor > 0.0:
                 raise InputError(f"factor[{i}][1] = {factor:g} must be > 0 [1]: a line cannot be reeled in to nothing")
+
+    def extend(self, net):
+        """The net with how short its lines become."""
+        return shortened(net, net.web.find_lines(self.lines), self.factor)
 
     def on(self, net):
         """The drive of the natural lengths."""

@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, checked, field, real, rows, table
-from .length_factor import scaled
+from .length_factor import scaled, shortened
 
 
 @accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
@@ -74,18 +74,26 @@ class Temperature(Table):
                 "" if name is None else f"groups.{short(name)} ",
             )
 
+    def extend(self, net):
+        """The net with how short its lines become."""
+        for lines, factor in self._factors(net.web):
+            net = shortened(net, lines, factor)
+        return net
+
     def on(self, net):
         """The drives of the natural lengths, one for the lines of each pair of α and ΔT."""
-        web, tables = net.web, list(self.groups.values())
+        return [scaled(net, lines, factor) for lines, factor in self._factors(net.web)]
+
+    def _factors(self, web):
+        """Lines of each pair of α and ΔT, and the table of their factor."""
+        tables = list(self.groups.values())
         found = givers(web.groups, self.groups, len(web.lines))
         none = np.full(len(web.lines), -1)
         given = np.stack([found.get("expansion", none), found.get("change", none)], axis=1)
-        drives = []
         for one in np.unique(given, axis=0):
             expanding, changing = (tables[number] if number >= 0 else self for number in one)
             _refuse_none(expanding, changing, "groups ")
-            drives.append(scaled(net, np.flatnonzero((given == one).all(axis=1)), _factor(expanding, changing)))
-        return drives
+            yield np.flatnonzero((given == one).all(axis=1)), _factor(expanding, changing)
 
 
 def _factor(expanding, changing):

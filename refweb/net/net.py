@@ -51,6 +51,8 @@ class Net:
         [m], then what effects add.
     columns : tuple of str
         Names of its columns.
+    shortest : float or ndarray, shape (cells,)
+        Natural length over that of the web [1], at its shortest: what reels and heat make of it.
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
     gradients : ndarray, shape (points, nodes per cell)
@@ -97,6 +99,7 @@ class Net:
     bodies: tuple = ()
     spins: int = 0
     columns: tuple = COLUMNS
+    shortest: float | np.ndarray = 1.0
 
     @property
     def law_number(self):

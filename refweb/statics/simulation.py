@@ -14,8 +14,6 @@ from ..results.solution import SOLVER, Result
 from ..results.state import State
 from .remarks import Remarks, open_rows, remarks_on
 
-UNFOLLOWED = "what moves between load steps is not followed"
-
 
 class Simulation:
     """Follows the load steps of a static scene.
@@ -41,7 +39,7 @@ class Simulation:
     def __init__(self, scene, system, solution):
         self.scene, self.system, self.solution = scene, system, solution
         self.rows, self._remarks, self._framed = [], Remarks(), -1
-        self._passage = _passage_of(scene, system)
+        self._passage, self._lines = _passage_of(scene, system), _lines_of(scene, system)
         self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
         self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
@@ -74,8 +72,8 @@ class Simulation:
         yield from self.system.remarks()
         if self._passage is not None and self.rows:
             yield from self._passage.overlaps.remarks()
-        if "lines" in self.solution.passage:
-            yield f"lines may have passed through lines: {UNFOLLOWED}"
+        if self._lines is not None and self.rows:
+            yield f"lines may have passed through lines: {self._lines.why}"
 
     def _smoothing(self):
         """What finds the error of smoothing, None where there is none to be found."""
@@ -96,8 +94,10 @@ class Simulation:
             self._passage.note(state)
             solution.bodies = self._passage.overlaps.plain()
             self._passage.overlaps.refuse()
-        if any(family.crossing is not None for family in self.system.families):
-            solution.passage = {**solution.passage, "lines": f"not certified: {UNFOLLOWED}"}
+        if self._lines is not None:
+            self._lines.note(state)
+            solution.passage = {**solution.passage, "lines": f"not certified: {self._lines.why}"}
+            solution.lines = self._lines.deepest.plain()
         results = self._results(found, state, smoothing)
         row = [found.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():
@@ -170,3 +170,12 @@ def _passage_of(scene, system):
     from .passage import Passage
 
     return Passage(scene, system)
+
+
+def _lines_of(scene, system):
+    """The `refweb.statics.line_passage.LinePassage` of a scene, None without lines that touch lines."""
+    if not any(family.crossing is not None for family in system.families):
+        return None
+    from .line_passage import LinePassage
+
+    return LinePassage(system, "self_contact" in scene.settled().chosen)

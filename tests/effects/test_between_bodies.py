@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import meshio
+import nets
 import numpy as np
 import pytest
 import solids
@@ -623,3 +624,22 @@ def test_nothing_passes(seed):
                 assert told["overlap"] <= told["allowed"]
                 touched += deep > 0.0
     assert touched
+
+
+def test_what_was_in_each_other_is_known_when_a_run_goes_on(tmp_path):
+    """Two balls fly through each other in the first half of a run, which is interrupted behind it."""
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[(0, 0, 0), (1, 0, 0)], lines=[(0, 1)], supports=[0, 1]),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0),
+        effects=[
+            refweb.Body(name="a", radius=0.1, mass=1.0, position=(0, 5, 0), velocity=(10.0, 0, 0)),
+            refweb.Body(name="b", radius=0.1, mass=1.0, position=(0.25, 5, 0)),
+            refweb.Contact(stiffness=1e4),
+        ],
+        solve=refweb.Dynamic(duration=0.1),
+        output=refweb.Output(interval=1e-3, frames=5),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    whole, resumed = nets.whole_and_resumed(scene, tmp_path)
+    assert any("m deep in each other" in warning for warning in whole.warnings)
+    assert resumed.warnings == whole.warnings

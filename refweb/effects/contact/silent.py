@@ -53,17 +53,26 @@ class Silent:
         away = np.linalg.norm(places[self._rows[:, 0]] - places[self._rows[:, 1]], axis=1)
         for n in np.flatnonzero(away < self._reach).tolist():
             a, b = self._pairs[n]
-            if (a.name, b.name) not in self._found:
+            if n not in self._found:
                 deep = max(_depth(a, b, places, x), _depth(b, a, places, x))
                 if deep > LEAST * min(a.thickness, b.thickness):
-                    self._found[a.name, b.name] = deep, time
+                    self._found[n] = deep, time
+
+    def kept(self):
+        """What is known so far, shape (pairs, 3): number of a pair, depth [m] and time [s]."""
+        return np.array([(n, *seen) for n, seen in self._found.items()]).reshape(-1, 3)
+
+    def take(self, kept):
+        """Go on with what was known."""
+        self._found = {int(n): (float(deep), float(time)) for n, deep, time in kept}
 
     def remarks(self):
         """What a reader of the results has to know."""
-        for (a, b), (deep, time) in itertools.islice(self._found.items(), MOST):
+        for n, (deep, time) in itertools.islice(self._found.items(), MOST):
+            a, b = self._pairs[n]
             yield (
-                f'bodies "{a}" and "{b}" are {deep:.3g} m deep in each other at t = {time:.6g} s and do not feel it: '
-                "between_bodies = true in [contact] lets bodies touch"
+                f'bodies "{a.name}" and "{b.name}" are {deep:.3g} m deep in each other at t = {time:.6g} s and do not '
+                "feel it: between_bodies = true in [contact] lets bodies touch"
             )
         if (more := len(self._found) - MOST) > 0:
             yield f"{more} more pairs of bodies are in each other"

@@ -134,8 +134,8 @@ class Passage:
         if (told := self.told()) != "certified":
             yield f"lines may have passed through lines, {told}"
 
-    def refuse(self, overlap, time, cell):
-        """Refuse an overlap above the radius [m] of a cell, at a time [s].
+    def refuse(self, overlap, when, cell):
+        """Refuse an overlap above the radius [m] of a cell, at a time or load step in words.
 
         Raises
         ------
@@ -152,19 +152,18 @@ class Passage:
         names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
         if own.ndim and self._system.supported[self._system.net.cells[own]].all():
             raise SolverError(
-                f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}: "
-                f"{PRESCRIBED}"
+                f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}: {PRESCRIBED}"
             )
         enough = float(f"{self._stiffness * (overlap / (AIM * radius)) ** POWER:.2g}")
         if self._chosen:
             enough = max(enough, STIFFER * self._stiffness)
             raise TooSoft(
-                f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}, with "
+                f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, with "
                 f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
                 {"self_contact": enough},
             )
         raise SolverError(
-            f"{names} overlap by {overlap:.3g} m at t = {time:.6g} s, more than their radius {radius:g}, where the "
+            f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, where the "
             f"push falls and lines pass: [self_contact] stiffness = {enough:g} or more is enough in place of "
             f"{self._stiffness:.3g}"
         )

@@ -29,12 +29,14 @@ class SelfContact(Table):
     the length on which they do, as a smooth function of their four nodes whatever their angle, see
     `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³), which is k r
     at half the distance of touch, where it is largest: what is pushed harder would pass, and is refused. Elements that
-    share a node do not push each other, nor do those that are within two radii of each other along the net.
+    share a node do not push each other, nor do those that are within two radii of each other along the net, where
+    reels and heat have made natural lengths shortest.
 
     Every pair of lines is followed from the start of a run on, and ``passage`` of ``run.json`` says "certified" where
     no two centre lines have met: before each drift of an explicit step, which is cut where two would meet, and in steps
     of cvode and ida on their interpolants. Neighbours that come to lie on each other are named there with the time, for
-    nothing keeps them apart. Load steps of statics are not followed. What is not certified is a warning as well.
+    nothing keeps them apart. Load steps of statics are not followed, but lines that meet on their straight ways from
+    one to the next are named. What is not certified is a warning as well.
 
     Explicit methods find pairs as they come near. Statics, cvode and ida take all pairs of a small web as one list.
 
@@ -187,15 +189,15 @@ def listed(cells, data):
 def near_along(net, distance):
     """Elements that share no node and are within a distance of each other along the net, shape (elements, most).
 
-    Rows are filled with −1. Lengths are natural ones.
+    Rows are filled with −1. Lengths are natural ones at their shortest.
     """
-    cells, count = net.cells, net.nodes
-    if distance < net.natural_length.min():
+    cells, count, natural = net.cells, net.nodes, net.natural_length * net.shortest
+    if distance < natural.min():
         return np.zeros((len(cells), 0))
     from scipy.sparse import coo_array, csr_array
     from scipy.sparse.csgraph import dijkstra
 
-    ends, lengths = np.sort(cells, axis=1), net.natural_length
+    ends, lengths = np.sort(cells, axis=1), natural
     order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))
     shortest = order[np.append(True, (np.diff(ends[order], axis=0) != 0).any(axis=1))]
     graph = coo_array((lengths[shortest], ends[shortest].T), shape=(count, count)).tocsr()
