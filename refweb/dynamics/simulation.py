@@ -231,7 +231,7 @@ class Simulation:
         course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
         if self._silent is not None:
-            self._silent.take(self._kept.get("silent", ()))
+            self._silent.take(self._kept.get("silent", np.zeros((0, 3))))
         self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
