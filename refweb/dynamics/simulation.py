@@ -310,8 +310,7 @@ class Simulation:
         if self.begin_of_twin is not None:
             kept |= {f"twin_begin_{name}": array for name, array in zip("xv", self.begin_of_twin.motion, strict=True)}
         kept |= {"row": number} | self.standing.arrays() | ({} if self._ways is None else self._ways.arrays())
-        if self._silent is not None:
-            kept["silent"] = self._silent.kept()
+        kept |= {} if self._silent is None else {"silent": self._silent.kept()}
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
     def remarks(self):
