@@ -17,7 +17,8 @@ at hand, so that equilibria are the same. A hexagon web of 40 000 cells from fla
 
 A factorization that is near enough is used again, by conjugate gradients with the matrix of the step, see
 `refweb.system.conjugate_gradients`: of webs of 40 000 cells five load steps with their error bounds take 12
-factorizations (squares, 118 803 unknowns), 17 (triangles) and 22 (hexagons). Forces without a potential have an
+factorizations by rslab (squares, 118 803 unknowns), 17 (triangles) and 22 (hexagons), by qdldl, whose solutions cost
+less beside them, 19 of hexagons. Forces without a potential have an
 unsymmetric tangent, its LU and a search of their own, see `refweb.statics.residual_search`.
 """
 
@@ -37,8 +38,6 @@ from .floating import NullSpace
 
 SMALL = 1000
 """Number of unknowns below which every step has a factorization of its own, which costs next to nothing."""
-MOST = 6
-"""Iterations of conjugate gradients that a factorization at hand may take, rather than one of the matrix itself."""
 NEAR = 0.1
 """Residual at which a tangent is near enough to that of the equilibrium to be used again."""
 SETTLED = 1e-3
@@ -241,7 +240,7 @@ class Newton:
     def _by_factor_at_hand(self, values, b, tolerance):
         """Solutions y of the matrix of ``values``, shape (n,) or (n, k), as conjugate gradients find them."""
         times = self.system.pattern.matrix(values).__matmul__
-        return conjugate_gradients.solve(times, self.factor.precondition, b, tolerance, MOST)
+        return conjugate_gradients.solve(times, self.factor.precondition, b, tolerance, self.factor.solutions)
 
     def _descends(self, r, p):
         """Whether p is a step to take: one that exists, leads down, and, in a frame that turns, from no saddle."""

@@ -138,7 +138,17 @@ class Pattern:
         """The `scipy.sparse.csc_array` of values."""
         return scipy.sparse.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
 
-    def upper_matrix(self, values):
-        """The upper triangle of values as a `scipy.sparse.csc_matrix`, as an LDLᵀ factorization takes it."""
-        part = (values[self.upper], *self._upper_pattern)
-        return scipy.sparse.csc_matrix(part, shape=(self.size, self.size))
+    @cached_property
+    def _lower_pattern(self):
+        """As `_upper_pattern`, of the lower triangle where unknowns are counted from the last one on: its upper one."""
+        ends = np.searchsorted(self._columns[self.lower], np.arange(self.size + 1))
+        starts = len(self.lower) - ends[::-1]
+        return self.size - 1 - self.indices[self.lower][::-1], starts.astype(np.int32)
+
+    def upper_matrix(self, values, turn=1):
+        """The upper triangle of values as a `scipy.sparse.csc_matrix`, as an LDLᵀ factorization takes it.
+
+        With a ``turn`` of −1 unknowns are counted from the last one on.
+        """
+        places, pattern = (self.upper, self._upper_pattern) if turn > 0 else (self.lower[::-1], self._lower_pattern)
+        return scipy.sparse.csc_matrix((values[places], *pattern), shape=(self.size, self.size))

@@ -63,6 +63,39 @@ def test_a_singular_matrix_has_no_solution(library):
     assert chain.library.remarks == []  # which is no fault of the library
 
 
+@pytest.mark.parametrize("turn", [1, -1])
+def test_unknowns_may_be_counted_from_either_end(turn):
+    chain = pattern("qdldl")
+    by = factorization._Qdldl(chain)
+    by._turn = turn
+    for seed, shift in ((0, 0.0), (1, 0.0), (2, -30.0)):
+        values, whole = matrix(chain, seed, shift)
+        upper = chain.upper_matrix(values, turn).toarray()
+        np.testing.assert_array_equal(upper, np.triu(whole[::turn, ::turn]))
+        by.factorize(values)
+        b = np.random.default_rng(seed).normal(size=(chain.size, 2))
+        np.testing.assert_allclose(by.solve(b[:, 0]), np.linalg.solve(whole, b[:, 0]), rtol=1e-7)
+        np.testing.assert_allclose(by.solve_all(b), np.linalg.solve(whole, b), rtol=1e-7)
+        np.testing.assert_allclose(by.times(b[:, 0]), whole @ b[:, 0], rtol=0.0, atol=1e-13 * np.abs(whole).max())
+        assert by.negative_pivots() == np.count_nonzero(np.linalg.eigvalsh(whole) < 0.0)
+
+
+@pytest.mark.parametrize("mesh", ["square", "triangle", "hexagon"])
+def test_the_way_to_count_that_fills_less_is_kept(mesh, monkeypatch):
+    """Of both, as qdldl itself has them; from the second factorization on."""
+    import qdldl
+
+    monkeypatch.setattr(factorization, "LARGE", 1000)
+    window = refweb.Window(mesh=mesh, rows=30, columns=30, side=0.1)
+    system = refweb.Scene(web=window, cable=net("qdldl").cable, solve=refweb.Static(factorization="qdldl")).build()
+    values = system.assemble_lines(system.net.unit_tension / system.net.natural_length[:, None, None])
+    fills = [qdldl.Solver(system.pattern.upper_matrix(values, turn), upper=True).factors()[0].nnz for turn in (1, -1)]
+    by = factorization._Qdldl(system.pattern)
+    for fill in (fills[0], min(fills), min(fills)):
+        by.factorize(values)
+        assert by._solver.factors()[0].nnz == fill
+
+
 def test_the_choice(monkeypatch):
     """By the number of unknowns, where it is installed; or as asked for."""
     for there in (True, False):
