@@ -162,8 +162,9 @@ class Passage:
                 f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
                 {"self_contact": enough},
             )
+        sure = "is" if self._unfollowed is None else "may be"  # an equilibrium does not tell what it would take
         raise SolverError(
             f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, where the "
-            f"push falls and lines pass: [self_contact] stiffness = {enough:g} or more is enough in place of "
+            f"push falls and lines pass: [self_contact] stiffness = {enough:g} or more {sure} enough in place of "
             f"{self._stiffness:.3g}"
         )
