@@ -5,6 +5,8 @@ Every refusal is an `InputError` whose message begins with the table it stands i
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from . import memory
@@ -63,6 +65,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     _check_memory(len(web.lines), cable, effects, solve)
     _check_history(solve, output, len(observables))
     net = discretisation.build(web, cable, quasi_static=solve.kind == "static", consistent=solve.mass == "consistent")
+    net = replace(net, end=float(max(solve.load_steps) if net.quasi_static else solve.duration))
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
     _check_bare(system)

@@ -19,10 +19,24 @@ def scale(t, lines, cells, data):
         lines[cells[c, 0], LENGTH] *= factor
 
 
-def shortened(net, lines, table):
-    """The net whose ``shortest`` has heard of a factor as in `scaled`."""
-    own = np.where(np.isin(net.line, lines), min(factor for _, factor in table), 1.0)
-    return replace(net, shortest=net.shortest * own)
+def noted(net, lines, table):
+    """The net with a factor as in `scaled` among its ``factors``."""
+    return replace(net, factors=(*net.factors, (np.flatnonzero(np.isin(net.line, lines)), table)))
+
+
+def shortest_of(net):
+    """Natural length of each element at its shortest in a run [m], shape (cells,).
+
+    Between corners a length is a product of positive linear functions of time, which is least at an end.
+    """
+    corners = [t for _, table in net.factors for t, _ in table if 0.0 < t < net.end]
+    least = np.full(len(net.cells), np.inf)
+    for t in {0.0, net.end, *corners}:
+        length = net.natural_length.copy()
+        for elements, table in net.factors:
+            length[elements] *= np.interp(t, *np.transpose(table))
+        np.minimum(least, length, out=least)
+    return least
 
 
 def scaled(net, lines, table):

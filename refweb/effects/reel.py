@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import InputError
 from ..tables import Several, Table, nodes, rows, table
-from .length_factor import scaled, shortened
+from .length_factor import noted, scaled
 
 
 @table
@@ -46,8 +46,8 @@ class Reel(Table):
                 raise InputError(f"factor[{i}][1] = {factor:g} must be > 0 [1]: a line cannot be reeled in to nothing")
 
     def extend(self, net):
-        """The net with how short its lines become."""
-        return shortened(net, net.web.find_lines(self.lines), self.factor)
+        """The net that knows what becomes of its lengths."""
+        return noted(net, net.web.find_lines(self.lines), self.factor)
 
     def on(self, net):
         """The drive of the natural lengths."""

@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, checked, field, real, rows, table
-from .length_factor import scaled, shortened
+from .length_factor import noted, scaled
 
 
 @accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
@@ -75,9 +75,9 @@ class Temperature(Table):
             )
 
     def extend(self, net):
-        """The net with how short its lines become."""
+        """The net that knows what becomes of its lengths."""
         for lines, factor in self._factors(net.web):
-            net = shortened(net, lines, factor)
+            net = noted(net, lines, factor)
         return net
 
     def on(self, net):

@@ -6,6 +6,7 @@ there alone.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -51,8 +52,10 @@ class Net:
         [m], then what effects add.
     columns : tuple of str
         Names of its columns.
-    shortest : float or ndarray, shape (cells,)
-        Natural length over that of the web [1], at its shortest: what reels and heat make of it.
+    factors : tuple
+        What reels and heat make of natural lengths: (elements, table of (t, factor)), they multiply.
+    end : float
+        Time at which a run ends at the latest [s], or its last load step.
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
     gradients : ndarray, shape (points, nodes per cell)
@@ -99,7 +102,8 @@ class Net:
     bodies: tuple = ()
     spins: int = 0
     columns: tuple = COLUMNS
-    shortest: float | np.ndarray = 1.0
+    factors: tuple = ()
+    end: float = math.inf
 
     @property
     def law_number(self):

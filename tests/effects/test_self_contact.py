@@ -684,6 +684,35 @@ def test_a_straight_line_that_becomes_shorter_does_not_push_itself(shorter):
     assert solution.lines["overlap"] == 0.0
 
 
+@pytest.mark.parametrize(
+    "reels, pushed",
+    [
+        ([[(0.0, 1.0), (1000.0, 0.02)]], True),  # as short as that long after the end of the run
+        ([[(-1.0, 0.02), (-0.5, 1.0)]], True),  # and before its start
+        ([[(0.0, 1.0), (0.06, 0.02), (0.12, 1.0)]], False),
+        ([[(0.0, 0.1), (0.06, 1.0)], [(0.06, 1.0), (0.12, 0.1)]], True),  # never both at once
+    ],
+)
+def test_near_along_the_net_is_what_is_so_in_the_run(reels, pushed):
+    """Two lines that cross 0.4 m from a slack third one of 0.3 m, which joins them: 2 r is 0.01 m."""
+    points = [(-0.4, 0, 0), (0.4, 0, 0), (-0.4, -0.2, 0.05), (0.4, 0.2, 0.05)]
+    effects = [refweb.Velocity(node=[2, 3], value=(0, 0, -1.0)), refweb.SelfContact(radius=5e-3, stiffness=1e4)]
+    scene = refweb.Scene(
+        web=refweb.Inline(
+            points=points,
+            lines=[(0, 1), (2, 3), (0, 2)],
+            supports=[],
+            natural_length=[0.8, float(np.hypot(0.8, 0.4)), 0.3],
+        ),
+        cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0),
+        effects=[*effects, *(refweb.Reel(lines=[2], factor=factor) for factor in reels)],
+        solve=refweb.Dynamic(duration=0.12),
+        accuracy=refweb.Accuracy(error="none"),
+    )
+    family = next(family for family in scene.build().families if family.crossing is not None)
+    assert ([0, 1] in family.elements.tolist()) == pushed
+
+
 # Friction
 
 

@@ -162,9 +162,13 @@ class Passage:
                 f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
                 {"self_contact": enough},
             )
-        sure = "is" if self._unfollowed is None else "may be"  # an equilibrium does not tell what it would take
+        words = f"{enough:g} or more is enough in place of {self._stiffness:.3g}"
+        if self._unfollowed is not None:  # what does not move does not tell what it would take
+            words = (
+                f"{enough:g} may be enough in place of {self._stiffness:.3g}; nodes that are themselves moved into "
+                "other lines are held by none"
+            )
         raise SolverError(
             f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, where the "
-            f"push falls and lines pass: [self_contact] stiffness = {enough:g} or more {sure} enough in place of "
-            f"{self._stiffness:.3g}"
+            f"push falls and lines pass: [self_contact] stiffness = {words}"
         )

@@ -11,6 +11,7 @@ from ...errors import InputError
 from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from ...tables import Table, real, table
 from ..base import Crossing, Family, without
+from ..length_factor import shortest_of
 from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
 from .search import found, near, paired
@@ -29,8 +30,8 @@ class SelfContact(Table):
     the length on which they do, as a smooth function of their four nodes whatever their angle, see
     `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³), which is k r
     at half the distance of touch, where it is largest: what is pushed harder would pass, and is refused. Elements that
-    share a node do not push each other, nor do those that are within two radii of each other along the net, where
-    reels and heat have made natural lengths shortest.
+    share a node do not push each other, nor do those that are within two radii of each other along the net at any
+    time of the run, as reels and heat change natural lengths.
 
     Every pair of lines is followed from the start of a run on, and ``passage`` of ``run.json`` says "certified" where
     no two centre lines have met: before each drift of an explicit step, which is cut where two would meet, and in steps
@@ -189,9 +190,9 @@ def listed(cells, data):
 def near_along(net, distance):
     """Elements that share no node and are within a distance of each other along the net, shape (elements, most).
 
-    Rows are filled with −1. Lengths are natural ones at their shortest.
+    Rows are filled with −1. Lengths are natural ones at their shortest in the run.
     """
-    cells, count, natural = net.cells, net.nodes, net.natural_length * net.shortest
+    cells, count, natural = net.cells, net.nodes, shortest_of(net)
     if distance < natural.min():
         return np.zeros((len(cells), 0))
     from scipy.sparse import coo_array, csr_array
