@@ -399,7 +399,7 @@ MUTANTS = [
     ),
     Mutant("pictures/camera", "for i in range(0, len(points), MANY)", "for i in range(0, MANY, MANY)"),
     Mutant("results/folder", "int(number[1]) <= row", "int(number[1]) < row"),
-    Mutant("results/folder", "self._listed += [(time, part,", "self._listed += [(row, part,"),
+    Mutant("results/folder", 'timestep="{number(time)}"', 'timestep="{number(row)}"'),
     Mutant("results/files", "return repr(float(value))", 'return f"{value:.9g}"'),
     Mutant("pictures/frames", "paths=self.paths + (scale * phase - 1.0)", "paths=self.paths + (scale * phase + 1.0)"),
     Mutant("pictures/record", "max(found, key=lambda pair: pair[0])[1]", "found[-1][1]"),
