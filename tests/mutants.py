@@ -48,6 +48,7 @@ MIRRORS = {
     "dynamics/integrators/followed_pairs": "effects/test_between_bodies.py",
     "dynamics/integrators/guard": "effects/test_passage.py effects/test_self_contact.py",
     "effects/self_contact/press": "effects/test_self_contact.py",
+    "effects/self_contact/slipping": "effects/test_self_contact.py",
     "effects/contact/rubbing": "effects/test_rubbing.py effects/test_contact.py",
     "effects/contact/carrying": "effects/test_carried_losses.py",
     "effects/drag/carrying": "effects/test_carried_losses.py",
@@ -272,6 +273,7 @@ MUTANTS = [
         "dynamics/integrators/guard", "if then != TOLD and walls.met[3] == 0:", "if walls.met[3] == 0 and then == TOLD:"
     ),
     Mutant("dynamics/integrators/guard", "    left[0] -= way\n", ""),
+    Mutant("effects/self_contact/slipping", "(1.0 - a, a, b - 1.0, -b)", "(1.0 - a, a, -b, b - 1.0)"),
     Mutant("effects/self_contact/press", "if square > (REACH * of.touch) ** 2", "if square > of.touch**2"),
     Mutant("dynamics/integrators/guard", "min(left, room, due[DUE] - due[PAST])", "min(left, room)"),
     Mutant("dynamics/integrators/guard", "due[PAST] += guard.left[1]", "due[PAST] += 0.0"),

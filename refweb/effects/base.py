@@ -150,6 +150,9 @@ class Family:
         is linear in displacement.
     moment_free : bool
         Whether forces that are not internal have no moment about the centre of mass of all that there is.
+    twists : bool
+        Whether forces that are internal have moments that the twist of lines would bear: they do not keep angular
+        momentum, and feel a rotation as a whole.
     symmetric : bool
         Whether stiffness and damping are symmetric.
     at_rest : bool
@@ -187,6 +190,7 @@ class Family:
     internal: bool = False
     impulse: Callable | None = None
     moment_free: bool = False
+    twists: bool = False
     symmetric: bool = True
     at_rest: bool = True
     times: tuple = ()

@@ -9,7 +9,8 @@ supports and of bodies that are fixed: there the book holds the method against i
 
 Where nothing is supported and all forces are internal or without a moment about the centre of mass, such as gravity,
 the angular momentum about that is booked as well, with that of bodies which turn. A ring keeps its plane, which takes
-moments: where there are rings it is the part along their normal, and nothing where their normals differ.
+moments: where there are rings it is the part along their normal, and nothing where their normals differ. Friction of
+lines that do not roll leaves moments to their twist: where there is any, angular momentum is not booked.
 
 Central differences and splittings close the book to rounding: each kick gives what the forces are worth, and the
 trapezoidal rule of the kicks is exact for linear factors. Damping sees the mean of the velocities at the ends of steps
@@ -136,7 +137,8 @@ class Outside(NamedTuple):
 
 def kept_axes(system):
     """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
-    if system.held.any() or not all(family.internal or family.moment_free for family in system.families):
+    kept = all(f.moment_free or (f.internal and not f.twists) for f in system.families)
+    if system.held.any() or not kept:
         return np.zeros((0, 3))
     normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)
     if not len(normals):

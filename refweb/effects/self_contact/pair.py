@@ -12,14 +12,15 @@ from typing import NamedTuple
 from ...kernels import kernel
 from ..vectors import cross, dot
 
-TOUCH, SCALE, LENGTH, OTHER, DAMPING, SHAPE, FRICTION, SLIP, NAMES, WIDTH = 0, 1, 2, 3, 4, 5, 14, 15, 16, 18
+TOUCH, SCALE, LENGTH, OTHER, DAMPING, SHAPE, FRICTION, SLIP, ROLLS, NAMES, WIDTH = 0, 1, 2, 3, 4, 5, 14, 15, 16, 17, 19
 """Columns of the data of a pair: distance of centre lines at which they touch [m], κ of `refweb.effects.self_contact.
 press` [N/m⁴], 0 where an element is broken, natural lengths of both [m], d [s/m], from the first node of the first
-element the vectors to the three others in the web's position, μ, v_s [m/s], and the numbers of both elements; number of
-columns."""
-ENDS, RUBBING, APART = 5, 11, 13
-"""First columns of the data of an element, behind the same but `OTHER`: reference positions of its nodes, μ and v_s,
-and numbers of the elements that it does not touch, being within the distance of touch along the net, −1 for none."""
+element the vectors to the three others in the web's position, μ, v_s [m/s], whether lines roll, and the numbers of both
+elements; number of columns."""
+ENDS, RUBBING, APART = 5, 11, 14
+"""First columns of the data of an element, behind the same but `OTHER`: reference positions of its nodes, μ, v_s and
+whether lines roll, and numbers of the elements that it does not touch, being within the distance of touch along the
+net, −1 for none."""
 
 ROUNDING = 1e-15
 """Error of a cross product over the lengths of its factors, at most."""

@@ -196,8 +196,8 @@ def paired(chosen, cells, data):
         numbers[c, SCALE] = min(data[a, SCALE], data[b, SCALE])
         numbers[c, LENGTH], numbers[c, OTHER] = data[a, LENGTH], data[b, LENGTH]
         numbers[c, NAMES], numbers[c, NAMES + 1] = a, b
-        numbers[c, FRICTION], numbers[c, FRICTION + 1] = data[a, RUBBING], data[a, RUBBING + 1]
         for k in range(3):
+            numbers[c, FRICTION + k] = data[a, RUBBING + k]
             first = data[a, ENDS + k]
             numbers[c, SHAPE + k] = data[a, ENDS + 3 + k] - first
             numbers[c, SHAPE + 3 + k] = data[b, ENDS + k] - first

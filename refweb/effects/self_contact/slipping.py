@@ -15,9 +15,13 @@ v_s,
 
 spread to the nodes as s takes their velocities, so that it keeps momentum and angular momentum. Nodes of a straight
 line take no moment about it, so friction has none either: lines turn freely about themselves, and one that is wound
-around a straight line is held no more than over a pulley that turns, whatever μ is. A friction that held it would have
-to leave the moment 2 r F of each contact to a torsion that elements without thickness do not have, and would brake nets
-that turn as a whole.
+around a straight line is held no more than over a pulley that turns, whatever μ is.
+
+Where lines do not roll, s are the two components across n of the velocity of one centre line relative to the other, and
+G is the identity: the friction of threads, by which a line that is wound n turns holds T₂/T₁ ≤ e^(2π n μ). It keeps
+momentum. Of angular momentum 2 r F is left in each contact to a twist that elements without thickness do not have, and
+nets that turn as a whole are braked, as their lines would have to turn along. To keep it and to hold exclude each
+other.
 
 N is the push of the overlap, whatever damping adds to it. Lines that lie along each other slide along themselves alone:
 across, such lines roll, as nothing resists their turning about themselves. 1 + `ALIKE` c²/(L L'), of the distance of
@@ -49,8 +53,8 @@ from ..kicks import (
 from ..kicks import FRICTION as DRAG
 from ..kicks import SLIP as CREEP
 from ..kicks import WIDTH as BEHIND
-from ..vectors import dot
-from .pair import FRICTION, LENGTH, NAMES, OTHER, RUBBING, SLIP, TOUCH, place_of
+from ..vectors import cross, dot
+from .pair import FRICTION, LENGTH, NAMES, OTHER, ROLLS, RUBBING, SLIP, TOUCH, place_of
 from .press import bound as press_bound
 from .press import pushed
 from .search import found
@@ -67,11 +71,26 @@ SLOTS, NOTED = 8, 5
 ŵ [N]."""
 
 
+@kernel(forceinline=True)
+def set_rows_of_threads(along, n, a, b, rows, shares):
+    """Write what `slip_rows` does of centre lines that do not roll: components along the first line and across it."""
+    off = dot(along, n)
+    e = along[0] - off * n[0], along[1] - off * n[1], along[2] - off * n[2]
+    inverse = 1.0 / math.sqrt(dot(e, e))
+    e = inverse * e[0], inverse * e[1], inverse * e[2]
+    axes, weights = (e, cross(n, e)), (1.0 - a, a, b - 1.0, -b)
+    for i in range(2):
+        for m in range(4):
+            for k in range(3):
+                rows[i, m, k] = weights[m] * axes[i][k]
+        shares[i, i], shares[i, 1 - i] = 1.0, 0.0
+
+
 @kernel()
 def slip_rows(x, cells, data, c, rows, shares):
     """N of pair c [N], 0 where it does not touch; what nodes add to both components of u to ``rows (2, 4, 3)``.
 
-    ``shares (2, 2)`` is what forces along both are along û and ŵ.
+    ``shares (2, 2)`` is what forces along both are along û and ŵ, or along the components of threads.
     """
     _, push = pushed(x, cells, data, c)
     whole = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
@@ -102,6 +121,9 @@ def slip_rows(x, cells, data, c, rows, shares):
     if not within > 0.0:
         return 0.0
     a, b = dot(push[1], n) / within, -dot(push[3], n) / within
+    if data[c, ROLLS] == 0.0:
+        set_rows_of_threads(one, n, a, b, rows, shares)
+        return size
     d = p[0] + a * u[0] - b * w[0], p[1] + a * u[1] - b * w[1], p[2] + a * u[2] - b * w[2]
     own, its = dot(one, d), dot(other, d)
     for k in range(3):

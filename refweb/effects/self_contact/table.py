@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
-from ...tables import Table, real, table
+from ...tables import Table, boolean, real, table
 from ..base import Crossing, Family, without
 from ..length_factor import shortest_of
 from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
@@ -53,11 +53,15 @@ class SelfContact(Table):
         d of Hunt and Crossley [s/m]: a push of 1 + d δ̇ times that of the overlap, never a pull; δ̇ is the rate of the
         overlap.
     friction : float
-        μ of Coulomb [1]; against it stands the push of the overlap. Lines are free to turn about themselves: one that
-        is wound around a straight one slides as over a pulley that turns. What is to hold it by friction has to be a
-        body.
+        μ of Coulomb [1]; against it stands the push of the overlap.
     slip_velocity : float
         v_s [m/s], of μ N |u|/√(|u|² + v_s²): what sticks creeps below it.
+    rolling : bool
+        Whether lines turn freely about themselves, so that friction keeps angular momentum: one that is wound around
+        a straight one then slides as over a pulley that turns. Where they do not, friction acts on centre lines, as on
+        threads that do not twist, and one that is wound n turns holds a ratio of tensions up to e^(2π n μ); moments of
+        2r times the friction are left to the twist of lines, so that angular momentum is not kept, and a web that turns
+        as a whole is braked where its lines press on each other.
 
     Raises
     ------
@@ -78,6 +82,7 @@ class SelfContact(Table):
     damping: float = real(default=0.0, at_least=0, unit="s/m")
     friction: float = real(default=0.0, at_least=0)
     slip_velocity: float = real(default=1e-3, above=0, unit="m/s")
+    rolling: bool = boolean(default=True)
 
     def on(self, net):
         """The family of the push, and those of damping and friction.
@@ -122,7 +127,8 @@ class SelfContact(Table):
         if self.friction > 0.0:
             from . import slipping
 
-            families.append(self._lossy(slipping, all_listed, rubbing=slipping.KICKS, **common))
+            own = dict(rubbing=slipping.KICKS, twists=not self.rolling)
+            families.append(self._lossy(slipping, all_listed, **own, **common))
         return families if len(families) > 1 else push
 
     @staticmethod
@@ -149,7 +155,7 @@ class SelfContact(Table):
         data[:, OWN_LENGTH] = net.natural_length
         data[:, ENDS : ENDS + 3] = net.points[net.cells[:, 0]]
         data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data[:, REFERENCE : REFERENCE + 3]
-        data[:, RUBBING], data[:, RUBBING + 1] = self.friction, self.slip_velocity
+        data[:, RUBBING : RUBBING + 3] = self.friction, self.slip_velocity, self.rolling
         data[:, APART:] = beside
         return np.ascontiguousarray(net.cells, dtype=np.int32), data
 
