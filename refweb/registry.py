@@ -43,7 +43,7 @@ EFFECTS = {
     "fold": "refweb.effects.fold:Fold",
 }
 """Effects by the name of their table."""
-FACTORIZATIONS = ("qdldl", "rslab")
+FACTORIZATIONS = ("qdldl", "superlu", "rslab")
 """Libraries that factorize symmetric matrices."""
 SOLVES = {"static": "refweb.settings:Static", "dynamic": "refweb.settings:Dynamic"}
 """Kinds of ``[solve]``."""

@@ -80,9 +80,9 @@ class Static(Table):
         Values of t.
     mass : {"lumped", "consistent"}
         The weight is the same with either; the modes at the equilibrium and the centrifugal forces are not.
-    factorization : {"auto", "qdldl", "rslab"}
-        Library that factorizes the tangent, see `refweb.system.factorization`; "auto" takes rslab for large nets where
-        it is installed.
+    factorization : {"auto", "qdldl", "superlu", "rslab"}
+        Library that factorizes the tangent, see `refweb.system.factorization`; "auto" takes, for
+        large nets, rslab where it is installed and else SuperLU.
 
     Raises
     ------
@@ -139,7 +139,7 @@ class Dynamic(Table):
         How linear systems are solved, see `refweb.dynamics.integrators.sundials`.
     mass : {"lumped", "consistent"}
         Mass of the lines at their nodes: row sums of the consistent matrix, or the matrix itself.
-    factorization : {"auto", "qdldl", "rslab"}
+    factorization : {"auto", "qdldl", "superlu", "rslab"}
         Of CVODE, IDA and a start at an equilibrium: library that factorizes the tangent, as of `Static`.
     start : {"web", "equilibrium"} or path
         State at t = 0: the web as it is, its equilibrium under what acts at t = 0 (free bodies do not), or the last

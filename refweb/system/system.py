@@ -35,7 +35,7 @@ class System:
         Values with ``on(net)``.
     supported : ndarray of bool, shape (nodes, 3)
         Components of nodes that do not move, or move as prescribed.
-    factorization : {"auto", "qdldl", "rslab"}
+    factorization : {"auto", "qdldl", "superlu", "rslab"}
         What factorizes its symmetric matrices.
 
     Attributes

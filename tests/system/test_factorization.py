@@ -1,4 +1,4 @@
-"""LDLᵀ by two libraries: the same solutions and signs of pivots, which is taken, and what is done where one errs.
+"""LDLᵀ by three libraries: the same solutions and signs of pivots, which is taken, and what is done where one errs.
 
 Truth of the signs are eigenvalues by numpy.
 """
@@ -17,7 +17,7 @@ from refweb.system.sparsity import Pattern
 
 THERE = importlib.util.find_spec("rslab") is not None
 needs_rslab = pytest.mark.skipif(not THERE, reason='rslab, of the extra "fast", is not installed')
-LIBRARIES = ["qdldl", pytest.param("rslab", marks=needs_rslab)]
+LIBRARIES = ["qdldl", "superlu", pytest.param("rslab", marks=needs_rslab)]
 
 
 def pattern(library, n=6):
@@ -100,7 +100,12 @@ def test_the_choice(monkeypatch):
     """By the number of unknowns, where it is installed; or as asked for."""
     for there in (True, False):
         monkeypatch.setattr(factorization.importlib.util, "find_spec", lambda name, there=there: there or None)
-        for size, name in ((factorization.LARGE, "rslab" if there else "qdldl"), (factorization.LARGE - 1, "qdldl")):
+        for size, fast, else_ in (
+            (factorization.LARGEST, "rslab", "superlu"),
+            (factorization.LARGE, "rslab", "qdldl"),
+            (factorization.LARGE - 1, "qdldl", "qdldl"),
+        ):
+            name = fast if there else else_
             library = Library()
             assert library.why is None
             library.choose(size)
@@ -150,12 +155,12 @@ def net(library, **solve):
     )
 
 
-@needs_rslab
+@pytest.mark.parametrize("library", LIBRARIES[1:])
 @pytest.mark.parametrize("method", ["static", "cvode", "ida"])
-def test_runs_agree_within_their_errors(method, tmp_path):
+def test_runs_agree_within_their_errors(method, library, tmp_path):
     """Bounds are kept, ± overlap, and ``run.json`` names what has factorized."""
     solve = {} if method == "static" else dict(kind="dynamic", method=method, duration=2e-3, linear_solver="block")
-    one, other = (refweb.run(net(library, **solve), out=tmp_path / library) for library in ("qdldl", "rslab"))
+    one, other = (refweb.run(net(by, **solve), out=tmp_path / by) for by in ("qdldl", library))
     for name, result in one.results.items():
         off = abs(result.value - other.results[name].value)
         assert off <= result.error + other.results[name].error, name
@@ -163,9 +168,9 @@ def test_runs_agree_within_their_errors(method, tmp_path):
         assert other.solver["duality_gap"] <= 10.0 * one.solver["duality_gap"] + 1e-15
         assert other.solver["nlu"] == one.solver["nlu"]
     assert other.warnings == one.warnings
-    for library in ("qdldl", "rslab"):
-        run = json.loads((tmp_path / library / "run.json").read_text(encoding="utf-8"))
-        assert run["solver"]["factorization"] == f"{library}, as asked for"
+    for by in ("qdldl", library):
+        run = json.loads((tmp_path / by / "run.json").read_text(encoding="utf-8"))
+        assert run["solver"]["factorization"] == f"{by}, as asked for"
 
 
 def test_what_factorizes_nothing_names_nothing():
@@ -173,9 +178,9 @@ def test_what_factorizes_nothing_names_nothing():
     assert refweb.run(scene).solver["factorization"] is None
 
 
-@needs_rslab
-def test_modes_agree():
-    one, other = (refweb.modes(net(library), number=4) for library in ("qdldl", "rslab"))
+@pytest.mark.parametrize("library", LIBRARIES[1:])
+def test_modes_agree(library):
+    one, other = (refweb.modes(net(by), number=4) for by in ("qdldl", library))
     for name, result in one.results.items():
         assert abs(result.value - other.results[name].value) <= result.error + other.results[name].error
-    assert other.solver["factorization"] == "rslab, as asked for"
+    assert other.solver["factorization"] == f"{library}, as asked for"

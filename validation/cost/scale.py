@@ -1,6 +1,6 @@
 """How cost grows with size: statics with its bounds and explicit steps, up to the largest web that is asked for.
 
-    python -m validation.cost.scale [CELLS [qdldl | rslab | auto [MESHES]]]
+    python -m validation.cost.scale [CELLS [qdldl | superlu | rslab | auto [MESHES]]]
 
 Square, triangle and hexagon webs of cells × cells up to CELLS a side, 100 by default, each size in a process of its
 own with one thread. Statics: five load steps of a load at the centre, from flat, with error bounds; the unit is one
@@ -27,6 +27,7 @@ import refweb  # noqa: E402
 from refweb.dynamics.simulation import Simulation  # noqa: E402
 from refweb.solution import Solution  # noqa: E402
 from refweb.statics import load_steps  # noqa: E402
+from refweb.system.factorization import symmetric_lu  # noqa: E402
 
 DURATION = 0.08
 """Of the explicit runs [s], some thousand steps."""
@@ -61,13 +62,11 @@ def statics(mesh, cells, library):
 
 def superlu(system):
     """CPU time of a factorization by SuperLU of a matrix with the system's pattern [s]."""
-    from scipy.sparse.linalg import splu
-
     net, times = system.net, []
     matrix = system.pattern.matrix(system.assemble_lines(net.unit_tension / net.natural_length[:, None, None]))
     for _ in range(2):
         began = time.process_time()
-        splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        symmetric_lu(matrix)
         times.append(time.process_time() - began)
     return min(times)
 
