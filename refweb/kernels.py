@@ -111,9 +111,10 @@ NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 def _cache_folder():
     package = pathlib.Path(__file__).parent
-    state = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
-        content = source.read_bytes()
+    folders, state = os.walk(package), hashlib.sha256()
+    for source in sorted(f"{at}/{name}" for at, _, names in folders for name in names if name.endswith(".py")):
+        with open(source, "rb") as file:
+            content = file.read()
         if b"kernel(" in content or b"ufunc(" in content:
             state.update(content)
     name = f"refweb-{state.hexdigest()[:16]}"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 
+@functools.cache
 def sphere():
-    """Unit sphere as points and triangles."""
+    """Unit sphere as points and triangles, which nobody may change."""
     level = 24
     polar = np.linspace(0.0, np.pi, level // 2 + 1)[1:-1]
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)
@@ -26,11 +29,12 @@ def sphere():
     for ring in range(len(polar) - 1):
         triangles += _band(ring * level + here, ring * level + after, level)
     triangles.append(np.column_stack([np.full(level, bottom), last + after, last + here]))
-    return points, np.vstack(triangles)
+    return _fixed(points), _fixed(np.vstack(triangles))
 
 
+@functools.cache
 def tube(radius, thin):
-    """Ring about the third axis, a tube of a thickness whose outer edge has the radius, as points and triangles."""
+    """Ring about the third axis, a tube of a thickness whose outer edge has the radius, as `sphere`."""
     level, sides = 48, 8
     around = np.linspace(0.0, 2.0 * np.pi, level, endpoint=False)[:, None]
     across = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
@@ -38,9 +42,13 @@ def tube(radius, thin):
     points = np.stack([out * np.cos(around), out * np.sin(around), thin * np.sin(across) + 0.0 * around], axis=-1)
     here = np.arange(level * sides).reshape(level, sides)
     after = np.roll(here, -1, axis=1)
-    return points.reshape(-1, 3), np.vstack(
-        [t for i in range(level) for t in _band(here[i], after[i], here[(i + 1) % level] - here[i])]
-    )
+    triangles = [t for i in range(level) for t in _band(here[i], after[i], here[(i + 1) % level] - here[i])]
+    return _fixed(points.reshape(-1, 3)), _fixed(np.vstack(triangles))
+
+
+def _fixed(values):
+    values.flags.writeable = False
+    return values
 
 
 def _band(here, after, step):

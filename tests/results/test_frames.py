@@ -188,7 +188,8 @@ def test_meshio_reads_arrays_of_any_size(tmp_path, seed):
 
 @pytest.mark.parametrize("what", ["digits", "repeated", "zeros", "mixed", "short"])
 def test_blocks_are_whole_however_they_are_compressed(what):
-    """Numbers whose digits are all their own are no more than 3 % longer than as zlib has them at the same level."""
+    """Numbers whose digits are all their own are stored: some four of their 64 bits repeat, those of the exponent. What
+    stores them adds 11 bytes."""
     random = np.random.default_rng(1)
     digits, repeated = random.normal(size=4000), np.tile(random.normal(size=40), 100)
     mixed = np.concatenate([digits, repeated])
@@ -196,4 +197,4 @@ def test_blocks_are_whole_however_they_are_compressed(what):
     data = values[what].tobytes()
     for cut in (None, 0, 1, 39):
         assert zlib.decompress(vtu_file._compressed(data, cut)) == data
-    assert len(vtu_file._compressed(data)) <= 1.03 * len(zlib.compress(data, vtu_file.LEVEL))
+    assert len(vtu_file._compressed(data)) <= 64.0 / 60.0 * len(zlib.compress(data, vtu_file.LEVEL)) + 11
