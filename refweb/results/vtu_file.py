@@ -1,10 +1,11 @@
 """VTU files: arrays compressed by zlib behind a short head of XML, each of which can be read by itself.
 
 The arrays stand as raw bytes at the end of the file (``appended``, encoding ``raw``), in blocks of `BLOCK` bytes that
-VTK decompresses one by one. Of a web of 978 600 lines just thrown, 102 MB, the file has 18 MB; base64 within the XML, as
-meshio writes it, is a third longer, takes 1.5 times the CPU time and is read in 2.5 times. At its own default level zlib takes twice the time of
-`LEVEL`, for 3 % less. Where all digits are their own, as those of tensions in motion, bytes are stored as they are: to
-look for runs would take three quarters of the time of a frame, for 5 to 12 % of such arrays.
+VTK decompresses one by one. Of a web of 978 600 lines just thrown, 102 MB, the file has 18 MB; base64 within the XML,
+as meshio writes it, is a third longer, takes 1.5 times the CPU time and is read in 2.5 times. At its own default level
+zlib takes twice the time of `LEVEL`, for 3 % less. Where all digits are their own, as those of tensions in motion,
+bytes are stored as they are: to look for runs would take three quarters of the time of a frame, for 5 to 12 % of such
+arrays.
 """
 
 from __future__ import annotations
