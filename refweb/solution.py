@@ -323,9 +323,7 @@ def summary_of(folder):
 
 def scene_of(folder, summary):
     """The scene in a result folder, with the stiffness of contact that refweb has chosen still its own to choose."""
-    chosen = tuple(name for name, body in summary.get("bodies", {}).items() if body["chosen"])
-    chosen += ("self_contact",) if summary.get("lines", {}).get("chosen") else ()
-    return Scene.load(pathlib.Path(folder) / "scene.toml").replace(chosen=chosen)
+    return Scene.load(pathlib.Path(folder) / "scene.toml").replace(chosen=tuple(summary.get("chosen", ())))
 
 
 def _columns(folder):

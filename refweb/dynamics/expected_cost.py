@@ -41,7 +41,7 @@ def ruling(integrator, system, reach, speed):
     both = np.sqrt(lossy.sum(axis=0) ** 2 + 4.0 * stiff.sum(axis=0)) + lossy.sum(axis=0)
     most = both.max(initial=0.0)
     if not most > 0.0:
-        return Rule(np.inf, "nothing that vibrates")
+        return Rule(np.inf, "nothing, as nothing vibrates")
     worst = int(both.argmax())
     damped = most > np.sqrt(2.0) * 2.0 * np.sqrt(stiff[:, worst].sum())
     family = system.families[int((lossy if damped else stiff)[:, worst].argmax())]
@@ -72,6 +72,8 @@ def _parts(system, bounds, reach, speed):
 
 
 def _seconds(value):
+    if value == np.inf:
+        return "as long as rows"
     factor, prefix = prefixed(value)
     return f"{value / factor:.3g} {prefix}s"
 

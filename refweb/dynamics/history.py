@@ -318,7 +318,7 @@ class Watch:
         if overlaps.pairs is not None:
             for i in range(len(overlaps.pairs.found)):
                 at = self._of_warning(("between", i))
-                overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]), course.time)
+                overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]))
 
     def note_way(self, course, pairs, integrator):
         """Note what has met in `refweb.effects.contact.pair_overlap.PairOverlaps`, or what bounds the way in a step."""

@@ -250,7 +250,7 @@ class Simulation:
                 self._lines = Passage(self.system, self._unfollowed(), "self_contact" in chosen)
             self._lines.note(deepest[0], course.crossings[[APART, BESIDE]])
             overlap, time, cell = deepest
-            self._lines.refuse(overlap, f"t = {time:.6g} s", cell)
+            self._lines.refuse(overlap, f"t = {time:.6g} s", cell, course.v)
 
     def _unfollowed(self):
         """Why lines that touch lines are not followed, None where they are."""

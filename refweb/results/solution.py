@@ -196,6 +196,7 @@ class SolutionData:
             "cost": self.cost,
             "versions": self.versions,
             "seed": self.scene.seed,
+            **({"chosen": list(self.scene.chosen)} if self.scene.chosen else {}),
             "warnings": self.warnings,
             **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
             **({"bodies": self.bodies} if self.bodies else {}),

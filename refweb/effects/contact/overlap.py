@@ -185,10 +185,10 @@ class Deepest(NamedTuple):
                 f"{self.body.thickness:.3g} m below its surface; {self._remedy()}"
             )
 
-    def remarks(self):
-        """What a reader of the results has to know."""
+    def remarks(self, what="the web"):
+        """What a reader of the results has to know; ``what`` is all that it might have touched."""
         if self.overlap <= 0.0:
-            yield f'body "{self.body.name}" never touches the web, though there is a [contact]'
+            yield f'body "{self.body.name}" never touches {what}, though there is a [contact]'
         elif self.too_deep:
             remedy = "there it starts" if self.at_start else self._remedy()
             share = 100.0 * self.overlap / size_of(self.body)
@@ -197,7 +197,7 @@ class Deepest(NamedTuple):
     def _remedy(self):
         power = f"1/{self.exponent + self.moving:g}"
         return (
-            f"stiffness = {self.enough:g} is enough in place of {self.stiffness:g}, or leave it out "
+            f"stiffness = {self.enough:g} should be enough in place of {self.stiffness:g}, or leave it out "
             f"(the overlap falls with k to the power {power})"
         )
 
@@ -278,9 +278,10 @@ class Overlaps:
     def remarks(self):
         """What a reader of the results has to know."""
         elsewhere = self.pairs.touched if self.pairs is not None else ()
+        what = "the web" if self.pairs is None else "anything"
         for deepest in self.found:
             if deepest.overlap > 0.0 or deepest.body.name not in elsewhere:
-                yield from deepest.remarks()
+                yield from deepest.remarks(what)
             yield from self._pushed_along(deepest)
         if self.pairs is not None:
             yield from self.pairs.remarks()

@@ -116,7 +116,7 @@ class DeepestPair(NamedTuple):
     @property
     def _remedy(self):
         return (
-            f"stiffness = {self.enough:g} holds them to {AIM * self.allowed:.3g} m in place of {self.stiffness:g}, or "
+            f"stiffness = {self.enough:g} may hold them to {AIM * self.allowed:.3g} m in place of {self.stiffness:g}, or "
             "leave it out"
         )
 
@@ -139,22 +139,19 @@ class PairOverlaps:
         self.found = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
         self._way, self._met = None, None
 
-    def _deepest(self, bodies, overlap, time, initial, deepening=False):
+    def _deepest(self, bodies, overlap, time, initial):
         stiffness, exponent, *_ = self._contact.law_between(*bodies)
         chosen = tuple(body.name for body in bodies if body.name in self._chosen)
         deep = overlap > CORE * min(body.thickness for body in bodies)
-        least = first_between(self._system, bodies, exponent) if deep and deepening else 0.0
+        least = first_between(self._system, bodies, exponent) if deep else 0.0
         return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, least, initial)
 
-    def note(self, i, overlap, time, now):
-        """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before; it is ``now`` [s].
-
-        What is deepest now may get deeper yet.
-        """
+    def note(self, i, overlap, time):
+        """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
         was = self.found[i]
         if overlap > was.overlap:
             initial = overlap if time == 0.0 else was.initial
-            self.found[i] = self._deepest(was.bodies, overlap, time, initial, time >= now)
+            self.found[i] = self._deepest(was.bodies, overlap, time, initial)
 
     def note_way(self, safety=0.0, step=0.0, speed=0.0):
         """Note what bounds the way in a step.

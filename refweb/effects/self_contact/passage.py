@@ -134,8 +134,26 @@ class Passage:
         if (told := self.told()) != "certified":
             yield f"lines may have passed through lines, {told}"
 
-    def refuse(self, overlap, when, cell):
-        """Refuse an overlap above the radius [m] of a cell, at a time or load step in words.
+    def _enough(self, overlap, own, v):
+        """Stiffness that may hold what overlaps so far [N/m].
+
+        Above the top of the push what comes is hardly braked, and the overlap tells nothing of its energy: it is at
+        least that which stores, at `AIM` of the radius, what is stored so far and what two elements bring that come
+        together as fast as any two of their nodes.
+        """
+        radius = 0.5 * self.touch
+        enough = self._stiffness * (overlap / (AIM * radius)) ** POWER
+        if v is None:
+            return enough
+        mass, cells = self._system.net.mass, self._system.net.cells
+        nodes = cells[own].ravel() if own.ndim else np.unique(cells)
+        heavy = mass[cells[own if own.ndim else slice(None)]].sum(axis=1).max()
+        moving = 0.25 * heavy * float((np.ptp(v[nodes], axis=0) ** 2).sum())
+        stored = self._stiffness * min(overlap / (AIM * radius), 1.0) ** POWER
+        return max(enough, stored + moving / (HELD * radius**2))
+
+    def refuse(self, overlap, when, cell, v=None):
+        """Refuse an overlap above the radius [m] of a cell, at a time or load step in words; v are velocities then.
 
         Raises
         ------
@@ -154,7 +172,7 @@ class Passage:
             raise SolverError(
                 f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}: {PRESCRIBED}"
             )
-        enough = float(f"{self._stiffness * (overlap / (AIM * radius)) ** POWER:.2g}")
+        enough = float(f"{self._enough(overlap, own, v):.2g}")
         if self._chosen:
             enough = max(enough, STIFFER * self._stiffness)
             raise TooSoft(
@@ -162,12 +180,11 @@ class Passage:
                 f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
                 {"self_contact": enough},
             )
-        words = f"{enough:g} or more is enough in place of {self._stiffness:.3g}"
+        words = f"{enough:g} may be enough in place of {self._stiffness:.3g}"
         if self._unfollowed is not None:  # what does not move does not tell what it would take
-            words = (
-                f"{enough:g} may be enough in place of {self._stiffness:.3g}; nodes that are themselves moved into "
-                "other lines are held by none"
-            )
+            words = f"{words}; nodes that are themselves moved into other lines are held by none"
+        else:
+            words = f"{words}, or leave it out"
         raise SolverError(
             f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, where the "
             f"push falls and lines pass: [self_contact] stiffness = {words}"

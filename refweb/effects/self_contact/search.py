@@ -213,6 +213,16 @@ def found(skin, x, cells, data):
     return chosen, rows, numbers
 
 
+@kernel()
+def distances(x, cells, data):
+    """Distance of the centre lines of each pair [m]."""
+    apart = np.empty(cells.shape[0])
+    for c in range(cells.shape[0]):
+        p, u, w = place_of(x, cells, data, c)
+        apart[c] = math.sqrt(nearest(p, u, w)[2])
+    return apart
+
+
 @kernel(NEAR)
 def near(skin, x, cells, data, chosen):
     count = 0

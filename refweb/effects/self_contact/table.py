@@ -14,7 +14,7 @@ from ..base import Crossing, Family, without
 from ..length_factor import shortest_of
 from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
-from .search import found, near, paired
+from .search import distances, found, near, paired
 
 LISTED = 20_000
 """Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
@@ -165,17 +165,15 @@ class SelfContact(Table):
         chosen, rows, numbers = found(0.0, rest, cells, data)
         if not len(rows):
             return
-        from .press import force
-
-        deep = np.zeros((len(rows), 1))
-        force(0.0, rest, rest, np.zeros_like(rest), rows, numbers, deep)
-        worst = int(deep[:, 0].argmax())
-        if deep[worst, 0] <= ROUNDING * self.radius:
+        apart = distances(rest, rows, numbers)
+        worst = int(apart.argmin())
+        deep = 2.0 * self.radius - apart[worst]
+        if deep <= ROUNDING * self.radius:
             return
         one, other = net.line[chosen[worst]]
         raise InputError(
-            f"radius = {self.radius:g}: lines {one} and {other} overlap by {deep[worst, 0]:.3g} m in the web's "
-            f"position, without being neighbours: it must be ≤ {0.5 * (2.0 * self.radius - deep[worst, 0]):.4g} [m], "
+            f"radius = {self.radius:g}: lines {one} and {other} overlap by {deep:.3g} m in the web's "
+            f"position, without being neighbours: it must be ≤ {0.5 * apart[worst]:.4g} [m], "
             "or the lines further apart"
         )
 
