@@ -508,7 +508,8 @@ def test_linked_loops_do_not_separate(damping):
 
 def test_what_is_too_soft_is_refused():
     scene, rings = loops(HOPF, stiffness=1.0)
-    with pytest.raises(SolverError, match=r"overlap by .* more than their radius 0\.005, .* stiffness = .* may be enough .*, or leave it"):
+    told = r"overlap by .* more than their radius 0\.005, .* stiffness = .* may be enough .*, or leave it"
+    with pytest.raises(SolverError, match=told):
         refweb.run(pulled(scene, rings, 1.0), progress=False)
 
 

@@ -46,9 +46,10 @@ LIMITS = {
 The fewer lines there are, the more a step has of what goes with steps and rows. In runs of 18 000 steps cables of 50,
 100, 200, 400 and 1000 elements take 2.0, 1.7, 1.6, 1.5 and 1.1 times as long as the lean loop, and 1.6, 1.4, 1.3, 1.3
 and 1.2 times as long as the same arithmetic in C. That takes 1.6 times as long as the lean loop itself for the cable of
-100 elements, on a CPU (AMD EPYC of the first generation) that halves vectors of four: hence its limit. Of the 60 000 steps of the cable here two thirds of the time are
-strains and forces, which with displacements as unknowns take as long as all of the lean loop, a fifth kicks, drifts and
-peaks, and the rest history rows, one in 60 steps, and what begins and ends a run.
+100 elements, on a CPU (AMD EPYC of the first generation) that halves vectors of four: hence its limit. Of the 60 000
+steps of the cable here two thirds of the time are strains and forces, which with displacements as unknowns take as long
+as all of the lean loop, a fifth kicks, drifts and peaks, and the rest history rows, one in 60 steps, and what begins
+and ends a run.
 """
 
 SOURCE = r"""

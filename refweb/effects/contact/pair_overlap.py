@@ -116,8 +116,8 @@ class DeepestPair(NamedTuple):
     @property
     def _remedy(self):
         return (
-            f"stiffness = {self.enough:g} may hold them to {AIM * self.allowed:.3g} m in place of {self.stiffness:g}, or "
-            "leave it out"
+            f"stiffness = {self.enough:g} may hold them to {AIM * self.allowed:.3g} m in place of {self.stiffness:g}, "
+            "or leave it out"
         )
 
 
