@@ -75,7 +75,7 @@ def outcome(scene):
         return f"{own:.4g} m deep in a row, {told['overlap']:.4g} m are told"
     if any(through(state, body) for _, state in solution.frames):
         return "went through"
-    said = any("is enough" in text for text in solution.warnings)
+    said = any("should be enough" in text for text in solution.warnings)
     if said != (told["overlap"] > allowed):
         return f"{told['overlap']:.4g} m of {allowed:.4g} m: {'said' if said else 'silent'}"
     return "said" if said else "held"
