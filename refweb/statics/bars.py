@@ -45,27 +45,40 @@ class Bars:
         along = ((self._net.bars @ change) * self.direction).sum(axis=1)
         return np.maximum(self.stiffness * (self.natural * self._strain + along), 0.0)
 
-    def across(self, tension):
-        """What other tensions make of the stiffness across the bars, a block per element (cells, 3 nodes, 3 nodes)."""
+    def lent(self, share):
+        """Stiffness that slack bars are lent [N/m]: that of a smooth law, η a share of the mean strain of the taut."""
+        slack, taut = self._strain < 0.0, self._strain > 0.0
+        width = share * self._strain[taut].mean() if taut.any() else 0.0
+        if not (width > 0.0 and slack.any()):
+            return np.zeros_like(self._strain)
+        root = np.sqrt(self._strain**2 + 4.0 * width**2)
+        return np.where(slack, self.stiffness * 2.0 * width**2 / ((root - self._strain) * root), 0.0)
+
+    def besides(self, tension, along):
+        """What other tensions make of the stiffness across the bars, and a stiffness ``along`` them that is added.
+
+        A block per element, shape (cells, 3 nodes, 3 nodes).
+        """
         net = self._net
-        off = (tension - self.tension) / np.where(self.length > 0, self.length, 1.0)
+        across = (tension - self.tension) / np.where(self.length > 0, self.length, 1.0)
         size = 3 * net.gradients.shape[1]
         blocks = np.zeros((len(net.cells), size, size))
-        _add_across(off, self.direction, net.weights[:, None] * net.gradients, blocks)
+        _add_bars(across, along, self.direction, net.weights[:, None] * net.gradients, blocks)
         return blocks
 
 
 @kernel()
-def _add_across(off, direction, shares, blocks):
-    """Add stiffness [N/m] across the direction of each bar, whose vector has ``shares`` of its element's nodes."""
+def _add_bars(across, along, direction, shares, blocks):
+    """Add stiffness [N/m] across and along the direction of each bar, whose vector has ``shares`` of its nodes."""
     points, nodes = shares.shape
     for c in range(blocks.shape[0]):
         for q in range(points):
             n = c * points + q
             for a in range(nodes):
                 for b in range(nodes):
-                    d = off[n] * shares[q, a] * shares[q, b]
+                    share = shares[q, a] * shares[q, b]
+                    d, e = share * across[n], share * (along[n] - across[n])
                     for i in range(3):
                         for j in range(3):
-                            blocks[c, 3 * a + i, 3 * b + j] -= d * direction[n, i] * direction[n, j]
+                            blocks[c, 3 * a + i, 3 * b + j] += e * direction[n, i] * direction[n, j]
                         blocks[c, 3 * a + i, 3 * b + i] += d

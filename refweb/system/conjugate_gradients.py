@@ -2,8 +2,8 @@
 
 Conjugate gradients on A y = b, with a factorization of M in place of M⁻¹, converge as √κ allows, κ the condition of
 M⁻¹A: between two load steps of a web, whose tensions differ by a factor of two or three, a solution to 1 % takes two or
-three of them. Each costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. What they do not
-reach in a few iterations a factorization of A itself does at less cost, and where A or M shows a direction without
+three of them. Each costs a ninth (rslab) to a thirtieth (SuperLU) of a factorization at 118 803 unknowns. What they do
+not reach in a few iterations a factorization of A itself does at less cost, and where A or M shows a direction without
 stiffness only that tells more: both end the iteration.
 """
 

@@ -314,9 +314,7 @@ def test_what_is_too_deep():
     """A warning names the pair and the stiffness that would do; a body in the core of another ends the run."""
     s = run(BALLS, 0.15, dict(stiffness=2e3))
     assert any('bodies "a" and "b" are' in text and "stiffness = " in text for text in s.warnings)
-    core = (
-        r'bodies "a" and "b" are (\S+) m deep .* in the core, more than 0\.5 of the 0\.1 m .*; stiffness = (\S+) may'
-    )
+    core = r'bodies "a" and "b" are (\S+) m deep .* in the core, more than 0\.5 of the 0\.1 m .*; stiffness = (\S+) may'
     with pytest.raises(refweb.SolverError, match=core) as refused:
         run(BALLS, 0.15, dict(stiffness=190.0))
     deep, enough = map(float, re.search(core, str(refused.value)).groups())

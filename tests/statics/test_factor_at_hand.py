@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from nets import system
 
+from refweb.effects.elasticity import strains
 from refweb.effects.load import Load
 from refweb.net.cable import Cable
 from refweb.net.lattices import Window
+from refweb.net.tension_laws import SMOOTH, tangent
 from refweb.statics import load_steps, newton
 from refweb.statics.bars import Bars
 from refweb.statics.duality_bound import duality_bound
@@ -82,14 +84,14 @@ def test_what_tensions_make_of_the_stiffness(order):
     net, rng = net_system.net, np.random.default_rng(order)
     bars = Bars(net, 1e-5 * rng.normal(size=(net_system.rows, 3)))
     assert (bars.tension > 0.0).all()
-    doubled = bars.across(2.0 * bars.tension)
+    doubled = bars.besides(2.0 * bars.tension, 0.0 * bars.tension)
     # Of bars with tension T alone: Bᵀ (T/l) (1 − t⊗t) B.
     shares = net.weights[:, None] * net.gradients
     across = np.eye(3) - bars.direction[:, :, None] * bars.direction[:, None, :]
     across *= (bars.tension / bars.length)[:, None, None]
     expected = np.einsum("cqij,qa,qb->caibj", across.reshape(len(net.cells), -1, 3, 3), shares, shares)
     np.testing.assert_allclose(doubled, expected.reshape(doubled.shape), rtol=1e-12, atol=1e-12 * expected.max())
-    assert not bars.across(bars.tension).any()
+    assert not bars.besides(bars.tension, 0.0 * bars.tension).any()
 
 
 def test_tensions_ahead_are_of_first_order():
@@ -175,3 +177,15 @@ def test_the_next_step_starts_near_its_end():
         assert off(predicted(net_system, 4.0, before)) < 0.25 * off(states[2].x)
     # Through the last two where loads are not 0 at 0, and nowhere where load steps return.
     assert predicted(net_system, states[1].step, states[1:2]) is states[1].x
+
+
+def test_slack_bars_are_lent_what_a_smooth_law_has():
+    """Its η is a share of the mean strain of taut bars; these are lent nothing, and none is where no bar is slack."""
+    net = system(*_prestressed(), []).net
+    x = 1e-2 * np.random.default_rng(5).normal(size=(len(net.points), 3))
+    bars, strain = Bars(net, x), strains(net, x).ravel()
+    assert 0.1 < np.mean(strain < 0.0) < 0.9
+    expected = [tangent(SMOOTH, e, 1.0, 0.0, 0.1 * strain[strain > 0.0].mean()) for e in strain]
+    np.testing.assert_allclose(bars.lent(0.1), np.where(strain < 0.0, bars.stiffness * expected, 0.0), rtol=1e-12)
+    still = Bars(net, 0.0 * x)
+    assert not still.lent(0.1).any() and not bars.lent(0.0).any()
