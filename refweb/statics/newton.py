@@ -22,8 +22,8 @@ first load step of triangle webs takes 8, 10 and 11 factorizations at 30 150, 12
 
 A factorization that is near enough is used again, by conjugate gradients with the matrix of the step, see
 `refweb.system.conjugate_gradients`: of webs of 40 000 cells five load steps with their error bounds take 12
-factorizations by rslab (squares, 118 803 unknowns), 17 (triangles) and 22 (hexagons), by SuperLU, whose solutions cost
-less beside them, 10, 15 and 20. Forces without a potential have an
+factorizations by rslab (squares, 118 803 unknowns), 13 (triangles) and 22 (hexagons), by SuperLU, whose solutions cost
+less beside them, 10, 13 and 20. Forces without a potential have an
 unsymmetric tangent, its LU and a search of their own, see `refweb.statics.residual_search`.
 """
 
