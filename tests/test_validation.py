@@ -18,6 +18,7 @@ LONG = (
     "example_3",
     "cross_validation",
     "open_parameters",
+    "capture_satellite",
 )
 """Cases that take more than ten seconds with ``--quick``; what they show has tests of its own beside them."""
 

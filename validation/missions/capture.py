@@ -66,6 +66,12 @@ def judged(solution, name):
     covered = f"{throw['covered']['value']:.2f}"
     if (error := throw["covered"].get("error")) is not None:
         covered += f" ± {error:.2f}"
+    passages = "; ".join(f"lines through {what}: {told}" for what, told in passed.items())
+    if solution.lines:
+        passages += (
+            f"; lines are at most {1e3 * solution.lines['overlap']:.1f} mm deep in each other, of a radius of "
+            f"{1e3 * solution.lines['radius']:.0f} mm"
+        )
     verdicts = [
         Verdict(
             "Kinetic energy is never below that of the rigid union.",
@@ -77,9 +83,7 @@ def judged(solution, name):
         Verdict(
             "Nothing can have passed.",
             "holds",
-            f"lines through bodies: {passed['bodies']}; lines through lines: {passed['lines']}; lines are at most "
-            f"{1e3 * solution.lines['overlap']:.1f} mm deep in each other, of a radius of "
-            f"{1e3 * solution.lines['radius']:.0f} mm",
+            passages,
             all(told == "certified" for told in passed.values()),
         ),
         Verdict(

@@ -25,7 +25,7 @@ MASS = 600.0
 
 
 def case(quick):
-    values = {"web.layers": 2, "web.cell_area": 10.0, "self_contact.radius": 0.1} if quick else {}
+    values = {"web.layers": 3, "web.cell_area": 4.0, "self_contact": False} if quick else {}
     solution = refweb.run(refweb.Scene.load("capture-satellite", values))
     rows, verdicts = judged(solution, "satellite")
     volumes = [float(np.prod(size)) for size, _ in BOXES]
