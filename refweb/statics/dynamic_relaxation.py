@@ -10,7 +10,16 @@ import numpy as np
 
 from ..kernels import FORCE, INDICES, MATRIX, kernel, typed_list
 from ..system.at_rest import at_rest
-from .equilibrium import LIMIT, TOLERANCE, Equilibrium, NotFound, check_supported, force_scale, residual
+from .equilibrium import (
+    LIMIT,
+    TOLERANCE,
+    Equilibrium,
+    NotFound,
+    check_supported,
+    force_scale,
+    residual,
+    where_nothing_touches,
+)
 
 SAFETY = 0.6
 """Half a kick from rest takes the stiffest vibration 2 `SAFETY`² of the way to its middle. Where it goes beyond, a net
@@ -115,11 +124,12 @@ class Relaxation:
             if error < 0.9 * best:
                 best, since = error, done
             if done >= self.most or done - since >= self._stalled or not np.isfinite(error):
-                raise NotFound(
+                failed = NotFound(
                     f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
                     f'{LIMIT:g}; use method = "newton"',
                     {"nsteps": done},
                 )
+                raise where_nothing_touches(system, t, failed)
             relax(LOOK, t, x, v, f, inverse, self._kernels, self._cells, data, self._per_cell)
             done += LOOK
             self.progress(f"step {t:g}, residual {error:.0e}")

@@ -75,24 +75,42 @@ def check_supported(system, t):
     """Refuse a load that no support carries, a frame that turns too fast, and links."""
     if system.constraints:
         raise InputError('[[link]] needs kind = "dynamic" and method = "ida": statics does not hold lengths')
-    outer = system.outer_force(t)
-    for rows, axis, _ in system.unsupported_parts:
-        resultant = np.sum(outer[rows, axis])
-        if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
-            first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
-            remedy = "support one of them"
-            if system.rotating:
-                kind = system.rotating[0].name
-                balanced = {"frame": "the axis", "orbit": "the track"}[kind]
-                remedy += f", or move the web so that its centre of mass is on {balanced} of [{kind}]"
-            raise SolverError(
-                f"no equilibrium: a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by "
-                f"{resultant:.4g} N at step {t:g}, with no support in that direction: {remedy}"
-            )
+    if carried := carried_off(system, t, system.unsupported_parts):
+        if system.rotating:
+            kind = system.rotating[0].name
+            balanced = {"frame": "the axis", "orbit": "the track"}[kind]
+            carried += f", or move the web so that its centre of mass is on {balanced} of [{kind}]"
+        raise SolverError(f"no equilibrium: {carried}")
     if system.rotating:
         from .critical_speed import check_speed
 
         check_speed(system, t)
+
+
+def carried_off(system, t, parts):
+    """Which of some parts the outer forces carry off, and what to do about it, in words; None where they balance."""
+    outer = system.outer_force(t)
+    for rows, axis, _ in parts:
+        resultant = np.sum(outer[rows, axis])
+        if abs(resultant) > 1e-12 * np.abs(outer[rows]).sum() > 0:
+            first = ", ".join(map(str, rows[:4])) + (", ..." if len(rows) > 4 else "")
+            return (
+                f"a mechanism of {len(rows)} nodes ({first}) is carried off along {'xyz'[axis]} by {resultant:.4g} N "
+                f"at step {t:g}, with no support in that direction: support one of them"
+            )
+    return None
+
+
+def where_nothing_touches(system, t, error):
+    """A `NotFound` with what is carried off where nothing touches anything, if that holds anything at all."""
+    if all(family.name not in ("contact", "self_contact") for family in system.families):
+        return error
+    from ..system.unsupported_parts import found
+
+    carried = carried_off(system, t, found(system, touching=False))
+    if carried is None:
+        return error
+    return NotFound(f"{error}; while it touches nothing, {carried}, or start where it touches", error.stats)
 
 
 def force_scale(system, t, x, tension):

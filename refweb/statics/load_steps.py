@@ -12,7 +12,7 @@ import numpy as np
 from ..net.net import AXIAL_STIFFNESS, G0
 from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.at_rest import at_rest
-from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
+from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_touches
 from .newton import Newton
 
 MOST = 400
@@ -47,7 +47,10 @@ def solve(system, load_steps, progress=None):
     system = at_rest(system)
     newton, states = Newton(system, progress, load_steps[0]), []
     for t in load_steps:
-        state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
+        try:
+            state = _equilibrium(newton, t, _start(system, t, states), warm=bool(states))
+        except NotFound as error:
+            raise where_nothing_touches(system, t, error) from None
         if system.convex:
             from .duality_bound import duality_bound
             from .floating import between_slack_lines

@@ -15,12 +15,13 @@ class Part(NamedTuple):
     unknowns: np.ndarray
 
 
-def found(system):
-    """Every `Part` of a system."""
+def found(system, touching=True):
+    """Every `Part` of a system; unless ``touching``, as if nothing touched anything."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    cells = [f.cells for f in system.families if f.cells.shape[1] > 1]
+    families = [f for f in system.families if touching or f.name not in ("contact", "self_contact")]
+    cells = [f.cells for f in families if f.cells.shape[1] > 1]
     pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
     count, part = connected_components(graph, directed=False)

@@ -94,6 +94,22 @@ def test_force_is_the_slope_of_an_energy(pair, law):
     assert touched >= 4
 
 
+def test_axes_that_cross_push_with_the_windows_of_both():
+    """k (W + W') δ of two capsules at right angles, W = 4 ξ (1 − ξ) at the share ξ of either axis, but for order δ."""
+    turned, k, radius, deep = dict(radius=0.2, length=1.0), 1e3, 0.2, 1e-6
+    bodies = [
+        refweb.Body(name="a", shape="capsule", axis=(1, 0, 0), position=(0.2, 0, 0), mass=1.0, **turned),
+        refweb.Body(
+            name="b", shape="capsule", axis=(0, 1, 0), position=(0, 0.3, 2 * radius - deep), mass=1.0, **turned
+        ),
+    ]
+    net = discretisation.build(FAR, CABLE)
+    whole = System(net, [*bodies, refweb.Contact(between_bodies=True, stiffness=k)], np.zeros((2, 3), dtype=bool))
+    force = whole.force(0.0, np.zeros((whole.rows, 3)))
+    windows = [4.0 * (0.5 - off) * (0.5 + off) for off in (0.2, 0.3)]
+    assert force[whole.net.bodies[1].row, 2] == pytest.approx(k * sum(windows) * deep, rel=1e-4)
+
+
 @pytest.mark.parametrize("pair", [("sphere", "box"), ("capsule", "cylinder"), ("box", "box"), ("box", "cylinder")])
 @pytest.mark.parametrize("held", [False, True])
 def test_tangents(pair, held):

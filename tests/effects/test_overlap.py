@@ -5,6 +5,7 @@ A line of one element between two supports does not give way: a ball on it is an
 
 import json
 import tomllib
+from dataclasses import replace
 
 import nets
 import numpy as np
@@ -276,6 +277,16 @@ def test_twins_share_the_stiffness():
     assert twin.system is simulation.system
     with pytest.raises(refweb.InputError, match='stiffness is missing for body "ball"'):
         refweb.Contact().on(scene.build().net)
+
+
+@pytest.mark.parametrize("stiffness", [1e3, None])
+def test_what_is_moved_through_a_body_is_no_matter_of_stiffness(stiffness):
+    """A line both of whose nodes move as prescribed, through a fixed ball."""
+    under = ball(speed=0.0, gap=0.2, fixed=True, mass=None)
+    through = refweb.Motion(node=[0, 1], displacement=[[0, 0, 0, 0], [0.06, 0, 0, -0.6]])
+    scene = hit(under, contact=dict(stiffness=stiffness), effects=[through], web=replace(HELD, supports=[]))
+    with pytest.raises(refweb.SolverError, match="held or moved as prescribed, and no stiffness keeps them apart"):
+        refweb.run(scene)
 
 
 def test_where_a_body_starts_is_no_matter_of_stiffness():

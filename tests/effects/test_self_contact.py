@@ -118,6 +118,30 @@ def test_forces_are_the_gradient_and_keep_momenta():
         assert np.abs(np.cross(pair.points + x, force).sum(axis=0)).max() <= 1e-14 * size
 
 
+def test_stretched_lines_push_with_the_mean_of_their_stretches():
+    """Of lines that cross: times k h (4 r² − h²)^(3/2)/(√27 r³), up to (c/L)² of lines 1000 radii long."""
+    height, lengths = 0.13, (80.0, 125.0)
+    pair = Pair(1000.0 * RADIUS * np.array(lines(1.1, 0.0)) + [[0, 0, 0], [0, 0, 0], [0, 0, height], [0, 0, height]])
+    pair.data[0, [LENGTH, OTHER]] = lengths
+    force, _ = pair.force()
+    push = STIFFNESS * height * (4.0 * RADIUS**2 - height**2) ** 1.5 / (np.sqrt(27.0) * RADIUS**3)
+    stretches = 1000.0 * RADIUS / np.array(lengths)
+    assert force[2:, 2].sum() == pytest.approx(push * stretches.mean(), rel=1e-5)
+
+
+def test_what_only_contact_could_carry_is_named_in_statics():
+    """A line that is free to fall on another, and does not touch it yet."""
+    scene = refweb.Scene(
+        web=Web([[-0.5, 0, 0], [0.5, 0, 0], [0, -0.5, 0.03], [0, 0.5, 0.03]], [[0, 1], [2, 3]], rim=[0, 1]),
+        support=[refweb.Supports(nodes=[2, 3], components=["x", "y"])],
+        cable=refweb.Cable(law="linear", modulus=1e7, area=1e-4, density=1000.0),
+        effects=[refweb.Load(node=[2, 3], force=(0, 0, -5)), refweb.SelfContact(radius=0.01, stiffness=1000.0)],
+        solve=refweb.Static(),
+    )
+    with pytest.raises(refweb.SolverError, match=r"while it touches nothing, a mechanism of 2 nodes \(2, 3\)"):
+        refweb.run(scene)
+
+
 @pytest.mark.parametrize("beyond, height", [(0.25, 0.05), (0.12, 0.17), (0.15, 0.19), (0.19, 0.19)])
 def test_what_reaches_past_an_end_pushes_further_than_lines_are_thick(beyond, height):
     """Segments that are apart by up to √2 of the distance of touch have an energy; differences of 1e-6 as above."""

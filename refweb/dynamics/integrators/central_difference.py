@@ -305,8 +305,9 @@ class CentralDifference(Integrator):
     def _way_out(self, x, step):
         """What to do about too short a step [s]: speeds ask for it where at rest it would be over twice as long."""
         if self.bound(x) * self.safety * self.stretch > 2.0 * step:
-            return "nothing may pass through a body in one, at the speeds there are; use a thicker body or slower ones"
-        return "ask for shorter rows, or lower the stiffness that asks for the step"
+            told = "nothing may pass through a body in one, at the speeds there are"
+            return f"{told}; use a thicker body, slower ones or less damping"
+        return "ask for shorter rows, or lower the stiffness, damping or friction that asks for the step"
 
     def _again(self, course, before, running):
         """What takes steps from ``before`` [s] again: ``after(state, begun, count)``.

@@ -114,6 +114,8 @@ class Deepest(NamedTuple):
         Whether the stiffness is refweb's choice.
     initial : float
         Overlap at t = 0 [m], which no stiffness changes.
+    held : bool
+        Whether neither the line nor the body is free to give way.
     """
 
     body: RigidBody
@@ -126,6 +128,7 @@ class Deepest(NamedTuple):
     least: float
     chosen: bool
     initial: float
+    held: bool = False
 
     @property
     def too_deep(self):
@@ -177,7 +180,7 @@ class Deepest(NamedTuple):
             raise SolverError(
                 f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
             )
-        if self.chosen and self.too_deep and self.overlap > DEEPER * self.initial:
+        if self.chosen and not self.held and self.too_deep and self.overlap > DEEPER * self.initial:
             raise too_soft(self, f"line {self.line} is {self._where()}", allowed(self.body), [self.body.name])
         if self.in_core:
             raise SolverError(
@@ -195,10 +198,11 @@ class Deepest(NamedTuple):
             yield f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
 
     def _remedy(self):
-        power = f"1/{self.exponent + self.moving:g}"
+        if self.held:
+            return "all its nodes and the body are held or moved as prescribed, and no stiffness keeps them apart"
         return (
             f"stiffness = {self.enough:g} should be enough in place of {self.stiffness:g}, or leave it out "
-            f"(the overlap falls with k to the power {power})"
+            f"(the overlap falls with k to the power 1/{self.exponent + self.moving:g})"
         )
 
 
@@ -235,11 +239,12 @@ class Overlaps:
         body, (stiffness, exponent), least = self.bodies[i], self._laws[i], 0.0
         if overlap > CORE * body.thickness:
             least = first_stiffness(self.system, body, exponent, self._load_steps)
-        chosen = body.name in self._chosen
         if self._moving and time == 0.0:
             self._initial[i] = overlap
-        initial = self._initial[i]
-        return Deepest(body, overlap, time, line, stiffness, exponent, self._moving, least, chosen, initial)
+        net, supported = self.system.net, self.system.supported
+        held = line is not None and bool(supported[[body.row, *net.cells[net.line == line].ravel()]].all())
+        own = stiffness, exponent, self._moving, least, body.name in self._chosen, self._initial[i], held
+        return Deepest(body, overlap, time, line, *own)
 
     def stiffness_of(self, body):
         """Stiffness of the contact of a body [N/m^p]."""
@@ -337,18 +342,15 @@ def first_between(system, bodies, exponent):
     """
     net, deep = system.net, AIM * min(map(allowed, bodies))
     if not math.isfinite(deep):
-        raise InputError(
-            f'stiffness is missing for bodies "{bodies[0].name}" and "{bodies[1].name}", whose size is infinite: give '
-            "stiffness = ..."
-        )
+        named = " and ".join(f'"{body.name}"' for body in bodies)
+        raise InputError(f"stiffness is missing for bodies {named}, whose size is infinite: give stiffness = ...")
     v, force = system.initial_velocity(), np.where(system.supported, 0.0, system.outer_force(0.0))
     free = [body for body in bodies if not body.fixed]
     mass = 1.0 / sum(1.0 / net.mass[body.row] for body in free)
     falls = [np.zeros(3) if body.fixed else force[body.row] / net.mass[body.row] for body in bodies]
-    gap = float(np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]))
-    gap = max(gap - sum(body.thickness for body in bodies), 0.0)
+    gap = np.linalg.norm(net.points[bodies[0].row] - net.points[bodies[1].row]) - sum(b.thickness for b in bodies)
     square = float(((v[bodies[0].row] - v[bodies[1].row]) ** 2).sum())
-    square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * gap
+    square += 2.0 * float(np.linalg.norm(falls[0] - falls[1])) * max(float(gap), 0.0)
     turns = [body for body in free if body.turn is not None]
     turning = sum(0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v)) for body in turns)
     push = sum(float(np.linalg.norm(force[body.row])) for body in net.bodies if not body.fixed)

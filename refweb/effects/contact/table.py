@@ -99,8 +99,10 @@ class Contact(Table):
         do not depend on it.
     between_bodies : bool
         Whether bodies touch each other as well, edges on edges too: all but pairs that are both fixed. They do so with
-        each corner once, with each edge once between its ends, and with rims; a sphere touches once. Each contact has
-        the push k δ^p. Stiffness, damping, friction and slip velocity of a pair are the larger of both bodies'.
+        each corner once, with each edge, as with the axis of a capsule, once between its ends, and with rims; a sphere
+        touches once. Each contact has the push k δ^p, one of an edge that of a line, k W δ^p: it fades towards the
+        ends, and edges that cross have one each. Stiffness, damping, friction and slip velocity of a pair are the
+        larger of both bodies'.
     bodies : dict of str to BodyContact
         What differs for a body.
 

@@ -45,6 +45,11 @@ def lines_of(net, nodes):
     return f"lines {one} and {other}"
 
 
+def holding(energy, radius):
+    """Stiffness that stores an energy [J] at `AIM` of a radius [m], where lines cross [N/m]."""
+    return energy / (HELD * radius**2)
+
+
 def would_pass(system, v, nodes):
     """That two lines would pass, and which stiffness would hold them; ``nodes (4,)`` are those of both.
 
@@ -58,7 +63,7 @@ def would_pass(system, v, nodes):
     speed = max(float(np.linalg.norm(v[i] - v[k])) for i in pairs[0] for k in pairs[1])
     if np.isinf(mass):
         return f"{given}: {PRESCRIBED}"
-    enough = max(0.5 * mass * speed**2 / (HELD * (0.5 * crossing.touch) ** 2), 2.0 * crossing.stiffness)
+    enough = max(holding(0.5 * mass * speed**2, 0.5 * crossing.touch), 2.0 * crossing.stiffness)
     return (
         f"{given}: [self_contact] stiffness = {float(f'{enough:.2g}'):g} would hold what comes at {speed:.3g} m/s, in "
         f"place of {crossing.stiffness:.3g}"
@@ -84,7 +89,7 @@ def first_stiffness(system):
     v = system.initial_velocity()[: system.rows - net.spins]
     speed = float(np.linalg.norm(np.ptp(v, axis=0)))
     mass = 0.5 * float(net.mass[net.cells].sum(axis=1).max())
-    return max(lines, float(f"{0.5 * mass * speed**2 / (HELD * (0.5 * touch) ** 2):.2g}"))
+    return max(lines, float(f"{holding(0.5 * mass * speed**2, 0.5 * touch):.2g}"))
 
 
 class Passage:
@@ -150,7 +155,7 @@ class Passage:
         heavy = mass[cells[own if own.ndim else slice(None)]].sum(axis=1).max()
         moving = 0.25 * heavy * float((np.ptp(v[nodes], axis=0) ** 2).sum())
         stored = self._stiffness * min(overlap / (AIM * radius), 1.0) ** POWER
-        return max(enough, stored + moving / (HELD * radius**2))
+        return max(enough, stored + holding(moving, radius))
 
     def refuse(self, overlap, when, cell, v=None):
         """Refuse an overlap above the radius [m] of a cell, at a time or load step in words; v are velocities then.

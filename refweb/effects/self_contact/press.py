@@ -13,11 +13,12 @@ f takes that away: whatever the angle, at any place that is not at a free end,
 
     E = (16/15) κ (c² − h²)^(5/2) f/sin,        push = k h (c² − h²)^(3/2)/(√27 r³) · f/sin,
 
-where f/sin is 1 but for (c/L)². For a small overlap δ that is 3.08 k δ^(3/2)/√r, as crossed cylinders push by Hertz; at
-h = r it is k r and largest. Where what overlaps is further than c from all ends, both integrals are these roots and
-powers to rounding, and no sum is taken. Lines that lie along each other push with 2 κ f h (c² − h²)·2 on their length:
-elements of a pair together by up to k r again, over the length that they share. So the stiffness of a pair is of the
-order of k at any angle, and steps need not be shorter for lines that are parallel.
+where f/sin is 1 but for (c/L)², and both are times the mean of the stretches |u|/L and |w|/L'. For a small overlap δ
+that is 3.08 k δ^(3/2)/√r, as crossed cylinders push by Hertz; at h = r it is k r and largest. Where what overlaps is
+further than c from all ends, both integrals are these roots and powers to rounding, and no sum is taken. Lines that lie
+along each other push with 2 κ f h (c² − h²)·2 on their length: elements of a pair together by up to k r again, over the
+length that they share. So the stiffness of a pair is of the order of k at any angle, and steps need not be shorter for
+lines that are parallel.
 """
 
 from __future__ import annotations

@@ -28,10 +28,11 @@ class SelfContact(Table):
 
     Lines are round, and touch where their centre lines are less than two radii apart. Two elements push each other over
     the length on which they do, as a smooth function of their four nodes whatever their angle, see
-    `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³), which is k r
-    at half the distance of touch, where it is largest: what is pushed harder would pass, and is refused. Elements that
-    share a node do not push each other, nor do those that are within two radii of each other along the net at any
-    time of the run, as reels and heat change natural lengths.
+    `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³) times the
+    mean of their stretches, length over natural length. That is k r at half the distance of touch, where it is
+    largest: what is pushed harder would pass, and is refused. Elements that share a node do not push each other, nor do
+    those that are within two radii of each other along the net at any time of the run, as reels and heat change natural
+    lengths.
 
     Every pair of lines is followed from the start of a run on, and ``passage`` of ``run.json`` says "certified" where
     no two centre lines have met: before each drift of an explicit step, which is cut where two would meet, and in steps

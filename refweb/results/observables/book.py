@@ -113,7 +113,7 @@ class DissipatedEnergy(Booked):
     """What damping and friction have taken."""
 
     dynamic = True
-    needs = "[damping], [drag] in a fluid at rest, or damping or friction in [contact],"
+    needs = "[damping], [drag] in a fluid at rest, or damping or friction in [contact] or [self_contact],"
 
 
 class TotalEnergy(Booked):
