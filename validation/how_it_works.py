@@ -52,14 +52,14 @@ factorizes smaller webs, would take 28 to 36 times, and 48 where the CPU has lit
 takes 20 factorizations, 102 s and 3.2 GB at 747 003 unknowns, 21, 208 s and 6.1 GB at 1 465 803, and at a million
 cells, 1 998 000 lines and 2 994 003 unknowns, 23, 545 s and 12.5 GB, with energies proven to 2e-14 of themselves. CPU
 time goes with unknowns to the power 1.25 from 365 403 on, and 1.36 from 118 803: larger webs take more steps. That of
-triangles goes with 1.38 from 120 300 to 1 471 050, where it takes 35 factorizations, 339 s and 6.3 GB: each costs by
-the power 1.1, and their number grows with the fourth root. That of hexagons goes with 1.28 from 237 009 to 2 929 509:
-31, 371 s and 7.6 GB. Of the 12.5 GB the factor has 3.1 and needs 4.3 while it is made, beside 4 of web, pattern and
-analysis; at that rate two million cells would take 25. Memory is to be counted by what is filled: where a process may
-have no more than 16 GB of addresses, a million cells end it, as libraries ask for more than they use. Explicit steps
-need no matrix: of the million cells a thousand take 27 s, 14 ns an element and step, and 1.3 GB, with a set-up of 5 s;
-both go with unknowns to the power 1.1. Of hexagons, which have more nodes for each line, an element and step takes 24
-ns at 747 252 lines: out of the cache the time is that of memory. A single web larger than a machine is a matter for
-PETSc: its SNES with the same tangents, spread over machines, and conjugate gradients with a multigrid of the soft
-modes, or MUMPS, in place of the factor. ``python -m validation.cost.scale`` prints these figures for a machine.
+triangles goes with 1.25 from 30 150 to 120 300, and with 1.37 on to 368 025, where it takes 18 factorizations and 1.8
+GB: each costs by the power 1.1, and their number grows by the power 0.3. That of hexagons goes with 1.28 from 237 009
+to 2 929 509: 31, 371 s and 7.6 GB. Of the 12.5 GB the factor has 3.1 and needs 4.3 while it is made, beside 4 of web,
+pattern and analysis; at that rate two million cells would take 25. Memory is to be counted by what is filled: where a
+process may have no more than 16 GB of addresses, a million cells end it, as libraries ask for more than they use.
+Explicit steps need no matrix: of the million cells a thousand take 27 s, 14 ns an element and step, and 1.3 GB, with a
+set-up of 5 s; both go with unknowns to the power 1.1. Of hexagons, which have more nodes for each line, an element and
+step takes 24 ns at 747 252 lines: out of the cache the time is that of memory. A single web larger than a machine is a
+matter for PETSc: its SNES with the same tangents, spread over machines, and conjugate gradients with a multigrid of the
+soft modes, or MUMPS, in place of the factor. ``python -m validation.cost.scale`` prints these figures for a machine.
 """
