@@ -105,10 +105,7 @@ def test_pandas_and_pyvista(tmp_path):
     """In a process of its own, as OpenGL that is broken ends the one that it is in."""
     pandas = pytest.importorskip("pandas")
     script = [sys.executable, str(FOLDER / "pandas_and_pyvista.py"), str(tmp_path), "0.01"]
-    environment = os.environ | {
-        "PYTHONPATH": str(FOLDER.parents[1]),
-        "VTK_DEFAULT_OPENGL_WINDOW": render.windows()[0][0] or "",
-    }
+    environment = os.environ | {"VTK_DEFAULT_OPENGL_WINDOW": render.windows()[0][0] or ""}
     done = subprocess.run(script, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     table = pandas.read_csv(tmp_path / "history.csv", index_col=0)

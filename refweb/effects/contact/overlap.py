@@ -115,7 +115,7 @@ class Deepest(NamedTuple):
     initial : float
         Overlap at t = 0 [m], which no stiffness changes.
     held : bool
-        Whether neither the line nor the body is free to give way.
+        Whether it is deeper than allowed, and neither the line nor the body is free to give way.
     """
 
     body: RigidBody
@@ -128,7 +128,7 @@ class Deepest(NamedTuple):
     least: float
     chosen: bool
     initial: float
-    held: bool = False
+    held: bool
 
     @property
     def too_deep(self):
@@ -242,7 +242,7 @@ class Overlaps:
         if self._moving and time == 0.0:
             self._initial[i] = overlap
         net, supported = self.system.net, self.system.supported
-        held = line is not None and bool(supported[[body.row, *net.cells[net.line == line].ravel()]].all())
+        held = overlap > allowed(body) and bool(supported[[body.row, *net.cells[net.line == line].ravel()]].all())
         own = stiffness, exponent, self._moving, least, body.name in self._chosen, self._initial[i], held
         return Deepest(body, overlap, time, line, *own)
 
