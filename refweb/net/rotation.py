@@ -26,11 +26,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels import kernel
+from ..kernels import Cube, IntegerMatrix, Matrix, Record, Vector, kernel
 
 TURN = 0.25
 """Largest angle by which a series takes a body on [rad]; longer ways are several."""
@@ -97,7 +96,7 @@ def to_quaternion(block, x, spin, turn, at):
         block[i, at + 3] = -size * (k0 * a + k1 * b + k2 * c)
 
 
-class Turns(NamedTuple):
+class Turns(Record):
     """Bodies whose orientation counts.
 
     Attributes
@@ -128,18 +127,18 @@ class Turns(NamedTuple):
         What makes rates of the nodes those of the body, see `carry_rates`.
     """
 
-    rows: np.ndarray
-    moment: np.ndarray
-    mobility: np.ndarray
-    principal: np.ndarray
-    faster: np.ndarray
-    reach: np.ndarray
-    before: np.ndarray
-    room: np.ndarray
-    carried: np.ndarray
-    arms: np.ndarray
-    ahead: np.ndarray
-    scales: np.ndarray
+    rows: IntegerMatrix
+    moment: Vector
+    mobility: Cube
+    principal: Cube
+    faster: Matrix
+    reach: Matrix
+    before: Matrix
+    room: Matrix
+    carried: IntegerMatrix
+    arms: Matrix
+    ahead: Matrix
+    scales: Matrix
 
     @classmethod
     def of(cls, net):
@@ -212,8 +211,8 @@ def angular_velocity(n, x, v, turns):
     )
 
 
-@kernel(leaf=True)
-def more_kinetic(x, v, turns):
+@kernel(leaf=True, apart=("turning",))
+def more_kinetic(x: Matrix, v: Matrix, turns: Turns) -> float:
     """Kinetic energy of bodies that turn less ½ I |L/I|² of each [J], which their rows have as all others."""
     total = 0.0
     for n in range(turns.moment.size):
@@ -301,8 +300,8 @@ def fastest_about(n, u, turns):
     return first, second, third
 
 
-@kernel(leaf=True)
-def turn_on(h, v, x, turns):
+@kernel(leaf=True, apart=("turning",))
+def turn_on(h: float, v: Matrix, x: Matrix, turns: Turns) -> None:
     """Turn free bodies by a time h [s] from the quaternions that are noted, and write them to x."""
     for n in range(turns.moment.size):
         s, q = turns.rows[n, 1], turns.before[n]
@@ -317,8 +316,10 @@ def turn_on(h, v, x, turns):
     carry(x, v, turns)
 
 
-@kernel()
-def turns_within(s, h, old, x, v, turns, here, speed):
+@kernel(apart=("turning", "looks"))
+def turns_within(
+    s: float, h: float, old: Cube, x: Matrix, v: Matrix, turns: Turns, here: Matrix, speed: Matrix
+) -> None:
     """Write rotations, and what bodies carry, to ``here`` and ``speed``.
 
     They are those at the share s of a step of size h that begins at ``old`` (position, velocity, ...), and lie on the
@@ -340,6 +341,13 @@ def turns_within(s, h, old, x, v, turns, here, speed):
 
 @kernel(leaf=True)
 def carry(x, v, turns):
+    """Write places and velocities of the nodes that bodies carry, where they carry any."""
+    if turns.carried.shape[0]:
+        carry_nodes(x, v, turns)
+
+
+@kernel(leaf=True, apart=("carried",))
+def carry_nodes(x: Matrix, v: Matrix, turns: Turns) -> None:
     """Write places and velocities of the nodes that bodies carry."""
     for c in range(turns.carried.shape[0]):
         i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]
@@ -355,6 +363,13 @@ def carry(x, v, turns):
 
 @kernel(leaf=True)
 def hand_on(x, f, turns):
+    """Add the forces on nodes that bodies carry to those on the bodies, where they carry any."""
+    if turns.carried.shape[0]:
+        forces_to_bodies(x, f, turns)
+
+
+@kernel(leaf=True, apart=("carried",))
+def forces_to_bodies(x: Matrix, f: Matrix, turns: Turns) -> None:
     """Add the forces on nodes that bodies carry, and their moments, to those on the bodies."""
     for c in range(turns.carried.shape[0]):
         i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 
-from ..kernels import kernel
-from .rotation import along_principal, fastest_about, matrix_at
+from ..kernels import Matrix, Vector, kernel
+from .rotation import Turns, along_principal, fastest_about, matrix_at
 
 
-@kernel(leaf=True)
-def carry_rates(rates, turns):
+@kernel(leaf=True, apart=("carried",))
+def carry_rates(rates: Vector, turns: Turns) -> None:
     """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
 
     A node at the arm a moves by δ + θ × a. In place of its displacement there are two unknowns, scaled to be no more
@@ -24,8 +24,8 @@ def carry_rates(rates, turns):
         rates[turns.rows[n, 1]] += turns.scales[c, 1] * rates[i]
 
 
-@kernel(leaf=True)
-def pull_rates(rates, f, turns):
+@kernel(leaf=True, apart=("carried",))
+def pull_rates(rates: Vector, f: Matrix, turns: Turns) -> None:
     """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
     for c in range(turns.carried.shape[0]):
         i = turns.carried[c, 0]
@@ -58,8 +58,37 @@ def pushes(n, x, f, turns):
     return own, far[0] * w[0] * abs(m[0]) + far[1] * w[1] * abs(m[1]) + far[2] * w[2] * abs(m[2])
 
 
-@kernel()
-def beside_places(kick, drift, x, v, f, inverse, turns):
+@kernel(leaf=True, apart=("turning",))
+def fastest_surface(x: Matrix, v: Matrix, turns: Turns) -> float:
+    """Largest speed that rotation adds at the surface of any body while it moves freely, at most [m/s]."""
+    fastest = 0.0
+    for n in range(turns.moment.size):
+        fastest = max(fastest, speeds(n, x, v, turns)[1])
+    return fastest
+
+
+@kernel(leaf=True, apart=("turning",))
+def fastest_point(x: Matrix, v: Matrix, turns: Turns) -> float:
+    """Largest speed of any point of a body while it moves freely, at most [m/s]."""
+    fastest = 0.0
+    for n in range(turns.moment.size):
+        own, turning = speeds(n, x, v, turns)
+        fastest = max(fastest, own + turning)
+    return fastest
+
+
+@kernel(leaf=True, apart=("turning",))
+def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: Turns) -> float:
+    """Largest acceleration of any point of a body by forces f, at most [m/s²]."""
+    hardest = 0.0
+    for n in range(turns.moment.size):
+        force, moment = pushes(n, x, f, turns)
+        hardest = max(hardest, inverse[turns.rows[n, 0], 0] * force + inverse[turns.rows[n, 1], 0] * moment)
+    return hardest
+
+
+@kernel(apart=("turning", "guarded"))
+def beside_places(kick: float, drift: float, x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, turns: Turns) -> float:
     """By how much points of bodies come elsewhere than their places do in a drift behind a kick, at most [m].
 
     Of the surface that is what it turns by; of nodes that bodies carry how far they are off the way that the velocities

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels import FORCE, INDICES, MATRIX, kernel, typed_list
+from ..kernels import FORCE, INDICES, MATRIX, Arrays, Functions, kernel
 from ..system.at_rest import at_rest
 from .equilibrium import (
     LIMIT,
@@ -103,9 +103,9 @@ class Relaxation:
         self.system, self.progress = system, progress or (lambda text: None)
         self.most, self.tolerance, self.scale = most, tolerance, 0.0
         self._stalled = TOUCHING if system.contact else STALLED
-        self._kernels = typed_list(FORCE, [f.force for f in system.families])
-        self._cells = typed_list(INDICES, [f.cells for f in system.families])
-        self._per_cell = typed_list(MATRIX, system.per_cell())
+        self._kernels = Functions(FORCE, [f.force for f in system.families])
+        self._cells = Arrays(INDICES, [f.cells for f in system.families])
+        self._per_cell = Arrays(MATRIX, system.per_cell())
 
     def solve(self, t, x):
         """Equilibrium at load step t from the displacement x, see `refweb.statics.newton.Newton.solve`."""
@@ -113,7 +113,7 @@ class Relaxation:
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
-        inverse, data = self._inverse_mass(t), typed_list(MATRIX, [f.data for f in system.at(t).families])
+        inverse, data = self._inverse_mass(t), Arrays(MATRIX, [f.data for f in system.at(t).families])
         v, done, error, best, since = np.zeros_like(x), 0, np.inf, np.inf, 0
         while True:
             f, per_cell = system.forces(t, x)

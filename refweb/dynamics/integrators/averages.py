@@ -16,11 +16,15 @@ the parabola through the rates is kept as correction: ± is no less. It shows wh
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import kernel
+from ...kernels import Integers, Matrix, Record, Vector, kernel
+
+if TYPE_CHECKING:
+    from .extremes import Extremes
+    from .records import Observed
 
 CELLS = 1024
 """Number of cells of a window. The mean of a sine over a whole period is off its largest value by 4e-12 of that."""
@@ -34,7 +38,7 @@ NEAR = 1e-12
 """Share of a time within which a step that ends before the end of a cell is taken to meet it."""
 
 
-class Windows(NamedTuple):
+class Windows(Record):
     """What means are asked for.
 
     Attributes
@@ -47,9 +51,9 @@ class Windows(NamedTuple):
         1 for the largest mean of all full windows, −1 for the smallest, 0 for neither.
     """
 
-    slots: np.ndarray
-    widths: np.ndarray
-    signs: np.ndarray
+    slots: Integers
+    widths: Vector
+    signs: Vector
 
     @classmethod
     def of(cls, probes):
@@ -59,7 +63,7 @@ class Windows(NamedTuple):
         return cls(slots, widths, np.array([float(probes[i].sign) for i in slots]))
 
 
-class Averages(NamedTuple):
+class Averages(Record):
     """What is known of means at the last look.
 
     Attributes
@@ -83,15 +87,15 @@ class Averages(NamedTuple):
         Time of the last look [s].
     """
 
-    integrals: np.ndarray
-    values: np.ndarray
-    passed: np.ndarray
-    integral: np.ndarray
-    opens: np.ndarray
-    open: np.ndarray
-    within: np.ndarray
-    latest: np.ndarray
-    looked: np.ndarray
+    integrals: Matrix
+    values: Matrix
+    passed: Integers
+    integral: Vector
+    opens: Matrix
+    open: Vector
+    within: Matrix
+    latest: Matrix
+    looked: Vector
 
     @classmethod
     def at_start(cls, values=()):
@@ -225,8 +229,8 @@ def mean_now(n, windows, averages):
     return (averages.integral[n] - averages.integrals[n, low] - past) / width, (averages.within[n, 0] - value) / width
 
 
-@kernel()
-def write_means(row, windows, averages, extremes):
+@kernel(apart=("averages",))
+def write_means(row: Vector, windows: Windows, averages: Averages, extremes: Extremes) -> None:
     """Write means to a row of a history, in the places of their probes; no extreme is less than those."""
     for n in range(windows.slots.size):
         mean, rate = mean_now(n, windows, averages)
@@ -238,8 +242,18 @@ def write_means(row, windows, averages, extremes):
             compare(n, begin, averages.looked[0], mean, rate, windows, averages, extremes)
 
 
-@kernel()
-def look_for_means(part, t, x, v, f, lines, where, observed, averages):
+@kernel(apart=("averages",))
+def look_for_means(
+    part: int,
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    where: Integers,
+    observed: Observed,
+    averages: Averages,
+) -> None:
     """Look at all values that are averaged, at the end of a part of a step; 0 is its start."""
     slots = observed.windows.slots
     for n in range(slots.size):
@@ -247,8 +261,19 @@ def look_for_means(part, t, x, v, f, lines, where, observed, averages):
         averages.within[n, part] = observed.probes[i](t, x, v, f, lines, observed.rows[i], observed.data[i], where)
 
 
-@kernel()
-def average(now, x, v, f, lines, where, smooth, observed, averages, extremes):
+@kernel(apart=("averages",))
+def average(
+    now: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    where: Integers,
+    smooth: bool,
+    observed: Observed,
+    averages: Averages,
+    extremes: Extremes,
+) -> None:
     """Slide all windows to the end of a step."""
     look_for_means(PARTS, now, x, v, f, lines, where, observed, averages)
     for n in range(observed.windows.slots.size):

@@ -8,11 +8,13 @@ forces: nothing is kept for it in all the steps that have no peak.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numba import types
 
-from ...kernels import copy_rows, inner, kernel
+from ...kernels import Cube, Integers, Matrix, Record, Vector, array_of, copy_rows, inner, kernel
 from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
@@ -20,6 +22,10 @@ from .extremes import EDGE, Extremes, correction, look, look_at, look_at_sums, t
 from .nearby import show_near
 from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
 
+if TYPE_CHECKING:
+    from .records import Model, Observed, Running
+
+FourfoldArray = array_of(types.float64, 4)
 LOOKS = PARTS
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
 SAME_PEAK = 1e-3
@@ -28,31 +34,54 @@ BEHIND = 0.51
 """Share of a step by which its motion is taken to go on before its start, where a peak about that is looked for."""
 
 
-class Inside(NamedTuple):
-    """Space to look at the inside of a long step with.
+class Inside(Record):
+    """Space to look at the inside of a step with.
 
     Attributes
     ----------
     before, state : ndarray, shape (3, rows, 3)
         Position, velocity and acceleration at its start; position, velocity and force at a place within.
+    ends : ndarray, shape (3, 3, rows, 3)
+        Position, velocity and force at the ends of the last steps.
     lines : ndarray, shape (cells, columns)
         What lines show there.
+    alone : refweb.dynamics.integrators.extremes.Extremes
+        Those of the run, with looks of their own.
+    where : ndarray of int, shape (2,)
+        Space for the place of a value.
+    total : ndarray, shape (families + 3,)
+        Space for energies.
     """
 
-    before: np.ndarray
-    state: np.ndarray
-    lines: np.ndarray
+    before: Cube
+    state: Cube
+    ends: FourfoldArray
+    lines: Matrix
+    alone: Extremes
+    where: Integers
+    total: Vector
+
+    @classmethod
+    def of(cls, rows, lines, extremes, sums):
+        """Space for a number of rows, what lines show, the extremes of a run, and a number of energies."""
+        space = np.empty((5, 3, rows, 3))
+        alone = replace(extremes, recent=np.empty_like(extremes.recent), looked=np.empty_like(extremes.looked))
+        where = np.zeros(2, dtype=np.int64)
+        return cls(space[0], space[1], space[2:], np.empty_like(lines), alone, where, np.empty(sums))
 
 
-@kernel()
-def room_inside(rows, lines):
-    """Space for looks inside, of no size where there are no rows."""
-    space = np.empty((6, rows, 3))
-    return Inside(space[:3], space[3:], np.empty_like(lines) if rows else lines)
-
-
-@kernel()
-def look_at_books(t, x, v, total, extremes, ending, model, observed, running):
+@kernel(apart=("books",))
+def look_at_books(
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    total: Vector,
+    extremes: Extremes,
+    ending: bool,
+    model: Model,
+    observed: Observed,
+    running: Running,
+) -> bool:
     """Look for extremes of energies at the end of a step."""
     families = model.families
     book_energies(
@@ -62,8 +91,10 @@ def look_at_books(t, x, v, total, extremes, ending, model, observed, running):
     return look_at_sums(t, total, observed, extremes, ending)
 
 
-@kernel()
-def book_within(t, now, x, v, smooth, total, model, running):
+@kernel(apart=("books",))
+def book_within(
+    t: float, now: float, x: Matrix, v: Matrix, smooth: bool, total: Vector, model: Model, running: Running
+) -> None:
     """Write energies at a state ahead of the last one.
 
     Work there is that until ``now`` less what they still gain, where the motion is ``smooth``; else it stays: in a
@@ -83,8 +114,8 @@ def book_within(t, now, x, v, smooth, total, model, running):
         total[-2] -= last - own_energy(total, working)
 
 
-@kernel()
-def forces_at(t, x, v, f, lines, model):
+@kernel(apart=("looks",))
+def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: Model) -> None:
     """Write all forces at a state and a time to f, and what lines show; natural lengths become those of that time."""
     families, motions = model.families, model.motions
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
@@ -99,11 +130,12 @@ def forces_at(t, x, v, f, lines, model):
     for i in model.rubbed.families:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
     hand_on(x, f, model.inertia.turns)
-    show_near(model.nearby, families)
+    if model.nearby.families.size:
+        show_near(model.nearby, families)
 
 
-@kernel()
-def step_back(t, h, end, start, lines, model):
+@kernel(apart=("watched", "kicks"))
+def step_back(t: float, h: float, end: Cube, start: Cube, lines: Matrix, model: Model) -> None:
     """Take a kick, a drift and a kick of size h back, from a state ``end`` to that at time t.
 
     Forces that follow from velocity see that of the middle of the step.
@@ -122,8 +154,10 @@ def step_back(t, h, end, start, lines, model):
             start[1, r, k] -= 0.5 * h * inverse[r, k] * start[2, r, k]
 
 
-@kernel()
-def state_within(t, now, h, x, v, f, smooth, inside, model):
+@kernel(apart=("looks",))
+def state_within(
+    t: float, now: float, h: float, x: Matrix, v: Matrix, f: Matrix, smooth: bool, inside: Inside, model: Model
+) -> None:
     """Write the state at a time in a step of size h that ends ``now`` at x, v, f, and what lines show.
 
     The step is of a higher order, and its motion ``smooth``, or a kick, a drift and a kick.
@@ -138,8 +172,8 @@ def state_within(t, now, h, x, v, f, smooth, inside, model):
     forces_at(t, here[0], here[1], here[2], inside.lines, model)
 
 
-@kernel()
-def show_again(now, inside, model, observed, running):
+@kernel(apart=("looks",))
+def show_again(now: float, inside: Inside, model: Model, observed: Observed, running: Running) -> None:
     """Write natural lengths, and what families show that probes read, of the end of a step over that of its inside."""
     families = model.families
     if model.reels.lengths.size:
@@ -148,13 +182,24 @@ def show_again(now, inside, model, observed, running):
         families.forces[i](
             now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
         )  # fmt: skip
-    show_near(model.nearby, families)
+    if model.nearby.families.size:
+        show_near(model.nearby, families)
 
 
-@kernel()
-def take_peak(t, now, smooth, inside, total, extremes, model, observed, running):
+@kernel(apart=("watched",))
+def take_peak(
+    t: float,
+    now: float,
+    smooth: bool,
+    inside: Inside,
+    total: Vector,
+    extremes: Extremes,
+    model: Model,
+    observed: Observed,
+    running: Running,
+) -> None:
     """Take over what exceeds its extreme at a state between the last three looks, which ``inside`` holds."""
-    (x, v, f), lines, where = (inside.state[0], inside.state[1], inside.state[2]), inside.lines, np.zeros(2, np.int64)
+    (x, v, f), lines, where = (inside.state[0], inside.state[1], inside.state[2]), inside.lines, inside.where
     signs = observed.signs
     for i in observed.followed:
         value = look_at(i, t, x, v, f, lines, observed, where)
@@ -162,7 +207,9 @@ def take_peak(t, now, smooth, inside, total, extremes, model, observed, running)
             take_over(i, value, t, x, v, f, lines, observed, where, extremes)
             extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
     if observed.sums.shape[0]:
-        first, here = len(observed.probes), total.copy()  # events are to see that of the step
+        first, here = len(observed.probes), inside.total  # events are to see that of the step
+        for i in range(total.size):
+            here[i] = total[i]
         book_within(t, now, x, v, smooth, here, model, running)
         for i in range(first, signs.size):
             value = inner(observed.sums[i - first], here)
@@ -171,8 +218,18 @@ def take_peak(t, now, smooth, inside, total, extremes, model, observed, running)
                 extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
 
 
-@kernel()
-def look_at_tops(now, h, smooth, inside, total, extremes, model, observed, running):
+@kernel(apart=("watched",))
+def look_at_tops(
+    now: float,
+    h: float,
+    smooth: bool,
+    inside: Inside,
+    total: Vector,
+    extremes: Extremes,
+    model: Model,
+    observed: Observed,
+    running: Running,
+) -> None:
     """Look where parabolas turn back, in a step that ends ``now`` and is looked at inside, or a little before."""
     last = -math.inf
     for i in range(observed.signs.size):
@@ -183,13 +240,12 @@ def look_at_tops(now, h, smooth, inside, total, extremes, model, observed, runni
             last = t
 
 
-@kernel()
-def look_back(total, model, observed, running):
+@kernel(apart=("watched", "kicks"))
+def look_back(inside: Inside, total: Vector, model: Model, observed: Observed, running: Running) -> None:
     """Look where parabolas turn back, in the last two steps."""
     extremes, last = running.extremes, -math.inf
     before, at, now = extremes.looked[0], extremes.looked[1], extremes.looked[2]
-    rows, inverse, lines = running.x.shape[0], model.inertia.inverse, model.families.outs[0]
-    inside, ends = room_inside(rows, lines), np.empty((3, 3, rows, 3))
+    inverse, ends = model.inertia.inverse, inside.ends
     for i in range(observed.signs.size):
         t = time_of_top(extremes, i, observed.signs[i])
         if abs(t - last) > SAME_PEAK * (now - at):
@@ -210,17 +266,30 @@ def look_back(total, model, observed, running):
         show_again(now, inside, model, observed, running)
 
 
-@kernel()
-def look_inside(now, h, fresh, alone, inside, where, total, model, observed, running):
+@kernel(apart=("looks",))
+def look_inside(
+    now: float,
+    h: float,
+    fresh: bool,
+    alone: bool,
+    inside: Inside,
+    where: Integers,
+    total: Vector,
+    model: Model,
+    observed: Observed,
+    running: Running,
+) -> None:
     """Look for extremes at `LOOKS` places of a step that ends ``now``, but its end.
 
     Of a ``fresh`` step it looks at an `EDGE` from its start as well, and from its end where the step is looked at
     ``alone``: where no other is, its inside is no look ahead of the next one.
     """
-    extremes, x, v = running.extremes, inside.state[0], inside.state[1]
+    own, x, v = running.extremes, inside.state[0], inside.state[1]
+    extremes = inside.alone if alone else own
     if alone:
-        values, times, places, corrections = extremes.values, extremes.times, extremes.places, extremes.corrections
-        extremes = Extremes(values, times, places, corrections, extremes.recent.copy(), extremes.looked.copy())
+        copy_rows(own.recent, extremes.recent)
+        for k in range(3):
+            extremes.looked[k] = own.looked[k]
     for n in range(0 if fresh else 1, LOOKS + 1 if alone else LOOKS):
         t = now - h + h * (EDGE if n == 0 else n / LOOKS if n < LOOKS else 1.0 - EDGE)
         state_within(t, now, h, running.x, running.v, running.f, not alone, inside, model)

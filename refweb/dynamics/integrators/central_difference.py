@@ -13,24 +13,25 @@ book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...compiled.kernel import prepare
 from ...effects.base import blind_to_carried
 from ...errors import InputError, NoEnd, OpenBook, SolverError
-from ...kernels import MATRIX, typed_list
+from ...kernels import MATRIX, Arrays
 from .averages import begin_averages
 from .between_steps import LOOKS
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
-from .explicit_loop import BREATH, HELD, advance_rows, begin, take_steps
+from .explicit_loop import BREATH, HELD, Room, advance_rows, begin, step_on
 from .extremes import Extremes
 from .guard import look_anew
 from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
 from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
 from .nearby import forget, look_at_all
-from .records import CLOCK, Model, Observed, Running, Scheme, aligned
+from .records import CLOCK, Model, Observed, Running, Scheme, aligned, features
 from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
@@ -96,7 +97,7 @@ class CentralDifference(Integrator):
 
     method, order, stretch = "central-difference", 2, 1.0
     knob, retry, beside, follows_lines = "safety", 0.5, True, True
-    breathe = staticmethod(lambda t: None)
+    breathe, compiling = staticmethod(lambda t: None), staticmethod(lambda done, count: None)
     variants = {"central-difference": Variant(kind="splitting")}
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
@@ -129,13 +130,22 @@ class CentralDifference(Integrator):
             )
         self._outs = outs = tuple(system.per_cell())
         self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
-        self._touches = typed_list(MATRIX, [np.empty((0, self._model.rubbed.width))])
-        self._events, self._least, self._taken = event_rows(events), least_energy(net), None
+        self._touches = Arrays(MATRIX, [np.empty((0, self._model.rubbed.width))])
+        self._events, self._least, self._taken, self._prepared = event_rows(events), least_energy(net), None, False
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
+    def _prepare(self):
+        """Compile what the run calls, once."""
+        if not self._prepared:
+            model, observed = self._model, self._observed
+            called = [advance_rows, begin, open_ledger, safe_step, look_anew, *model.all_kernels(), *observed.all_kernels()]
+            prepare(called, features(self._scheme, model, observed, self._events), self.compiling)
+            self._prepared = True
+
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m], at any time."""
+        self._prepare()
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
         return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
@@ -164,6 +174,7 @@ class CentralDifference(Integrator):
 
     def start(self, x=None, v=None):
         """The `ExplicitCourse` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
+        self._prepare()
         system, self._taken = self.system, None
         force = np.zeros((system.rows, 3))
         x = np.zeros_like(force) if x is None else np.array(x, dtype=float, order="C")
@@ -173,7 +184,8 @@ class CentralDifference(Integrator):
         signs, sums = self._observed.signs, self._observed.sums
         extremes = Extremes.at_start(np.zeros(len(signs)), np.full(len(signs), -1))
         work, total = np.zeros(len(system.families) + 1), np.zeros(len(system.families) + 3)
-        begin(x, v, force, self._model, self._observed, extremes, work, total)
+        where = np.zeros(2, dtype=np.int64)
+        begin(x, v, force, where, self._model, self._observed, extremes, work, total)
         first = len(signs) - len(sums)
         extremes.values[first:] = sums @ total
         events = self._events.copy()
@@ -207,6 +219,7 @@ class CentralDifference(Integrator):
 
     def load(self, arrays):
         """The `ExplicitCourse` of a checkpoint; families show what they do there."""
+        self._prepare()
         course, self._taken = ExplicitCourse.of_arrays(arrays), None
         self.system.force_to(self._outs, course.time, course.x, course.v)
         return course
@@ -259,8 +272,9 @@ class CentralDifference(Integrator):
         history = History.empty(len(times), len(self.observed[0]), self.system.families)
         work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
         done, breath = 0, max(BREATH // max(work, 1), 1)
-        records = self._scheme, self._model, self._observed, self._running(course)
-        clock = records[-1].clock
+        running = self._running(course)
+        records = self._scheme, self._model, self._observed, running, Room.of(self._model, running)
+        clock = running.clock
         if len(self._model.guard.families) or len(self._model.walls.families):
             look_anew(self._model.guard)
         if self._taken != (id(course), course.nsteps):
@@ -314,14 +328,14 @@ class CentralDifference(Integrator):
 
         That is the state (3, rows, 3) which is ``count`` steps behind one that ``begun`` steps have led to.
         """
-        running.clock["time"], total = before, np.zeros(running.work.size + 2)
-        model = self._model._replace(nearby=self._model.nearby.without())  # its lists hold for steps in a row
+        running.clock["time"] = before
+        model = replace(self._model, nearby=self._model.nearby.without())  # its lists hold for steps in a row
 
         def after(state, begun, count):
             state, running.clock["begun"] = state.copy(), begun
-            copy = running._replace(x=state[0], v=state[1], f=state[2], events=course.events[:0])
-            changing = self._model.reels.lengths.size > 0
-            take_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, total)
+            copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
+            changing, room = self._model.reels.lengths.size > 0, Room.of(model, copy)
+            step_on(count, float(course.step), changing, self._scheme, model, self._observed, copy, room)
             return state
 
         return after

@@ -6,14 +6,29 @@ A flag of success is not believed: at every history row ``|ΔE − work|`` is he
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import OpenBook
-from ...kernels import ENERGY, among, kernel, sum_of
-from ...list_items import item
+from ...kernels import (
+    ENERGY,
+    EnergyTable,
+    IndexTable,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Vector,
+    VectorTable,
+    among,
+    kernel,
+    sum_of,
+)
 from ...net.net import AXIAL_STIFFNESS, LENGTH
-from ...net.rotation import more_kinetic
+from ...net.rotation import Turns, more_kinetic
+
+if TYPE_CHECKING:
+    from .records import Families, Reels
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -39,8 +54,21 @@ def refuse_open(course, limit, remedy):
         raise OpenBook(f"{drift}, limit {limit:g}: {remedy}", course.drift)
 
 
-@kernel(leaf=True)
-def book_energies(t, x, v, mass, turns, cells, data, energies, energy_outs, book, working, total):
+@kernel(leaf=True, apart=())
+def book_energies(
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    mass: Vector,
+    turns: Turns,
+    cells: IndexTable,
+    data: MatrixTable,
+    energies: EnergyTable,
+    energy_outs: VectorTable,
+    book: Vector,
+    working: Integers,
+    total: Vector,
+) -> None:
     """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
 
     ``book`` holds the work of each family and, last, that of all motion; ``working`` says of each family whether that
@@ -49,8 +77,8 @@ def book_energies(t, x, v, mass, turns, cells, data, energies, energy_outs, book
     count = len(energies)
     total[count], total[count + 1] = 0.0, book[count]
     for i in range(count):
-        item(energies, i)(t, x, item(cells, i), item(data, i), item(energy_outs, i))
-        total[i] = sum_of(item(energy_outs, i))
+        energies[i](t, x, cells[i], data[i], energy_outs[i])
+        total[i] = sum_of(energy_outs[i])
         if working[i] > 0:
             total[count + 1] += book[i]
         elif working[i] < 0:
@@ -80,25 +108,27 @@ def begin_powers(t, x, v, extra, families, solved, known, power):
 @kernel(leaf=True, forceinline=True)
 def act(i, t, x, v, f, families):
     """Add the force of a family, by its number, to f."""
-    cells, data, out = item(families.cells, i), item(families.data, i), item(families.outs, i)
-    item(families.forces, i)(t, x, v, f, cells, data, out)
+    cells, data, out = families.cells[i], families.data[i], families.outs[i]
+    families.forces[i](t, x, v, f, cells, data, out)
 
 
-@kernel(leaf=True)
-def book_powers(t, h, x, v, extra, power, work, families):
+@kernel(leaf=True, apart=("powers",))
+def book_powers(
+    t: float, h: float, x: Matrix, v: Matrix, extra: Matrix, power: Vector, work: Vector, families: Families
+) -> None:
     """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
     powers = families.powers
     for n in range(powers.shape[0]):
         i, column = powers[n, 0], powers[n, 1]
         if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
             act(i, t, x, v, extra, families)
-        gained = sum_of(item(families.outs, i)[:, column])
+        gained = sum_of(families.outs[i][:, column])
         work[i] += 0.5 * h * (power[i] + gained)
         power[i] = gained
 
 
-@kernel()
-def book_potential(sign, t, x, families, work):
+@kernel(apart=("stages",))
+def book_potential(sign: float, t: float, x: Matrix, families: Families, work: Vector) -> None:
     """Add the potential at time t of each family that is booked, times a sign, to its work [J].
 
     With + before a drift of a step of higher order and − behind it this is the work of dead loads. Such a potential is
@@ -143,10 +173,10 @@ def book_motion(driven, mass, x, v, f, before, work):
             work[last] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
 
 
-@kernel(leaf=True)
-def book_lengths(t, x, reels, was, length_force, work):
+@kernel(leaf=True, apart=("lengths",))
+def book_lengths(t: float, x: Matrix, reels: Reels, was: Vector, length_force: Matrix, work: Vector) -> None:
     """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
-    item(reels.by_length, 0)(t, x, reels.nodes, reels.lines, length_force[1])
+    reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
     for c in range(reels.lengths.size):
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
         length_force[0, c] = length_force[1, c]

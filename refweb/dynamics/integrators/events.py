@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numba import from_dtype
 
-from ...kernels import inner, kernel
+from ...kernels import Integers, Matrix, Vector, array_of, inner, kernel
 from .extremes import look_at
+
+if TYPE_CHECKING:
+    from .records import Observed
 
 EVENT = np.dtype(
     [
@@ -25,6 +29,8 @@ EVENT = np.dtype(
 """An event in the loop: slot, level and flags as in `Event`; the side of the level that its value is on, 1 above, −1
 not and 0 before any is known; the time at which it has happened [s], infinite before; and how much earlier that may
 have been [s]."""
+
+EventArray = array_of(from_dtype(EVENT), 1)
 
 
 class Event(NamedTuple):
@@ -76,8 +82,19 @@ def starts_above(event, value):
         event.time = 0.0
 
 
-@kernel(leaf=True)
-def note_events(t, h, x, v, f, lines, events, where, observed, total):
+@kernel(leaf=True, apart=("events",))
+def note_events(
+    t: float,
+    h: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    events: EventArray,
+    where: Integers,
+    observed: Observed,
+    total: Vector,
+) -> bool:
     """Note what happens at the end of a step of size h; whether that ends the run."""
     ended = False
     for e in range(events.shape[0]):

@@ -9,16 +9,16 @@ time of a cable of 100 elements. The loop asks once what a scene has none of.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import copy_rows, kernel
-from ...list_items import item
+from ...kernels import Integers, Matrix, Record, Vector, copy_rows, kernel
 from ...net.rotation import hand_on
-from ...net.rotation_bounds import pushes, speeds
+from ...net.rotation_bounds import fastest_point, hardest_push
 from ...results.probes import PLACE
 from .averages import average, look_for_means
-from .between_steps import look_at_books, look_at_tops, look_back, look_inside, room_inside, show_again
+from .between_steps import Inside, look_at_books, look_at_tops, look_back, look_inside, show_again
 from .energy_book import (
     act,
     begin_powers,
@@ -41,14 +41,11 @@ from .step import (
     add_forces,
     give_impulse,
     give_reaction,
-    hand_over,
     move,
     move_supports,
     note_lengths,
     note_state,
     plain_kick,
-    room_for_forces,
-    room_for_numbers,
     rubbing_kick,
     set_lengths,
     set_reaction,
@@ -57,14 +54,20 @@ from .step import (
 )
 from .step_bound import safe_step, step_by_elements
 
+if TYPE_CHECKING:
+    from .extremes import Extremes
+    from .records import Model, Observed, Reels, Running, Scheme
+
 HELD = -2
 """What the loop returns where lines would pass whatever the step."""
 BREATH = 10_000_000
 """Steps times cells after which a compiled loop returns, some tenths of a second."""
 
 
-@kernel()
-def inner_stages(now, h, scheme, model, running, reaction, push, extra):
+@kernel(apart=("stages",))
+def inner_stages(
+    now: float, h: float, scheme: Scheme, model: Model, running: Running, reaction: Vector, push: Vector, extra: Matrix
+) -> bool:
     """All kicks and drifts of a step of higher order but the last drift, with work and the impulses of forces.
 
     Time goes with the drifts, and in the potential that is booked with the kicks. A step in which lines would pass is
@@ -96,21 +99,33 @@ def inner_stages(now, h, scheme, model, running, reaction, push, extra):
     return True
 
 
-@kernel()
-def look_behind(model, observed, running, total):
+@kernel(apart=("driven",))
+def look_behind(model: Model, observed: Observed, running: Running, room: Room) -> None:
     """Look for extremes behind a corner of motion, where velocities have jumped."""
-    now, lines, where = running.clock[0].time, model.families.outs[0], np.zeros(2, dtype=np.int64)
+    now, lines, where, total = running.clock[0].time, model.families.outs[0], room.where, room.total
     x, v, f, extremes = running.x, running.v, running.f, running.extremes
     begin_anew(extremes)
-    look(now, x, v, f, lines, where, observed, extremes, False)
-    look_for_means(0, now, x, v, f, lines, where, observed, running.averages)
+    if observed.followed.size + observed.windows.slots.size:
+        look(now, x, v, f, lines, where, observed, extremes, False)
+    if observed.windows.slots.size:
+        look_for_means(0, now, x, v, f, lines, where, observed, running.averages)
     if observed.sums.shape[0]:
         look_at_books(now, x, v, total, extremes, False, model, observed, running)
     begin_anew(extremes)
 
 
-@kernel()
-def look_again(now, h, fresh, smooth, inside, total, model, observed, running):
+@kernel(apart=("watched",))
+def look_again(
+    now: float,
+    h: float,
+    fresh: bool,
+    smooth: bool,
+    inside: Inside,
+    total: Vector,
+    model: Model,
+    observed: Observed,
+    running: Running,
+) -> bool:
     """Look for extremes where values turn back near the end of a step; whether steps that follow are looked at inside.
 
     What was found inside of a ``fresh`` step of order 2 are corrections.
@@ -121,7 +136,7 @@ def look_again(now, h, fresh, smooth, inside, total, model, observed, running):
     elif fresh:
         correct_within(running.extremes, observed.signs)
     else:
-        look_back(total, model, observed, running)
+        look_back(inside, total, model, observed, running)
     return smooth
 
 
@@ -133,8 +148,8 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
         begin_more(t, changing, extra, push, model, running)
 
 
-@kernel()
-def begin_more(t, changing, extra, push, model, running):
+@kernel(apart=("booked",))
+def begin_more(t: float, changing: bool, extra: Matrix, push: Vector, model: Model, running: Running) -> None:
     """Write powers, forces of natural lengths and push from outside."""
     x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
     if running.clock[0].begun == 0:
@@ -145,33 +160,70 @@ def begin_more(t, changing, extra, push, model, running):
         set_push(t, x, v, outside, families, extra, push)
 
 
-@kernel(leaf=True)
-def change_lengths(t, x, reels, was, lines, length_force, work):
+@kernel(leaf=True, apart=("lengths",))
+def change_lengths(
+    t: float, x: Matrix, reels: Reels, was: Vector, lines: Matrix, length_force: Matrix, work: Vector
+) -> None:
     """Give what changes its natural lengths at time t, and book the work of that."""
     note_lengths(reels, was)
     set_lengths(t, reels, lines)
     book_lengths(t, x, reels, was, length_force, work)
 
 
-@kernel()
-def take_steps(count, h, changing, scheme, model, observed, running, total):
+class Room(Record):
+    """Space for what does not stay from step to step.
+
+    Attributes
+    ----------
+    where : ndarray of int, shape (2,)
+        The place of a value.
+    reaction, known, push : ndarray, shape (3,)
+        Force of the supports [N], what is known of plain probes, and the force that is integrated along the steps [N].
+    before : ndarray, shape (driven, 7)
+        State of rows whose motion is prescribed, ahead of a step.
+    aside, extra, half, momenta : ndarray, shape (rows, 3)
+        Velocities and forces that nobody needs, velocities at half a step [m/s], and momenta [N s].
+    was : ndarray, shape (changing,)
+        Natural lengths ahead of a step [m].
+    total : ndarray, shape (families + 3,)
+        Energies [J], and the size of a step [s].
+    inside : refweb.dynamics.integrators.between_steps.Inside
+        Space for looks inside of a step.
+    """
+
+    where: Integers
+    reaction: Vector
+    known: Vector
+    push: Vector
+    before: Matrix
+    aside: Matrix
+    extra: Matrix
+    half: Matrix
+    momenta: Matrix
+    was: Vector
+    total: Vector
+    inside: Inside
+
+    @classmethod
+    def of(cls, model, running):
+        """Space for the steps of a run."""
+        (rows, _), sums = running.x.shape, len(running.work) + 2
+        numbers = np.zeros(2, dtype=np.int64), np.zeros(3), np.zeros(3), np.zeros(3)
+        vectors = [np.zeros((rows, 3)) for _ in range(4)]
+        inside = Inside.of(rows, model.families.outs[0], running.extremes, sums)
+        driven, changing = np.empty((len(model.inertia.driven), 7)), np.empty(len(model.reels.lengths))
+        return cls(*numbers, driven, *vectors, changing, np.zeros(sums), inside)
+
+
+@kernel(leaf=True, apart=())
+def step_on(
+    count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running, room: Room
+) -> int:
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
-    return step_on(count, h, changing, scheme, model, observed, running, total, room_for_steps(scheme, model, running))
-
-
-@kernel()
-def room_for_steps(scheme, model, running):
-    """Room for what does not stay: numbers, forces, and a look inside of a step."""
-    rows, clock = running.x.shape[0], running.clock[0]
-    looks = clock.nsteps + clock.begun == 0 or scheme.drifts.size > 1
-    inside = room_inside(rows * looks, model.families.outs[0])
-    return room_for_numbers(rows, model.inertia.driven.size), room_for_forces(rows, model), inside
-
-
-@kernel(leaf=True)
-def step_on(count, h, changing, scheme, model, observed, running, total, room):
-    """As `take_steps`, with room for what does not stay."""
-    (where, reaction, known, push, before, aside), (extra, half, was), inside = room
+    where, reaction, known, push, before, aside = (
+        room.where, room.reaction, room.known, room.push, room.before, room.aside
+    )  # fmt: skip
+    extra, half, was, inside, total = room.extra, room.half, room.was, room.inside, room.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
@@ -179,8 +231,8 @@ def step_on(count, h, changing, scheme, model, observed, running, total, room):
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    lines, first = item(families.outs, 0), item(families.forces, 0)
-    cells_of_lines, data_of_lines = item(families.cells, 0), item(families.data, 0)
+    lines, first = families.outs[0], families.forces[0]
+    cells_of_lines, data_of_lines = families.cells[0], families.data[0]
     near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
     pushing, pushed, length_force = model.outside.pushing.size > 0, running.ledger.pushed, running.length_force
     stages, looked = scheme.drifts.size - 1, extremes.looked
@@ -214,7 +266,7 @@ def step_on(count, h, changing, scheme, model, observed, running, total, room):
             act(i, now, x, v, f, families)
         if near:
             show_near(nearby, families)
-        hand_over(x, f, turns)
+        hand_on(x, f, turns)
         if rubbing.size:
             rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.touches, model)
         elif viscous.size:
@@ -260,10 +312,9 @@ def steps_until(end, changing, scheme, model, running):
         a0, a1, a2 = inverse[r, 0] * f[r, 0], inverse[r, 1] * f[r, 1], inverse[r, 2] * f[r, 2]
         push = max(push, a0 * a0 + a1 * a1 + a2 * a2)
     turns = model.inertia.turns
-    for n in range(turns.moment.size):  # of any point of a body
-        (own, turning), (force, moment) = speeds(n, running.x, v, turns), pushes(n, running.x, f, turns)
-        speed = max(speed, (own + turning) ** 2)
-        push = max(push, (inverse[turns.rows[n, 0], 0] * force + inverse[turns.rows[n, 1], 0] * moment) ** 2)
+    if turns.moment.size:
+        speed = max(speed, fastest_point(running.x, v, turns) ** 2)
+        push = max(push, hardest_push(running.x, f, inverse, turns) ** 2)
     fastest = 2.0 * (math.sqrt(speed) + 0.5 * interval * math.sqrt(push))  # of two rows towards each other
     if model.nearby.at.shape[0]:
         fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
@@ -275,8 +326,8 @@ def steps_until(end, changing, scheme, model, running):
     return interval / (scheme.safety * bound)
 
 
-@kernel(leaf=True)
-def plan(end, changing, scheme, model, running):
+@kernel(leaf=True, apart=())
+def plan(end: float, changing: bool, scheme: Scheme, model: Model, running: Running) -> bool:
     """Begin the way to ``end``: note the state there, and plan its steps; whether they are few enough."""
     clock, before, span = running.clock[0], running.before, end - running.clock[0].time
     copy_rows(running.x, before[0])
@@ -308,8 +359,18 @@ def end_of_steps(corners, time, row):
     return corners[first] if first < corners.size and corners[first] < row * (1.0 - SAME) else row
 
 
-@kernel()
-def advance_rows(times, breath, limit, scheme, model, observed, running, history):
+@kernel(apart=())
+def advance_rows(
+    times: Vector,
+    breath: int,
+    limit: float,
+    scheme: Scheme,
+    model: Model,
+    observed: Observed,
+    running: Running,
+    room: Room,
+    history: Matrix,
+) -> int:
     """Advance to each of some times, and write a row of ``history`` there.
 
     Equal steps lead to each, or to each corner of a table on the way: no step passes one.
@@ -321,8 +382,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
     on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.guard`.
     """
     clock, events, reels, left = running.clock[0], running.events, model.reels, breath
-    total, stopped, room = np.zeros(running.work.size + 2), ended_by(events), room_for_steps(scheme, model, running)
-    momenta = np.empty_like(running.v)
+    total, stopped = room.total, ended_by(events)
     for n in range(times.size):
         if reels.lengths.size and not clock.begun:
             set_lengths(clock.time, reels, model.families.data[0])
@@ -338,7 +398,7 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
             if halved > 0.0 and not begun:
                 add_half_steps(-halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             count = min(clock.planned - begun, max(left, 1))
-            taken = step_on(count, clock.step, changing, scheme, model, observed, running, total, room)
+            taken = step_on(count, clock.step, changing, scheme, model, observed, running, room)
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
@@ -355,13 +415,13 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
             if halved > 0.0:
                 add_half_steps(halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             if model.inertia.driven.size and turn_supports(clock.time, model, running):
-                look_behind(model, observed, running, total)
+                look_behind(model, observed, running, room)
             if clock.time < times[n]:  # a corner: what is stored may be gone again at the row
                 largest = energies_now(model, running, total)[1]
                 if not math.isfinite(largest):
                     break
                 clock.largest = max(clock.largest, largest)
-        energy, stored = write_row(history[n], model, observed, running, total, room[0][0], momenta)
+        energy, stored = write_row(history[n], model, observed, running, total, room.where, room.momenta)
         if drifts_away(clock, energy, stored, total[-2], limit):
             return n
         if stopped:
@@ -369,10 +429,20 @@ def advance_rows(times, breath, limit, scheme, model, observed, running, history
     return times.size
 
 
-@kernel()
-def begin(x, v, f, model, observed, extremes, work, total):
+@kernel(apart=())
+def begin(
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    where: Integers,
+    model: Model,
+    observed: Observed,
+    extremes: Extremes,
+    work: Vector,
+    total: Vector,
+) -> None:
     """Write forces, values of probes with their places, and energies at t = 0."""
-    families, where = model.families, np.empty(2, dtype=np.int64)
+    families = model.families
     if model.reels.lengths.size:
         set_lengths(0.0, model.reels, families.data[0])
     for i in range(len(families.forces)):

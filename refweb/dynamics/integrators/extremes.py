@@ -16,19 +16,21 @@ passes what a kink has, an eighth of a second difference, and finds less than no
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import inner, kernel
-from ...list_items import item
+from ...kernels import Integers, Matrix, Record, Vector, inner, kernel
 from ...results.probes import NODES, PLACE, farthest, largest_in
+
+if TYPE_CHECKING:
+    from .records import Observed
 
 EDGE = 2.0**-16
 """Share of a step at whose distance from an end it is looked at for the rate there."""
 
 
-class Extremes(NamedTuple):
+class Extremes(Record):
     """Extreme values of probes and, behind them, of sums.
 
     Attributes
@@ -47,12 +49,12 @@ class Extremes(NamedTuple):
         Times of these looks [s].
     """
 
-    values: np.ndarray
-    times: np.ndarray
-    places: np.ndarray
-    corrections: np.ndarray
-    recent: np.ndarray
-    looked: np.ndarray
+    values: Vector
+    times: Vector
+    places: Integers
+    corrections: Vector
+    recent: Matrix
+    looked: Vector
 
     @classmethod
     def at_start(cls, values, places):
@@ -133,12 +135,23 @@ def plain_value(i, x, lines, plain, scales, known):
 @kernel(leaf=True, forceinline=True)
 def look_at(i, t, x, v, f, lines, observed, where):
     """Value of a probe, by its number."""
-    rows, data = item(observed.rows, i), item(observed.data, i)
-    return item(observed.probes, i)(t, x, v, f, lines, rows, data, where)
+    rows, data = observed.rows[i], observed.data[i]
+    return observed.probes[i](t, x, v, f, lines, rows, data, where)
 
 
-@kernel(leaf=True)
-def take_over(i, value, t, x, v, f, lines, observed, where, extremes):
+@kernel(leaf=True, apart=("watched",))
+def take_over(
+    i: int,
+    value: float,
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    observed: Observed,
+    where: Integers,
+    extremes: Extremes,
+) -> None:
     """Take over a value of a probe that exceeds its extreme, with its time and place."""
     where[1] = PLACE
     look_at(i, t, x, v, f, lines, observed, where)
@@ -146,8 +159,18 @@ def take_over(i, value, t, x, v, f, lines, observed, where, extremes):
     extremes.corrections[i] = 0.0
 
 
-@kernel(leaf=True)
-def look(t, x, v, f, lines, where, observed, extremes, ending):
+@kernel(leaf=True, apart=("looks",))
+def look(
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    where: Integers,
+    observed: Observed,
+    extremes: Extremes,
+    ending: bool,
+) -> bool:
     """Look at all probes that are followed, and take over what exceeds its extreme; whether any may turn back."""
     signs, turned = observed.signs, False
     note_time(extremes.looked, t)
@@ -159,8 +182,8 @@ def look(t, x, v, f, lines, where, observed, extremes, ending):
     return turned
 
 
-@kernel()
-def look_at_sums(t, total, observed, extremes, ending):
+@kernel(apart=("books",))
+def look_at_sums(t: float, total: Vector, observed: Observed, extremes: Extremes, ending: bool) -> bool:
     """As `look`, at sums of the energies ``total``; the time is to be noted before."""
     first, signs, turned = len(observed.probes), observed.signs, False
     for i in range(first, signs.size):

@@ -22,16 +22,36 @@ other reasons. What has come further in it is told of.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numba.typed import List
 
-from ...kernels import INDICES, INTEGERS, MATRIX, MEETS, VECTOR, WATCH, kernel, typed_list
-from ...list_items import item
+from ...kernels import (
+    INDICES,
+    INTEGERS,
+    MATRIX,
+    MEETS,
+    VECTOR,
+    WATCH,
+    Arrays,
+    Functions,
+    IndexTable,
+    Integers,
+    IntegerTable,
+    MatrixTable,
+    MeetsTable,
+    Record,
+    Vector,
+    VectorTable,
+    WatchTable,
+    kernel,
+)
 from ...net.rotation_bounds import beside_places
 from .crossings import APART, BESIDE, THROUGH, note_met
 from .nearby import WAY, goes_freely, near_of, spread_of
+
+if TYPE_CHECKING:
+    from .records import Model, Running
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
@@ -48,16 +68,16 @@ PAST, DUE = -3, -1
 way up to which some are chosen."""
 
 
-class Guard(NamedTuple):
+class Guard(Record):
     """Lines that push each other.
 
     Attributes
     ----------
     families, places : ndarray of int
         The number of the family, none without; its place among those that act nearby.
-    meets, watches : List
+    meets, watches : table
         Its kernels, see `refweb.effects.base.Crossing`.
-    rows, data, due, chosen : List
+    rows, data, due, chosen : table
         Neighbours, and when their turn comes.
     touch : float
         Distance at which lines touch [m].
@@ -67,17 +87,17 @@ class Guard(NamedTuple):
         Way that rows may go until lines are looked at, and that which they have gone since they were [m].
     """
 
-    families: np.ndarray
-    places: np.ndarray
-    meets: List
-    watches: List
-    rows: List
-    data: List
-    due: List
-    chosen: List
+    families: Integers
+    places: Integers
+    meets: MeetsTable
+    watches: WatchTable
+    rows: IndexTable
+    data: MatrixTable
+    due: VectorTable
+    chosen: IntegerTable
     touch: float
-    met: np.ndarray
-    left: np.ndarray
+    met: Integers
+    left: Vector
 
     @classmethod
     def of(cls, system):
@@ -87,26 +107,26 @@ class Guard(NamedTuple):
         return cls(
             families=np.array(found, dtype=np.int64),
             places=np.array([near.index(i) for i in found], dtype=np.int64),
-            meets=typed_list(MEETS, [one.meets for one in own]),
-            watches=typed_list(WATCH, [one.watch for one in own]),
-            rows=typed_list(INDICES, [one.rows for one in own]),
-            data=typed_list(MATRIX, [one.data for one in own]),
-            due=typed_list(VECTOR, [np.zeros(len(one.rows) + 3) for one in own]),
-            chosen=typed_list(INTEGERS, [np.zeros(len(one.rows) + 1, dtype=np.int64) for one in own]),
+            meets=Functions(MEETS, [one.meets for one in own]),
+            watches=Functions(WATCH, [one.watch for one in own]),
+            rows=Arrays(INDICES, [one.rows for one in own]),
+            data=Arrays(MATRIX, [one.data for one in own]),
+            due=Arrays(VECTOR, [np.zeros(len(one.rows) + 3) for one in own]),
+            chosen=Arrays(INTEGERS, [np.zeros(len(one.rows) + 1, dtype=np.int64) for one in own]),
             touch=max((one.touch for one in own), default=0.0),
             met=np.zeros(4, dtype=np.int64),
             left=np.zeros(2),
         )
 
 
-class Walls(NamedTuple):
+class Walls(Record):
     """Bodies that push lines.
 
     Attributes
     ----------
     families, places : ndarray of int
         As in `Guard`.
-    meets : List
+    meets : table
         Kernels of `refweb.effects.contact.passing`.
     most : ndarray
         Depth that nothing comes to of each family, at least [m].
@@ -118,13 +138,13 @@ class Walls(NamedTuple):
         Way that is open to a drift which is not looked at before [m], 0 where it is; none where nothing is pushed.
     """
 
-    families: np.ndarray
-    places: np.ndarray
-    meets: List
-    most: np.ndarray
-    shown: np.ndarray
-    met: np.ndarray
-    left: np.ndarray
+    families: Integers
+    places: Integers
+    meets: MeetsTable
+    most: Vector
+    shown: Vector
+    met: Integers
+    left: Vector
 
     @classmethod
     def of(cls, system):
@@ -138,7 +158,7 @@ class Walls(NamedTuple):
         return cls(
             families=np.array(found, dtype=np.int64),
             places=np.array([near.index(i) for i in found], dtype=np.int64),
-            meets=typed_list(MEETS, [family.passing for family in own]),
+            meets=Functions(MEETS, [family.passing for family in own]),
             most=np.ascontiguousarray(limits[:, 0]),
             shown=np.ascontiguousarray(limits[:, 1]),
             met=np.ones(4, dtype=np.int64),
@@ -167,8 +187,8 @@ def largest_of(kick, v, f, inverse, share):
     return _larger(_larger(a, b), _larger(c, d))
 
 
-@kernel()
-def look_anew(guard):
+@kernel(apart=())
+def look_anew(guard: Guard) -> None:
     """Look at all lines when they come next: rows may be anywhere."""
     guard.left[:] = 0.0
     for m in range(guard.families.size):
@@ -224,14 +244,14 @@ def calm(walls, nearby, families):
     """Whether a drift behind another need not be looked at before, for bodies alone that do not turn."""
     skin, left = nearby.skin[0], math.inf
     for m in range(walls.families.size):
-        deep = deepest_of(item(families.outs, walls.families[m]))
+        deep = deepest_of(families.outs[walls.families[m]])
         left = min(left, walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0))
     walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
     return walls.left[0] > 0.0
 
 
-@kernel()
-def look_back_at_bodies(time, model, running):
+@kernel(apart=("walls",))
+def look_back_at_bodies(time: float, model: Model, running: Running) -> None:
     """Note lines that may have come to the middle of a body in a drift that was not looked at before, from its end."""
     walls, x, v, f, skin = model.walls, running.x, running.v, running.f, model.nearby.skin[0]
     for m in range(walls.families.size):
@@ -271,8 +291,8 @@ def foreseen(time, h, model, running):
     return comes_through(time, 0.5 * h, h, FORESEEN, model, running)
 
 
-@kernel()
-def comes_through(time, kick, drift, then, model, running):
+@kernel(apart=("guarded",))
+def comes_through(time: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
     """Whether lines would pass in a drift behind a kick, from a time on: each other, or the middle of a body.
 
     What is ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
@@ -292,8 +312,8 @@ def comes_through(time, kick, drift, then, model, running):
     return came
 
 
-@kernel()
-def passes_lines(time, way, kick, drift, then, model, running):
+@kernel(apart=("guard",))
+def passes_lines(time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
     """Whether lines that push each other would meet; where the drift is taken, it is found what is open behind it."""
     guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
     inverse, left = model.inertia.inverse, math.inf
@@ -318,8 +338,10 @@ def passes_lines(time, way, kick, drift, then, model, running):
     return came
 
 
-@kernel()
-def passes_bodies(time, way, kick, drift, then, model, running):
+@kernel(apart=("walls",))
+def passes_bodies(
+    time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running
+) -> bool:
     """Whether lines would come as deep in a body as its middle."""
     walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
     inverse, room = model.inertia.inverse, 0.0

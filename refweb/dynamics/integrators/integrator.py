@@ -135,7 +135,7 @@ class Course:
         """All of it as arrays by name, for a checkpoint; a field whose metadata says ``saved=False`` is left out."""
         kept = {f.name: getattr(self, f.name) for f in fields(self) if f.metadata.get("saved", True)}
         for group in GROUPS:
-            kept |= {f"{group}_{name}": array for name, array in kept.pop(group)._asdict().items()}
+            kept |= {f"{group}_{name}": array for name, array in kept.pop(group).by_name().items()}
         return {name: np.asarray(value) for name, value in kept.items()}
 
     @classmethod
@@ -143,7 +143,7 @@ class Course:
         """The course of a checkpoint."""
         given = {name: array if array.ndim else array.item() for name, array in arrays.items()}
         for group, kind in GROUPS.items():
-            given[group] = kind(*(given.pop(f"{group}_{name}") for name in kind._fields))
+            given[group] = kind(*(given.pop(f"{group}_{name}") for name in kind.field_names()))
         return cls(**given)
 
 

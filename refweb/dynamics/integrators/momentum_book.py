@@ -25,15 +25,30 @@ and temperature change, pressure inside of a closed line. Nor does it see [[moti
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numba.typed import List
 
 from ...errors import OpenBook
-from ...kernels import IMPULSE, INDICES, MATRIX, kernel, typed_list
-from ...list_items import item
+from ...kernels import (
+    IMPULSE,
+    INDICES,
+    MATRIX,
+    Arrays,
+    Functions,
+    ImpulseTable,
+    IndexTable,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Record,
+    Vector,
+    kernel,
+)
 from ...net.net import AXIAL_STIFFNESS
+
+if TYPE_CHECKING:
+    from .records import Families
 
 CLOSURE = 1e-6
 """Largest momentum that an explicit run may miss, over the largest of the run: 1e4 roundings in each of 1e6 steps, of
@@ -50,7 +65,7 @@ def allowed(rtol):
     return max(CLOSURE, rtol ** (2.0 / 3.0))
 
 
-class Ledger(NamedTuple):
+class Ledger(Record):
     """What the book holds of a run.
 
     Attributes
@@ -66,11 +81,11 @@ class Ledger(NamedTuple):
         that is known to have come in, and the largest that parts of the system have, whatever their direction.
     """
 
-    first: np.ndarray
-    given: np.ndarray
-    pushed: np.ndarray
-    left: np.ndarray
-    largest: np.ndarray
+    first: Matrix
+    given: Vector
+    pushed: Vector
+    left: Vector
+    largest: Vector
 
     @classmethod
     def empty(cls):
@@ -83,12 +98,12 @@ class Ledger(NamedTuple):
         return np.divide(self.left, self.largest, out=np.zeros(2), where=self.largest > 0.0)
 
 
-class Outside(NamedTuple):
+class Outside(Record):
     """What acts from outside, as the book sees it.
 
     Attributes
     ----------
-    impulses, cells, data : List
+    impulses, cells, data : table
         Kernel of the impulse of each family that has one, and its numbers.
     damped : ndarray of int
         Those of them that depend on velocity.
@@ -104,14 +119,14 @@ class Outside(NamedTuple):
         Force that roundings are worth [N].
     """
 
-    impulses: List
-    cells: List
-    data: List
-    damped: np.ndarray
-    pushing: np.ndarray
-    places: np.ndarray
-    mass: np.ndarray
-    axes: np.ndarray
+    impulses: ImpulseTable
+    cells: IndexTable
+    data: MatrixTable
+    damped: Integers
+    pushing: Integers
+    places: Matrix
+    mass: Vector
+    axes: Matrix
     rounding: float
 
     @classmethod
@@ -123,9 +138,9 @@ class Outside(NamedTuple):
         damped = [i for i, family in enumerate(known) if family.damping is not None]
         pushing = [i for i, family in outer if family.impulse is None]
         return cls(
-            impulses=typed_list(IMPULSE, [family.impulse for family in known]),
-            cells=typed_list(INDICES, [family.cells for family in known]),
-            data=typed_list(MATRIX, [family.data for family in known]),
+            impulses=Functions(IMPULSE, [family.impulse for family in known]),
+            cells=Arrays(INDICES, [family.cells for family in known]),
+            data=Arrays(MATRIX, [family.data for family in known]),
             damped=np.array(damped, dtype=np.int64),
             pushing=np.array(pushing, dtype=np.int64),
             places=net.points[:linear] - net.points[:linear].mean(axis=0),
@@ -146,16 +161,16 @@ def kept_axes(system):
     return normals[:1] if np.abs(np.cross(normals, normals[0])).max() <= ROUNDINGS else np.zeros((0, 3))
 
 
-@kernel(leaf=True)
-def impulse_until(t, x, outside, total):
+@kernel(leaf=True, apart=())
+def impulse_until(t: float, x: Matrix, outside: Outside, total: Vector) -> None:
     """Write the impulse of all that has a formula, but for a constant, to ``total (3,)``."""
     total[:] = 0.0
     for i in range(len(outside.impulses)):
-        item(outside.impulses, i)(t, x, item(outside.cells, i), item(outside.data, i), total)
+        outside.impulses[i](t, x, outside.cells[i], outside.data[i], total)
 
 
-@kernel()
-def add_half_steps(by, outside, inverse, f, pushed):
+@kernel(apart=("damped",))
+def add_half_steps(by: float, outside: Outside, inverse: Matrix, f: Matrix, pushed: Vector) -> None:
     """Add the impulse of damping over displacements of ``by`` times the accelerations."""
     ahead, total = np.empty_like(f), np.zeros(3)
     for r in range(f.shape[0]):
@@ -167,8 +182,8 @@ def add_half_steps(by, outside, inverse, f, pushed):
         pushed[k] += total[k]
 
 
-@kernel()
-def set_push(t, x, v, outside, families, extra, push):
+@kernel(apart=("pushing",))
+def set_push(t: float, x: Matrix, v: Matrix, outside: Outside, families: Families, extra: Matrix, push: Vector) -> None:
     """Write the force of what is integrated along the steps to ``push (3,)``; ``extra`` takes that on every row."""
     extra[:], push[:] = 0.0, 0.0
     for i in outside.pushing:
@@ -178,8 +193,19 @@ def set_push(t, x, v, outside, families, extra, push):
             push[k] += extra[r, k]
 
 
-@kernel()
-def push_on(t, before, behind, x, v, outside, families, extra, push, pushed):
+@kernel(apart=("pushing",))
+def push_on(
+    t: float,
+    before: float,
+    behind: float,
+    x: Matrix,
+    v: Matrix,
+    outside: Outside,
+    families: Families,
+    extra: Matrix,
+    push: Vector,
+    pushed: Vector,
+) -> None:
     """Integrate over two kicks: a time with the push ahead of a drift, and one with that behind it, at time t."""
     for k in range(3):
         pushed[k] += before * push[k]
@@ -188,8 +214,8 @@ def push_on(t, before, behind, x, v, outside, families, extra, push, pushed):
         pushed[k] += behind * push[k]
 
 
-@kernel()
-def turning(x, p, outside, turned):
+@kernel(apart=("angular",))
+def turning(x: Matrix, p: Matrix, outside: Outside, turned: Vector) -> tuple[float, float]:
     """Write the angular momentum about the centre of mass along the axes; the sum of its parts' sizes [N m s].
 
     What moves with the centre of mass is left out of momenta ``p``, since it has no part in the sum.
@@ -221,8 +247,8 @@ def turning(x, p, outside, turned):
     return size, far
 
 
-@kernel()
-def open_ledger(x, p, outside, ledger):
+@kernel(apart=())
+def open_ledger(x: Matrix, p: Matrix, outside: Outside, ledger: Ledger) -> None:
     """Note momentum, angular momentum and impulses at t = 0; ``p`` is M v of all rows that are free."""
     impulse_until(0.0, x, outside, ledger.given)
     for r in range(outside.mass.size):
@@ -232,8 +258,10 @@ def open_ledger(x, p, outside, ledger):
         turning(x, p, outside, ledger.first[1])
 
 
-@kernel()
-def note_momentum(t, x, p, support, outside, ledger, least, row):
+@kernel(apart=())
+def note_momentum(
+    t: float, x: Matrix, p: Matrix, support: Vector, outside: Outside, ledger: Ledger, least: float, row: Vector
+) -> None:
     """Hold the momenta ``p`` of a row against the book, and write momentum and impulses to ``row (9,)``.
 
     ``support`` is the impulse of the supports, ``least`` the momentum that a drift is held against at least.

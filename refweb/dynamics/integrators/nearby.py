@@ -17,15 +17,32 @@ from __future__ import annotations
 
 import functools
 import math
-from typing import NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from numba import types
-from numba.typed import List
+from numba import from_dtype, types
 
-from ...kernels import INDICES, MATRIX, VECTOR, copy_rows, kernel, typed_list
-from ...list_items import item
-from ...net.rotation_bounds import speeds
+from ...compiled.records import ArraysType
+from ...kernels import (
+    INDICES,
+    MATRIX,
+    VECTOR,
+    Arrays,
+    Functions,
+    IndexTable,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Record,
+    array_of,
+    copy_rows,
+    kernel,
+)
+from ...net.rotation_bounds import fastest_surface
+
+if TYPE_CHECKING:
+    from .records import Families, Model
 
 LASTS = 64.0
 """Number of steps that a list is to last at the speed of its first."""
@@ -75,18 +92,18 @@ and above which a list is made, 0 from the start of a run on; the largest compon
 as what it is [m/s]; largest depth around pairs [m], infinite where none are found."""
 NOWHERE = np.zeros((0, 3))
 """Displacements where none are looked at."""
-_lists = (types.ListType(item) for item in (INDICES, MATRIX, MATRIX, VECTOR))
-SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *_lists)
-"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the lists
-of `refweb.dynamics.integrators.records.Families`, for those within a skin, or all where it is infinitely deep."""
+SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR)))
+"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the tables
+of `refweb.dynamics.integrators.records.Families`, for those within a skin, or for all where that is infinitely deep."""
+SwapTable, SkinArray = Annotated[Functions, SWAP], array_of(from_dtype(SKIN), 1)
 
 
-class Nearby(NamedTuple):
+class Nearby(Record):
     """Families whose cells act only near something.
 
     Attributes
     ----------
-    swaps : List
+    swaps : table
         Kernel of each that swaps its cells, see `swap_of`.
     families : ndarray of int
         Their numbers.
@@ -94,27 +111,32 @@ class Nearby(NamedTuple):
         How long what is chosen will do.
     at : ndarray, shape (rows, 3)
         Displacement at which pairs were found [m]; no rows where none are found.
+    cells, data : table
+        Space for the cells and numbers of each.
     """
 
-    swaps: List
-    families: np.ndarray
-    skin: np.ndarray
-    at: np.ndarray
+    swaps: SwapTable
+    families: Integers
+    skin: SkinArray
+    at: Matrix
+    cells: IndexTable
+    data: MatrixTable
 
     @classmethod
     def of(cls, system):
         """Those of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
         skin["depth"], skin["lasts"] = np.inf, MANY
-        swaps = typed_list(SWAP, [swap_for(system.families[i]) for i in near])
+        swaps = Functions(SWAP, [swap_for(system.families[i]) for i in near])
         pairs = any(family.finder is not None for family in system.families)
         at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
         skin["widest"] = WIDEST * float(system.net.natural_length.mean()) if pairs else np.inf
-        return cls(swaps, np.array(near, dtype=np.int64), skin, at)
+        cells, data = [system.families[i].cells for i in near], [system.families[i].data for i in near]
+        return cls(swaps, np.array(near, dtype=np.int64), skin, at, Arrays(INDICES, cells), Arrays(MATRIX, data))
 
     def without(self):
         """That of no families."""
-        return self._replace(families=self.families[:0])
+        return replace(self, families=self.families[:0])
 
 
 def near_of(system):
@@ -190,8 +212,8 @@ def swap_pairs_of(pairs):
     return swap
 
 
-@kernel()
-def take(x, nearby, families):
+@kernel(apart=("near",))
+def take(x: Matrix, nearby: Nearby, families: Families) -> None:
     """Swap the cells of all families for those within the skin at displacement x."""
     depth = nearby.skin[0].depth
     for m in range(nearby.families.size):
@@ -199,8 +221,8 @@ def take(x, nearby, families):
         nearby.swaps[m](i, m, depth, x, families.cells, families.data, families.outs, families.stored)
 
 
-@kernel(leaf=True)
-def show_near(nearby, families):
+@kernel(leaf=True, apart=("near",))
+def show_near(nearby: Nearby, families: Families) -> None:
     """Write what the chosen cells show where it is looked for, among that of all cells.
 
     What an element shows is the largest value of its pairs, or the smallest where these are below 0.
@@ -209,8 +231,8 @@ def show_near(nearby, families):
         return
     size, whole = nearby.families.size, len(families.data)
     for m in range(size):
-        own, shown = item(families.outs, nearby.families[m]), item(families.outs, whole - size + m)
-        chosen = item(families.cells, whole + m)
+        own, shown = families.outs[nearby.families[m]], families.outs[whole - size + m]
+        chosen = families.cells[whole + m]
         if chosen.shape[1] == 1:
             for n in range(chosen.shape[0]):
                 for k in range(own.shape[1]):
@@ -245,8 +267,8 @@ def look_at_all(system, model):
     skin["depth"] = np.inf
 
 
-@kernel()
-def take_pairs(x, nearby, families):
+@kernel(apart=("pairs",))
+def take_pairs(x: Matrix, nearby: Nearby, families: Families) -> None:
     """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
     copy_rows(x[: nearby.at.shape[0]], nearby.at)
     take(x, nearby, families)
@@ -275,12 +297,13 @@ def reach_all(reach, x, nearby, families):
         take(x, nearby, families)
 
 
-@kernel(leaf=True)
-def covered(way, x, nearby, families):
+@kernel(leaf=True, apart=("pairs",))
+def covered(way: float, x: Matrix, nearby: Nearby, families: Families) -> bool:
     """Whether the pairs that are listed are all that can touch by coming nearer by a way [m].
 
     They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
-    bounds look at the elements themselves, see `exchange`. So steps do not depend on which pairs happen to be listed,
+    bounds look at the elements themselves, see
+    `refweb.dynamics.integrators.step_bound`. So steps do not depend on which pairs happen to be listed,
     as they would where a run is taken row by row.
     """
     skin = nearby.skin[0]
@@ -294,17 +317,8 @@ def covered(way, x, nearby, families):
     skin.depth, skin.used = depth, 0.0
     take_pairs(x, nearby, families)
     for m in range(nearby.families.size):  # how deep the pairs are is not known before the next forces
-        item(families.outs, nearby.families[m])[:, 0] = math.inf
+        families.outs[nearby.families[m]][:, 0] = math.inf
     return True
-
-
-@kernel()
-def exchange(nearby, families, cells, data):
-    """Exchange cells and data of families that act nearby with those that stand in two lists."""
-    for m in range(nearby.families.size):
-        i = nearby.families[m]
-        families.cells[i], cells[m] = cells[m], families.cells[i]
-        families.data[i], data[m] = data[m], families.data[i]
 
 
 @kernel(leaf=True, fastmath={"contract", "nnan", "nsz"})
@@ -337,8 +351,8 @@ def goes_freely(model):
     return model.guard.families.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
 
 
-@kernel(leaf=True)
-def follow_near(drift, x, v, bits, before, model):
+@kernel(leaf=True, apart=("near",))
+def follow_near(drift: float, x: Matrix, v: Matrix, bits: Integers, before: Matrix, model: Model) -> None:
     """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
 
     ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
@@ -361,10 +375,8 @@ def follow_near(drift, x, v, bits, before, model):
     way *= WAY
     if FEWEST * way > skin.widest and not driven.size:
         way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
-    turned = 0.0
-    for n in range(turns.moment.size):
-        turned = max(turned, speeds(n, x, v, turns)[1])
-    way += 2.0 * abs(drift) * turned
+    if turns.moment.size:
+        way += 2.0 * abs(drift) * fastest_surface(x, v, turns)
     skin.earlier, skin.before, skin.last = skin.before, skin.last, way
     skin.longest = max(skin.longest, way)
     skin.used += way
@@ -373,8 +385,8 @@ def follow_near(drift, x, v, bits, before, model):
         choose(drift, x, v, driven.size > 0, model.nearby, model.families)
 
 
-@kernel()
-def choose(drift, x, v, driven, nearby, families):
+@kernel(apart=("near",))
+def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: Nearby, families: Families) -> None:
     """Choose anew what is near, behind a drift that led to x at velocities v, where motion is ``driven`` or is not."""
     skin = nearby.skin[0]
     way, recent = skin.last, skin.last + skin.before + skin.earlier

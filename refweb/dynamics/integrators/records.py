@@ -1,22 +1,47 @@
-"""Records of the compiled loop: what acts, what is looked at, and what moves, as named tuples that numba takes whole.
+"""Records of the compiled loop: what acts, what is looked at, and what moves.
 
-Kernels of one signature, and arrays of one type, stand in typed lists, so that the loop is compiled once for any
-mixture of effects. What a scene does not have is an empty list or array.
+Kernels of one signature, and arrays of one type, stand in tables, so that the loop is compiled once for any mixture of
+effects. What a scene does not have is an empty table or array, and the kernels that would be called for it are not
+compiled, see `features`.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
-from numba.typed import List
+from numba import from_dtype
 
 from ... import kernels as k
-from ...kernels import INDICES, INTEGERS, MATRIX, VECTOR, record, typed_list
+from ...kernels import (
+    INDICES,
+    INTEGERS,
+    MATRIX,
+    VECTOR,
+    Arrays,
+    BoundTable,
+    Cube,
+    EnergyTable,
+    ForceTable,
+    Functions,
+    IndexTable,
+    Indices,
+    IntegerMatrix,
+    Integers,
+    IntegerTable,
+    LinesTable,
+    Matrix,
+    MatrixTable,
+    Record,
+    Vector,
+    VectorTable,
+    array_of,
+)
 from ...net.rotation import Turns
 from ...results.probes import PROBE, plain_of
 from .averages import Averages, Windows
 from .energy_book import no_energy
+from .events import EventArray
 from .extremes import Extremes
 from .guard import Guard, Walls
 from .momentum_book import Ledger, Outside
@@ -46,7 +71,8 @@ CLOCK = np.dtype(
 energy that a drift is held against at least, the time from which steps are equal, how many of these are taken, 0 where
 none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not pass, 0
 where it is not, and whether it is to be cut."""
-
+ClockArray = array_of(from_dtype(CLOCK), 1)
+ProbeTable = Annotated[Functions, PROBE]
 
 LINE = 64
 """Bytes of a line of the cache."""
@@ -64,8 +90,7 @@ def aligned(values):
     return copy
 
 
-@record
-class Scheme(NamedTuple):
+class Scheme(Record):
     """How steps are made.
 
     Attributes
@@ -82,15 +107,15 @@ class Scheme(NamedTuple):
         Factor on the number of steps of each row.
     """
 
-    kicks: np.ndarray
-    drifts: np.ndarray
+    kicks: Vector
+    drifts: Vector
     safety: float
     least: float
     step_size: float
     finer: float
 
 
-class Inertia(NamedTuple):
+class Inertia(Record):
     """What resists.
 
     Attributes
@@ -109,12 +134,12 @@ class Inertia(NamedTuple):
         Bodies whose orientation counts.
     """
 
-    mass: np.ndarray
-    inverse: np.ndarray
-    rates: np.ndarray
-    moving: np.ndarray
-    held: np.ndarray
-    driven: np.ndarray
+    mass: Vector
+    inverse: Matrix
+    rates: Matrix
+    moving: Integers
+    held: Integers
+    driven: Integers
     linear: int
     turns: Turns
 
@@ -130,41 +155,41 @@ class Inertia(NamedTuple):
         )
 
 
-class Families(NamedTuple):
+class Families(Record):
     """What acts; that of the lines is the first family.
 
     Of those that act only near something, lists have the cells that are looked at; all stand behind all families.
 
     Attributes
     ----------
-    forces, cells, data, outs : List
+    forces, cells, data, outs : table
         Kernel of each family, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
         column, the numbers of cells that are looked at instead of all, none where all are.
     still, viscous : ndarray of int
         Families behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
-    energies, stored : List
+    energies, stored : table
         Kernel of the energy of each family, and what it writes per cell [J].
     working : ndarray of int, shape (families,)
         Whether what is booked of a family is work (1), its energy, which is lost (−1), or nothing (0).
     powers : ndarray of int, shape (powered, 3)
         Families booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
-    bounds, dampings : List
+    bounds, dampings : table
         Kernel that bounds the stiffness of each family, and the damping of each viscous one.
     """
 
-    forces: List
-    cells: List
-    data: List
-    outs: List
-    still: np.ndarray
-    viscous: np.ndarray
-    energies: List
-    stored: List
-    working: np.ndarray
-    powers: np.ndarray
-    bounds: List
-    dampings: List
+    forces: ForceTable
+    cells: IndexTable
+    data: MatrixTable
+    outs: MatrixTable
+    still: Integers
+    viscous: Integers
+    energies: EnergyTable
+    stored: VectorTable
+    working: Integers
+    powers: IntegerMatrix
+    bounds: BoundTable
+    dampings: BoundTable
 
     @classmethod
     def of(cls, system, outs):
@@ -179,47 +204,47 @@ class Families(NamedTuple):
         near, stored = near_of(system), [np.zeros(len(family.cells)) for family in families]
         cells = [*(families[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         return cls(
-            forces=typed_list(k.FORCE, [family.force for family in families]),
-            cells=typed_list(INDICES, [*(family.cells for family in families), *cells]),
-            data=typed_list(MATRIX, [*numbers, *(numbers[i] for i in near)]),
-            outs=typed_list(MATRIX, [*outs, *(outs[i] for i in near)]),
+            forces=Functions(k.FORCE, [family.force for family in families]),
+            cells=Arrays(INDICES, [*(family.cells for family in families), *cells]),
+            data=Arrays(MATRIX, [*numbers, *(numbers[i] for i in near)]),
+            outs=Arrays(MATRIX, [*outs, *(outs[i] for i in near)]),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
-            energies=typed_list(k.ENERGY, [family.energy or no_energy for family in families]),
-            stored=typed_list(VECTOR, [*stored, *(stored[i] for i in near)]),
+            energies=Functions(k.ENERGY, [family.energy or no_energy for family in families]),
+            stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
-            bounds=typed_list(k.BOUND, [family.bound or no_bound for family in families]),
-            dampings=typed_list(k.BOUND, [families[i].damping_bound or no_bound for i in viscous]),
+            bounds=Functions(k.BOUND, [family.bound or no_bound for family in families]),
+            dampings=Functions(k.BOUND, [families[i].damping_bound or no_bound for i in viscous]),
         )
 
 
-class Motions(NamedTuple):
+class Motions(Record):
     """Prescribed motion: kernels, cells, numbers, and matrices of no columns for what they would write."""
 
-    kernels: List
-    cells: List
-    data: List
-    outs: List
+    kernels: ForceTable
+    cells: IndexTable
+    data: MatrixTable
+    outs: MatrixTable
 
     @classmethod
     def of(cls, system):
         """That of a system."""
         drives = system.drives
         return cls(
-            kernels=typed_list(k.FORCE, [drive.kernel for drive in drives]),
-            cells=typed_list(INDICES, [drive.cells for drive in drives]),
-            data=typed_list(MATRIX, [drive.data for drive in drives]),
-            outs=typed_list(MATRIX, [np.zeros((len(drive.cells), 0)) for drive in drives]),
+            kernels=Functions(k.FORCE, [drive.kernel for drive in drives]),
+            cells=Arrays(INDICES, [drive.cells for drive in drives]),
+            data=Arrays(MATRIX, [drive.data for drive in drives]),
+            outs=Arrays(MATRIX, [np.zeros((len(drive.cells), 0)) for drive in drives]),
         )
 
 
-class Reels(NamedTuple):
+class Reels(Record):
     """Natural lengths that change.
 
     Attributes
     ----------
-    kernels, cells, data : List
+    kernels, cells, data : table
         What changes them, elements counted among those that change.
     lengths : ndarray, shape (changing,)
         Natural lengths that the kernels multiply [m].
@@ -229,22 +254,22 @@ class Reels(NamedTuple):
         Numbers of these elements as last set.
     nodes : ndarray of int, shape (changing, 2)
         Their nodes.
-    by_length : List
+    by_length : table
         One kernel of ∂E/∂L [N], where any length changes.
     corners : ndarray
         Times at which a factor of natural lengths has a corner [s], increasing, then ∞ for the end of a row if there
         are such factors, then −∞ for its start.
     """
 
-    kernels: List
-    cells: List
-    data: List
-    lengths: np.ndarray
-    elements: np.ndarray
-    lines: np.ndarray
-    nodes: np.ndarray
-    by_length: List
-    corners: np.ndarray
+    kernels: LinesTable
+    cells: IndexTable
+    data: MatrixTable
+    lengths: Vector
+    elements: Integers
+    lines: Matrix
+    nodes: Indices
+    by_length: EnergyTable
+    corners: Vector
 
     @classmethod
     def of(cls, system):
@@ -253,20 +278,19 @@ class Reels(NamedTuple):
         elements = np.unique(np.concatenate([[], *(drive.cells[:, 0] for drive in drives)])).astype(np.int64)
         corners = sorted({time for drive in drives for time in drive.times})
         return cls(
-            kernels=typed_list(k.LINES, [drive.kernel for drive in drives]),
-            cells=typed_list(INDICES, [np.searchsorted(elements, drive.cells).astype(np.int32) for drive in drives]),
-            data=typed_list(MATRIX, [drive.data for drive in drives]),
+            kernels=Functions(k.LINES, [drive.kernel for drive in drives]),
+            cells=Arrays(INDICES, [np.searchsorted(elements, drive.cells).astype(np.int32) for drive in drives]),
+            data=Arrays(MATRIX, [drive.data for drive in drives]),
             lengths=net.natural_length[elements],
             elements=elements,
             lines=net.line_data[elements],
             nodes=net.cells[elements],
-            by_length=typed_list(k.ENERGY, [system.length_force_kernel] if drives else []),
+            by_length=Functions(k.ENERGY, [system.length_force_kernel] if drives else []),
             corners=np.array([*corners, *([np.inf] if drives else []), -np.inf]),
         )
 
 
-@record
-class Model(NamedTuple):
+class Model(Record):
     """A system as the loop sees it; ``corners`` are the times at which a table has one [s], increasing."""
 
     inertia: Inertia
@@ -274,7 +298,7 @@ class Model(NamedTuple):
     rubbed: Rubbed
     motions: Motions
     reels: Reels
-    corners: np.ndarray
+    corners: Vector
     outside: Outside
     nearby: Nearby
     guard: Guard
@@ -289,13 +313,12 @@ class Model(NamedTuple):
         return cls(inertia, families, rubbed, motions, reels, system.corners, outside, *kept)
 
 
-@record
-class Observed(NamedTuple):
+class Observed(Record):
     """What is looked at.
 
     Attributes
     ----------
-    probes, rows, data : List
+    probes, rows, data : table
         Kernel of each probe and its numbers.
     sums : ndarray, shape (sums, families + 3)
         Weights of each sum.
@@ -313,16 +336,16 @@ class Observed(NamedTuple):
         Factor on that.
     """
 
-    probes: List
-    rows: List
-    data: List
-    sums: np.ndarray
-    signs: np.ndarray
-    followed: np.ndarray
+    probes: ProbeTable
+    rows: IntegerTable
+    data: MatrixTable
+    sums: Matrix
+    signs: Vector
+    followed: Integers
     windows: Windows
-    shown: np.ndarray
-    plain: np.ndarray
-    scales: np.ndarray
+    shown: Integers
+    plain: IntegerMatrix
+    scales: Vector
 
     @classmethod
     def of(cls, probes, sums, outs):
@@ -332,9 +355,9 @@ class Observed(NamedTuple):
         signs[windows.slots] = 0.0
         plain = [plain_of(probe) for probe in probes]
         return cls(
-            probes=typed_list(PROBE, [probe.kernel for probe in probes]),
-            rows=typed_list(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
-            data=typed_list(MATRIX, numbers),
+            probes=Functions(PROBE, [probe.kernel for probe in probes]),
+            rows=Arrays(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
+            data=Arrays(MATRIX, numbers),
             sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(outs) + 3),
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
@@ -345,8 +368,7 @@ class Observed(NamedTuple):
         )
 
 
-@record
-class Running(NamedTuple):
+class Running(Record):
     """What the loop writes; arrays of an explicit course, and numbers that pass from one part of a row to the next.
 
     Attributes
@@ -375,22 +397,63 @@ class Running(NamedTuple):
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)
         What has met, see `refweb.dynamics.integrators.integrator.Course`.
-    touches : List
-        One array, room for what touches and is solved for.
+    touches : table
+        One array, space for what touches and is solved for.
     """
 
-    clock: np.ndarray
-    x: np.ndarray
-    v: np.ndarray
-    f: np.ndarray
-    before: np.ndarray
-    work: np.ndarray
-    impulse: np.ndarray
+    clock: ClockArray
+    x: Matrix
+    v: Matrix
+    f: Matrix
+    before: Cube
+    work: Vector
+    impulse: Vector
     ledger: Ledger
     extremes: Extremes
-    events: np.ndarray
+    events: EventArray
     averages: Averages
-    power: np.ndarray
-    length_force: np.ndarray
-    crossings: np.ndarray
-    touches: List
+    power: Vector
+    length_force: Matrix
+    crossings: Matrix
+    touches: MatrixTable
+
+
+def features(scheme, model, observed, events):
+    """Names of what a run has and not every run has: kernels for what it has not are not compiled.
+
+    Returns
+    -------
+    set of str
+        ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
+        ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
+        that change; ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
+        ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
+        found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either).
+    """
+    inertia, families, outside, windows = model.inertia, model.families, model.outside, observed.windows
+    has = {
+        "stages": len(scheme.drifts) > 1,
+        "kicks": len(scheme.drifts) == 1,
+        "watched": len(observed.followed) + len(observed.sums),
+        "books": len(observed.sums),
+        "averages": len(windows.slots),
+        "looks": len(observed.followed) + len(observed.sums) + len(windows.slots),
+        "events": len(events),
+        "turning": len(inertia.turns.moment),
+        "carried": len(inertia.turns.carried),
+        "driven": len(inertia.driven) + len(model.motions.kernels),
+        "lengths": len(model.reels.lengths),
+        "powers": len(families.powers),
+        "viscous": len(families.viscous),
+        "rubbing": len(model.rubbed.families),
+        "pushing": len(outside.pushing),
+        "damped": len(outside.damped),
+        "booked": len(families.powers) + len(model.reels.lengths) + len(outside.pushing),
+        "angular": len(outside.axes),
+        "near": len(model.nearby.families),
+        "pairs": len(model.nearby.at),
+        "guard": len(model.guard.families),
+        "walls": len(model.walls.families),
+        "guarded": len(model.guard.families) + len(model.walls.families),
+    }
+    return {name for name, count in has.items() if count}

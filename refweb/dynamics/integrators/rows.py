@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from ...kernels import kernel
-from ...list_items import item
+from typing import TYPE_CHECKING
+
+from ...kernels import Integers, Matrix, Vector, kernel
 from .averages import write_means
 from .energy_book import book_energies, own_energy
 from .extremes import look_at
 from .momentum_book import note_momentum
 
+if TYPE_CHECKING:
+    from .records import Model, Observed, Running
 
-@kernel(leaf=True)
-def energies_now(model, running, total):
+
+@kernel(leaf=True, apart=())
+def energies_now(model: Model, running: Running, total: Vector) -> tuple[float, float]:
     """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
     clock, families = running.clock[0], model.families
     book_energies(
@@ -25,20 +29,23 @@ def energies_now(model, running, total):
     return own_energy(total, families.working), stored
 
 
-@kernel(leaf=True)
-def write_row(row, model, observed, running, total, where, p):
+@kernel(leaf=True, apart=())
+def write_row(
+    row: Vector, model: Model, observed: Observed, running: Running, total: Vector, where: Integers, p: Matrix
+) -> tuple[float, float]:
     """Write time, probes, energies, work, step size, momentum and impulses; hold momentum against these.
 
     Returns the energy, and the sum of all energies without regard to sign [J]. There is room for a place and for
     momenta.
     """
     clock, families, inertia, v = running.clock[0], model.families, model.inertia, running.v
-    lines, at = item(families.outs, 0), 1
+    lines, at = families.outs[0], 1
     row[0] = clock.time
     for i in range(len(observed.probes)):
         row[at] = look_at(i, clock.time, running.x, v, running.f, lines, observed, where)
         at += 1
-    write_means(row, observed.windows, running.averages, running.extremes)
+    if observed.windows.slots.size:
+        write_means(row, observed.windows, running.averages, running.extremes)
     energy, stored = energies_now(model, running, total)
     total[-1] = clock.step
     for i in range(total.size):

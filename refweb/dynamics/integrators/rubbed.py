@@ -6,25 +6,36 @@ a depth there are looked at.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numba.typed import List
 
 from ... import kernels as k
 from ...effects.base import CELL
-from ...kernels import INTEGERS, MATRIX, kernel, typed_list
+from ...kernels import (
+    INTEGERS,
+    MATRIX,
+    Arrays,
+    Functions,
+    GiveTable,
+    Integers,
+    IntegerTable,
+    KeptTable,
+    MatrixTable,
+    MeetTable,
+    Record,
+    SweepTable,
+    kernel,
+)
 from .nearby import near_of, rows_of
 
 
-class Rubbed(NamedTuple):
+class Rubbed(Record):
     """Families whose kicks are solved for.
 
     Attributes
     ----------
     families : ndarray of int
         Their numbers; ``last`` are the places among these where runs of families with one sweep end.
-    meets, recalls, sweeps, gives, memories : List
+    meets, recalls, sweeps, gives, memories : table
         Their kernels, see `refweb.effects.base.Rubbing`, and what is remembered of the step before, within a row.
     shown, told : ndarray of int, List
         Which ``outs`` of `refweb.dynamics.integrators.records.Families` has depths, −1 for those that have none, and
@@ -35,15 +46,15 @@ class Rubbed(NamedTuple):
         Number of columns of what touches.
     """
 
-    families: np.ndarray
-    meets: List
-    recalls: List
-    sweeps: List
-    gives: List
-    memories: List
-    last: np.ndarray
-    shown: np.ndarray
-    told: List
+    families: Integers
+    meets: MeetTable
+    recalls: KeptTable
+    sweeps: SweepTable
+    gives: GiveTable
+    memories: MatrixTable
+    last: Integers
+    shown: Integers
+    told: IntegerTable
     pieces: int
     width: int
 
@@ -57,14 +68,14 @@ class Rubbed(NamedTuple):
         depths = [depths_of(system, family) for family in rubbing]
         return cls(
             families=np.array(families, dtype=np.int64),
-            meets=typed_list(k.MEET, [one.meet for one in own]),
-            recalls=typed_list(k.KEPT, [one.recall for one in own]),
-            sweeps=typed_list(k.SWEEP, [one.sweep for one in own]),
-            gives=typed_list(k.GIVE, [one.give for one in own]),
+            meets=Functions(k.MEET, [one.meet for one in own]),
+            recalls=Functions(k.KEPT, [one.recall for one in own]),
+            sweeps=Functions(k.SWEEP, [one.sweep for one in own]),
+            gives=Functions(k.GIVE, [one.give for one in own]),
             last=np.array(last, dtype=np.int64),
-            memories=typed_list(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
+            memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
             shown=np.array([shown for shown, _ in depths], dtype=np.int64),
-            told=typed_list(INTEGERS, [told for _, told in depths]),
+            told=Arrays(INTEGERS, [told for _, told in depths]),
             pieces=system.net.subdivide,
             width=max((one.width for one in own), default=0),
         )

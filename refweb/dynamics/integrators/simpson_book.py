@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import NoEnd, OpenBook
-from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, typed_list
+from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import Turns, more_kinetic
 from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
 from .momentum_book import Outside, note_momentum, open_ledger
@@ -158,10 +158,10 @@ class SimpsonBook:
         families, self._shown = system.families, shown
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
-            typed_list(INDICES, [f.cells for f in families]),
-            typed_list(MATRIX, [self._lines if f.lines else f.data for f in families]),
-            typed_list(ENERGY, [f.energy or no_energy for f in families]),
-            typed_list(VECTOR, [np.zeros(len(f.cells)) for f in families]),
+            Arrays(INDICES, [f.cells for f in families]),
+            Arrays(MATRIX, [self._lines if f.lines else f.data for f in families]),
+            Functions(ENERGY, [f.energy or no_energy for f in families]),
+            Arrays(VECTOR, [np.zeros(len(f.cells)) for f in families]),
         )
         self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
         self._working = system.working

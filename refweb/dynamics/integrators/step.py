@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import copy_rows, kernel, sum_of
+from ...kernels import Cube, ForceTable, IndexTable, Matrix, MatrixTable, copy_rows, kernel, sum_of
 from ...net.net import LENGTH
-from ...net.rotation import carry, hand_on, note_turns, turn_on
+from ...net.rotation import Turns, carry, hand_on, note_turns, turn_on
 from .energy_book import act
 from .rubbed import meet_all
+
+if TYPE_CHECKING:
+    from .records import Families, Model, Reels, Running
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -57,15 +61,7 @@ def last_kick(kick, inverse, v, f):
 def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
     """As `last_kick`, where bodies may carry nodes."""
     last_kick(kick, inverse, flat_v, flat_f)
-    if turns.carried.shape[0]:
-        carry(x, v, turns)
-
-
-@kernel(leaf=True, forceinline=True)
-def hand_over(x, f, turns):
-    """Add forces on nodes that bodies carry to those on the bodies."""
-    if turns.carried.shape[0]:
-        hand_on(x, f, turns)
+    carry(x, v, turns)
 
 
 @kernel(forceinline=True)
@@ -101,8 +97,19 @@ def give_reaction(before, behind, held, f, reaction, impulse):
     give_impulse(behind, reaction, impulse)
 
 
-@kernel(leaf=True)
-def viscous_kick(t, h, x, v, f, inverse, half, extra, families, turns):
+@kernel(leaf=True, apart=("viscous",))
+def viscous_kick(
+    t: float,
+    h: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    inverse: Matrix,
+    half: Matrix,
+    extra: Matrix,
+    families: Families,
+    turns: Turns,
+) -> None:
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
 
     Forces that depend on velocity see that at the end of the step; the kick, thereby implicit, stays adjoint to the
@@ -136,8 +143,20 @@ def viscous_kick(t, h, x, v, f, inverse, half, extra, families, turns):
     carry(x, v, turns)
 
 
-@kernel()
-def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, room, model):
+@kernel(apart=("rubbing",))
+def rubbing_kick(
+    number: int,
+    t: float,
+    h: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    inverse: Matrix,
+    half: Matrix,
+    extra: Matrix,
+    room: MatrixTable,
+    model: Model,
+) -> None:
     """As `viscous_kick`, where losses of contact are solved for: they need no bound.
 
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
@@ -194,16 +213,27 @@ def rubbing_kick(number, t, h, x, v, f, inverse, half, extra, room, model):
         begin = ends[m]
 
 
-@kernel()
-def move_supports(t, h, x, v, f, aside, kernels, cells, data, outs):
+@kernel(apart=("driven",))
+def move_supports(
+    t: float,
+    h: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    aside: Matrix,
+    kernels: ForceTable,
+    cells: IndexTable,
+    data: MatrixTable,
+    outs: MatrixTable,
+) -> None:
     """Write prescribed positions at the end of a step, and velocities in it: at its end they may jump."""
     for i in range(len(kernels)):
         kernels[i](t, x, v, f, cells[i], data[i], outs[i])
         kernels[i](t - 0.5 * h, aside, v, f, cells[i], data[i], outs[i])
 
 
-@kernel()
-def turn_supports(t, model, running):
+@kernel(apart=("driven",))
+def turn_supports(t: float, model: Model, running: Running) -> bool:
     """Write prescribed velocities behind a corner at time t, and forces that follow from velocity; whether any jumps.
 
     What the kinetic energy of the supports gains is work of their motion; the rows of a history show what is behind.
@@ -238,8 +268,8 @@ def note_lengths(reels, was):
         was[c] = reels.lines[c, LENGTH]
 
 
-@kernel()
-def set_lengths(t, reels, lines):
+@kernel(apart=("lengths",))
+def set_lengths(t: float, reels: Reels, lines: Matrix) -> None:
     """Give the elements that change their natural lengths at time t, in the numbers of all ``lines``."""
     for c in range(reels.lengths.size):
         reels.lines[c, LENGTH] = reels.lengths[c]
@@ -249,8 +279,8 @@ def set_lengths(t, reels, lines):
         lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
 
 
-@kernel(leaf=True)
-def note_state(x, v, f, inverse, old):
+@kernel(leaf=True, apart=("looks",))
+def note_state(x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, old: Cube) -> None:
     """Write position, velocity and acceleration, of which a long step begins."""
     for r in range(x.shape[0]):
         for k in range(3):
@@ -292,19 +322,3 @@ def interpolate_kicks(s, h, old, x, v, inverse, f, here, speed):
             a0, a1 = old[2, q, k], inverse[q, k] * f[q, k]
             here[q, k] = old[0, q, k] + s * (x[q, k] - old[0, q, k]) - bend0 * a0 - bend1 * a1
             speed[q, k] = old[1, q, k] + way * (v[q, k] - old[1, q, k]) + rate0 * a0 + rate1 * a1
-
-
-@kernel()
-def room_for_numbers(rows, driven):
-    """Room for a place, for three vectors, and for states of rows whose motion is prescribed."""
-    place, before, aside = np.zeros(2, dtype=np.int64), np.empty((driven, 7)), np.empty((rows * (driven > 0), 3))
-    return place, np.zeros(3), np.zeros(3), np.zeros(3), before, aside
-
-
-@kernel()
-def room_for_forces(rows, model):
-    """Room for forces that do not stay, twice where any are asked for, and for natural lengths."""
-    families, pushing = model.families, model.outside.pushing.size
-    more = families.powers.shape[0] + families.viscous.size + model.rubbed.families.size + pushing > 0
-    extra, lengths = np.zeros((rows * more, 3)), np.empty(model.reels.lengths.size)
-    return extra, np.empty_like(extra), lengths

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from ...kernels import BOUND, kernel
-from ...list_items import item
+from ...kernels import BOUND, Matrix, kernel
 from ...net.rotation_bounds import carry_rates, pull_rates
-from .nearby import exchange
 from .step import set_lengths
 
+if TYPE_CHECKING:
+    from .records import Families, Inertia, Model, Running
 
-@kernel(leaf=True)
-def step_bound(reach, speed, x, f, inertia, families):
+
+@kernel(leaf=True, apart=())
+def step_bound(reach: float, speed: float, x: Matrix, f: Matrix, inertia: Inertia, families: Families) -> float:
     """Largest stable step [s], 2/ω (√(1 + ζ²) − ζ); infinite where nothing vibrates.
 
     It is that of all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most, while forces f
@@ -21,9 +23,11 @@ def step_bound(reach, speed, x, f, inertia, families):
     mass, viscous, rates, losses = inertia.mass, families.viscous, inertia.rates[0], inertia.rates[1]
     inertia.rates[:] = 0.0
     for i in range(len(families.bounds)):
-        item(families.bounds, i)(reach, speed, x, mass, rates, item(families.cells, i), item(families.data, i))
-    carry_rates(rates, inertia.turns)
-    pull_rates(rates, f, inertia.turns)
+        families.bounds[i](reach, speed, x, mass, rates, families.cells[i], families.data[i])
+    carries = inertia.turns.carried.shape[0] > 0
+    if carries:
+        carry_rates(rates, inertia.turns)
+        pull_rates(rates, f, inertia.turns)
     if not viscous.size:
         rate = 0.0
         for r in inertia.moving:
@@ -31,9 +35,10 @@ def step_bound(reach, speed, x, f, inertia, families):
         return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
     step = math.inf
     for n in range(viscous.size):
-        cells, data = item(families.cells, viscous[n]), item(families.data, viscous[n])
-        item(families.dampings, n)(reach, speed, x, mass, losses, cells, data)
-    carry_rates(losses, inertia.turns)
+        cells, data = families.cells[viscous[n]], families.data[viscous[n]]
+        families.dampings[n](reach, speed, x, mass, losses, cells, data)
+    if carries:
+        carry_rates(losses, inertia.turns)
     for r in inertia.moving:
         rate, loss = rates[r] / mass[r], losses[r] / mass[r]
         if rate + loss > 0.0:  # (√(γ² + 4κ) − γ)/κ of κ = ω², γ = 2ζω
@@ -41,14 +46,10 @@ def step_bound(reach, speed, x, f, inertia, families):
     return step
 
 
-@kernel()
-def shorten(t, model):
-    """Give lines their natural lengths at time t."""
-    set_lengths(t, model.reels, model.families.data[0])
-
-
-@kernel(leaf=True)
-def safe_step(start, end, changing, reach, speed, x, f, model):
+@kernel(leaf=True, apart=())
+def safe_step(
+    start: float, end: float, changing: bool, reach: float, speed: float, x: Matrix, f: Matrix, model: Model
+) -> float:
     """Step that is stable from ``start`` to ``end`` [s], also where natural lengths change.
 
     They are looked at at all corners of their factors: in between a length is a product of positive linear functions of
@@ -58,21 +59,27 @@ def safe_step(start, end, changing, reach, speed, x, f, model):
     for corner in model.reels.corners:
         if changing and (start < corner < end or corner == math.inf) or corner == -math.inf:
             if changing:
-                shorten(min(max(corner, start), end), model)
+                set_lengths(min(max(corner, start), end), model.reels, model.families.data[0])
             bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.families))
     return bound
 
 
-@kernel()
-def step_by_elements(start, end, changing, reach, speed, model, running):
+@kernel(apart=("pairs",))
+def step_by_elements(
+    start: float, end: float, changing: bool, reach: float, speed: float, model: Model, running: Running
+) -> float:
     """As `safe_step`, where pairs that are listed are not all that can touch: by the elements themselves."""
-    families, cells, data = model.families, model.families.cells.copy(), model.families.data.copy()
-    more, first = len(cells) - len(data), 2 * len(data) - len(cells)
-    for m in range(more):
-        cells[m], data[m] = cells[first + m], data[first + m]
-    exchange(model.nearby, families, cells, data)
+    nearby, families = model.nearby, model.families
+    first = 2 * len(families.data) - len(families.cells)  # see `refweb.dynamics.integrators.records.Families`
+    for m in range(nearby.families.size):
+        i = nearby.families[m]
+        nearby.cells[m], nearby.data[m] = families.cells[i], families.data[i]
+        families.cells[i], families.data[i] = families.cells[first + m], families.data[first + m]
     bound = safe_step(start, end, changing, reach, speed, running.x, running.f, model)
-    exchange(model.nearby, families, cells, data)
+    for m in range(nearby.families.size):
+        i = nearby.families[m]
+        families.cells[i], families.data[i] = nearby.cells[m], nearby.data[m]
+        nearby.cells[m], nearby.data[m] = families.cells[first + m], families.data[first + m]
     return bound
 
 

@@ -1,0 +1,253 @@
+"""Kernels: functions that numba compiles when they are called, stand in a table or are prepared, never before.
+
+Three kinds of calls lead to a kernel. Another kernel that names it is optimized with it, as numba does by itself: for
+what stands in loops over elements. A kernel with ``apart`` is called by its address: its callers know its signature,
+which its annotations say, and are neither optimized with it nor compiled again when it changes. Its ``apart`` are the
+features that a run needs to reach it; a run without them neither compiles nor loads it, see `prepare`. And Python calls
+a kernel through an entry of its own, which is compiled when it is first asked for.
+"""
+
+from __future__ import annotations
+
+import functools
+import typing
+from typing import Annotated, Any
+
+from numba import types
+
+from . import keys, numba_internals
+
+COMMON = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
+"""Options of all kernels: products and sums may contract, nothing else departs from IEEE arithmetic."""
+PLAIN_TYPES = {float: types.float64, int: types.int64, bool: types.boolean, type(None): types.void}
+RECORDS: dict[str, Any] = {}
+"""Classes of records by name, for annotations whose module does not import them."""
+
+
+def type_of(annotation):
+    """numba's type of what an annotation says: a number, an array with its type, a table, or a record."""
+    if annotation in PLAIN_TYPES:
+        return PLAIN_TYPES[annotation]
+    if typing.get_origin(annotation) is Annotated:
+        base, kind = typing.get_args(annotation)[:2]
+        return base.kind_of(kind) if hasattr(base, "kind_of") else kind
+    if typing.get_origin(annotation) is tuple:
+        return types.Tuple([type_of(one) for one in typing.get_args(annotation)])
+    return annotation.reference()
+
+
+def signature_of(function):
+    """The `numba` signature that the annotations of a function say."""
+    hints = typing.get_type_hints(function, localns=RECORDS, include_extras=True)
+    result = type_of(hints.pop("return"))
+    return result(*map(type_of, hints.values()))
+
+
+class Kernel:
+    """A compiled function, see the module.
+
+    Attributes
+    ----------
+    py_func : function
+        What is compiled.
+    apart : frozenset of str, optional
+        Features of a run that reaches it, for one that is called by its address; else None.
+    """
+
+    def __init__(self, function, signature, apart, counted, options):
+        self.py_func, self.apart = function, None if apart is None else frozenset(apart)
+        self._given, self._counted, self._options = signature, counted, {**COMMON, **options}
+        self.prepared = False
+        if function.__closure__:
+            cells = [keys.described(cell.cell_contents, ()) for cell in function.__closure__]
+            function.__qualname__ += f"_{keys.digest(*cells)[:16]}"
+
+    @property
+    def name(self):
+        """Its name with that of its module, without the package's."""
+        return f"{self.py_func.__module__}.{self.py_func.__qualname__}".removeprefix("refweb.").replace("<locals>.", "")
+
+    @functools.cached_property
+    def signature(self):
+        """Its one signature; None where callers give it any."""
+        return signature_of(self.py_func) if self._given is None and self.apart is not None else self._given
+
+    @functools.cached_property
+    def _key(self):
+        return keys.digest(keys.of_function(self.py_func), self._options, self._counted, self.signature)
+
+    def machine_code_key(self, seen):
+        """What a caller's machine code depends on, see `refweb.compiled.keys.described`."""
+        return self._key if self.apart is None or numba_internals.PLAIN else f"apart {self._slot.symbol}"
+
+    @functools.cached_property
+    def _slot(self):
+        """Where its address stands, which kernels share that are the same."""
+        symbol = f"refweb.{self.name}.{keys.digest(self.signature)[:8]}"
+        return numba_internals.slot_of(symbol, self._key)
+
+    @functools.cached_property
+    def _body(self):
+        """The dispatcher that kernels see."""
+        given = {**numba_internals.options(self._options, self._counted), **numba_internals.BARE}
+        linked = self.apart is None
+        cache = numba_internals.Cache(self.py_func.__qualname__.rpartition(".")[2], lambda: self._key, linked)
+        made = numba_internals.dispatcher(self.py_func, given, cache)
+        made.own_kernel = self
+        return made
+
+    @property
+    def _numba_type_(self):
+        with numba_internals.lock:
+            if self.apart is None or numba_internals.PLAIN:
+                body = self._body
+                if self.signature is not None and not body.overloads:
+                    body.compile(self.signature)
+                    body.disable_compile()
+                return body._numba_type_
+            return numba_internals.Called(self.signature, self._slot.symbol)
+
+    def known(self):
+        """Whether its machine code is loaded, or on disk."""
+        if self._slot.filled:
+            return True
+        return numba_internals.PLAIN or self._body._cache.has(self.signature)
+
+    def address(self):
+        """Address of its machine code, which is compiled where there is none."""
+        with numba_internals.lock:
+            if not self._slot.filled:
+                for one in self.callees:
+                    _ = one._slot  # symbols that its machine code names
+                self._body.compile(self.signature)
+                self._slot.fill(numba_internals.address_of(self._body, self.signature))
+        return self._slot.address
+
+    @functools.cached_property
+    def _entry(self):
+        """The dispatcher that Python calls."""
+        own = self.by_address() if self.signature is not None else self
+        names = ", ".join(self.py_func.__code__.co_varnames[: self.py_func.__code__.co_argcount])
+        space = {"own": own, "__name__": self.py_func.__module__}
+        exec(f"def entry({names}): return own({names})", space)
+        entry = space["entry"]
+        entry.__qualname__ = f"{self.py_func.__qualname__}.entry"
+        name = "entry_" + self.py_func.__qualname__.rpartition(".")[2]
+        cache = numba_internals.Cache(name, lambda: keys.digest(keys.of_function(entry)), False)
+        made = numba_internals.dispatcher(entry, {**COMMON, **numba_internals.ENTRY}, cache)
+        if self.signature is not None:
+            made.compile(self.signature)
+            made.disable_compile()
+        return made
+
+    def by_address(self):
+        """What calls it by its address, whatever kind it is of."""
+        return _ByAddress(self)
+
+    def __call__(self, *arguments):
+        if not self.prepared:
+            prepare([self])
+        return self._entry(*arguments)
+
+    @functools.cached_property
+    def callees(self):
+        """Kernels that are called by their address, by it or by what is compiled into it, a list."""
+        found = {}
+        _collect(self.py_func, found, set())
+        return list(found.values())
+
+
+class _ByAddress:
+    """A kernel as its callers see it that call it by its address."""
+
+    def __init__(self, kernel):
+        self.kernel = kernel
+
+    @property
+    def _numba_type_(self):
+        return numba_internals.Called(self.kernel.signature, self.kernel._slot.symbol)
+
+    def machine_code_key(self, seen):
+        """As of one that is ``apart``."""
+        return f"apart {self.kernel._slot.symbol}"
+
+
+def _collect(function, found, seen):
+    """Add to ``found`` the kernels that are called by their address from a function and what is compiled into it."""
+    if function in seen:
+        return
+    seen.add(function)
+    for _, value in keys.captured(function):
+        for one in value if type(value) is tuple else (value,):
+            if isinstance(one, Kernel):
+                if one.apart is None:
+                    _collect(one.py_func, found, seen)
+                else:
+                    found[one.name] = one
+
+
+def needed(kernels, features=None):
+    """Kernels to have machine code of before a run: some, and all that they reach by address with its features.
+
+    Parameters
+    ----------
+    kernels : sequence of Kernel
+        What is called, or stands in tables.
+    features : set of str, optional
+        What the run has; by default all that there is.
+
+    Returns
+    -------
+    list of Kernel
+    """
+    found, left = {}, list(kernels)
+    while left:
+        one = left.pop()
+        if one.name in found:
+            continue
+        found[one.name] = one
+        left += [k for k in one.callees if features is None or k.apart <= features]
+    return list(found.values())
+
+
+def prepare(kernels, features=None, progress=None):
+    """Compile or load all that is `needed` before a run.
+
+    Parameters
+    ----------
+    kernels, features
+        See `needed`.
+    progress : callable, optional
+        Called with the number of kernels that have been compiled and of those that are to be, where any are.
+    """
+    wanted = [one for one in needed(kernels, features) if one.signature is not None]
+    new = [one for one in wanted if progress is not None and not one.known()]
+    for one in wanted:
+        if one in new:
+            progress(new.index(one), len(new))
+        one.address()
+    for one in kernels:
+        one.prepared = True
+
+
+def kernel(signature=None, *, leaf=False, apart=None, **options) -> Any:
+    """Compile a function, and keep its machine code on disk.
+
+    Parameters
+    ----------
+    signature : numba signature, optional
+        The only one that it has; by default callers give it any, or where it is ``apart`` its annotations say.
+    leaf : bool
+        Whether it counts no references to arrays, which takes 10 ns an array and call where loops hide that each is
+        given back. It neither makes nor returns arrays, nor calls what returns any.
+    apart : sequence of str, optional
+        Features of a run that reaches it: it is called by its address, see the module.
+    **options
+        Of `numba.njit`.
+    """
+    return lambda function: Kernel(function, signature, apart, not leaf, options)
+
+
+def ufunc(signatures) -> Any:
+    """Compile a scalar function into a numpy ufunc and keep its machine code on disk."""
+    return lambda function: numba_internals.ufunc(function, signatures, keys.digest(keys.of_function(function)))

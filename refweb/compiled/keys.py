@@ -1,0 +1,103 @@
+"""What the machine code of a kernel depends on: its own bytecode, and that of all that is compiled into it.
+
+A comment, a docstring or a moved line changes no bytecode, so that nothing is compiled again. A kernel that is called
+by its address counts with its signature alone: its callers stay as they are when it changes.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import pathlib
+import platform
+import sys
+import types as python
+
+import numpy as np
+
+
+def digest(*parts):
+    """A short name of some texts."""
+    return hashlib.sha256("\0".join(map(str, parts)).encode()).hexdigest()[:24]
+
+
+@functools.cache
+def platform_key(processor):
+    """A text that tells apart what machine code depends on besides its source: versions, processor and this package."""
+    import llvmlite
+    import numba
+
+    content = [path.read_bytes() for path in sorted(pathlib.Path(__file__).parent.glob("*.py"))]
+    own = hashlib.sha256(b"".join(content)).hexdigest()[:16]
+    versions = numba.__version__, llvmlite.__version__, np.__version__
+    return " ".join([sys.implementation.cache_tag, platform.system(), platform.machine(), *versions, *processor, own])
+
+
+def code_of(code):
+    """What a code object does, as a text: neither line numbers nor a docstring."""
+    constants = [code_of(one) if isinstance(one, python.CodeType) else repr(one) for one in code.co_consts]
+    if code.co_consts and isinstance(code.co_consts[0], str):  # a docstring, or a text that does not matter to numba
+        constants = constants[1:]
+    names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
+    return repr((code.co_code.hex(), constants, names, code.co_argcount, code.co_flags))
+
+
+def names_in(code):
+    """All global names and attributes in a code object and those inside of it."""
+    found = set(code.co_names)
+    for one in code.co_consts:
+        if isinstance(one, python.CodeType):
+            found |= names_in(one)
+    return found
+
+
+def captured(function):
+    """What a function names outside of itself, as pairs of a name and a value, in an order of its own."""
+    names = names_in(function.__code__)
+    for name in sorted(names):
+        if name in function.__globals__:
+            value = function.__globals__[name]
+            if isinstance(value, python.ModuleType) and value.__name__.partition(".")[0] == "refweb":
+                for inner in sorted(names & vars(value).keys()):
+                    yield f"{name}.{inner}", getattr(value, inner)
+            else:
+                yield name, value
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+
+
+def described(value, seen):
+    """What a captured value is, as a text that is the same in every process.
+
+    Parameters
+    ----------
+    value : object
+        A number, a text, a type, a kernel, a function, or a tuple of such.
+    seen : tuple
+        Functions that are being described, of which no more is said.
+    """
+    if hasattr(value, "machine_code_key"):
+        return value.machine_code_key(seen)
+    if isinstance(value, tuple) and type(value) is tuple:
+        return f"({', '.join(described(one, seen) for one in value)})"
+    if isinstance(value, bool | int | float | str | bytes | type(None) | np.generic | np.dtype):
+        return repr(value)
+    if isinstance(value, np.ndarray):
+        return f"array {value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    if isinstance(value, python.ModuleType):
+        return f"module {value.__name__}"
+    function = getattr(value, "py_func", None) or getattr(value, "_defn", None) or value
+    if isinstance(function, python.FunctionType):
+        return of_function(function, seen)
+    if isinstance(value, type):
+        return f"class {value.__module__}.{value.__qualname__} {getattr(value, '_fields', ())}"
+    return f"{type(value).__qualname__} {getattr(value, '__name__', value)}"
+
+
+def of_function(function, seen=()):
+    """A text that changes where what a function does changes, or what it calls."""
+    if function in seen:
+        return f"again {function.__qualname__}"
+    seen = (*seen, function)
+    parts = [f"{name} = {described(value, seen)}" for name, value in captured(function)]
+    return digest(function.__module__, function.__qualname__, code_of(function.__code__), *parts)

@@ -1,0 +1,272 @@
+"""All that relies on private parts of numba, and what is done where one of them is missing.
+
+=====================  ======================================================  ====================================
+part                   reason                                                  without it
+=====================  ======================================================  ====================================
+``dispatcher._cache``  numba's own cache looks at one source file alone, so    ``njit(cache=True)``
+                       that a changed callee leaves stale machine code, and
+                       a comment makes all of a file stale
+options of `njit`      entries from Python are two fifths of what it takes to  they are compiled, references are
+(`BARE`, `UNCOUNTED`)  compile, and counting of references costs 10 ns an      counted
+                       array and call
+call by address        a caller that links its callees optimizes all that is   kernels are linked
+                       below it again
+=====================  ======================================================  ====================================
+
+``REFWEB_PLAIN=1`` takes the right column. Addresses of functions and the calling convention of numba are needed in
+both: tables of kernels have them. numba is bounded above in ``pyproject.toml``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import pickle
+from typing import Any
+
+import llvmlite.binding as llvm
+import numba
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils, config, sigutils
+from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.imputils import lower_builtin, lower_constant
+from numba.core.runtime.nrt import rtsys
+from numba.core.serialize import dumps
+from numba.core.typing.templates import Signature
+from numba.extending import models, register_model
+
+from . import keys, store
+
+PLAIN = os.environ.get("REFWEB_PLAIN") == "1"
+"""Whether kernels do with the public parts of numba."""
+BARE = {} if PLAIN else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of a kernel without an entry from Python."""
+ENTRY = {} if PLAIN else {"no_cfunc_wrapper": True}
+"""Options of a kernel that is entered from Python alone."""
+SHIPPED_TARGETS = {
+    **dict.fromkeys(("x86_64", "amd64"), ("x86-64-v3", "")),
+    **dict.fromkeys(("aarch64", "arm64"), ("generic", "")),
+}
+"""(processor, features) that machine code in wheels is made for, by machine."""
+V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+"""Features of a processor that runs code for x86-64-v3."""
+_byte = ir.IntType(8).as_pointer()
+_config: Any = config  # numba makes its entries at run time, from variables of the environment
+lock = global_compiler_lock
+"""numba's own: one thread compiles at a time."""
+
+
+def host():
+    """(name, features) of the processor that numba compiles for."""
+    features = _config.CPU_FEATURES
+    if features is None:
+        own = llvm.get_host_cpu_features()
+        features = ",".join(name for name in sorted(own) if own[name])
+    return _config.CPU_NAME or llvm.get_host_cpu_name(), features
+
+
+def shipped():
+    """(processor, features) whose machine code this processor runs and a wheel may bring; None where none does."""
+    import platform
+
+    found = SHIPPED_TARGETS.get(platform.machine().lower())
+    own = llvm.get_host_cpu_features()
+    return found if found and (found[0] == "generic" or all(own.get(name) for name in V3)) else None
+
+
+def target(processor):
+    """Compile for a (processor, features) from now on, before anything is compiled."""
+    _config.CPU_NAME, _config.CPU_FEATURES = processor
+
+
+def options(given, counted):
+    """Options of `numba.njit` for a kernel that counts references or does not."""
+    return given if counted or PLAIN else {**given, "_nrt": False}
+
+
+class Cache:
+    """What a dispatcher of numba asks for machine code: files of `refweb.compiled.store`.
+
+    Parameters
+    ----------
+    name : str
+        Readable part of the names of files.
+    key : callable
+        Text of all that the machine code depends on besides the types of its arguments.
+    linked : bool
+        Whether other kernels may be optimized with it; else what that takes, most of a file, is left out.
+    """
+
+    def __init__(self, name, key, linked):
+        self.name, self.key, self.linked = name, key, linked
+
+    def file(self, signature, processor=None):
+        """Name of the file of a signature."""
+        arguments, _ = sigutils.normalize_signature(signature)
+        made = keys.digest(keys.platform_key(processor or host()), self.key(), *map(str, arguments))
+        return f"{self.name}-{made}"
+
+    def _content(self, signature):
+        content = store.read(self.file(signature))
+        if content is None and store.SHIPPED.is_dir() and (other := shipped()):
+            content = store.read_shipped(self.file(signature, other))
+        return content
+
+    def has(self, signature):
+        """Whether there is machine code of a signature."""
+        return self._content(signature) is not None
+
+    def load_overload(self, signature, target_context):
+        """The machine code of a signature, None where there is none."""
+        content = self._content(signature)
+        if content is None:
+            return None
+        rtsys.initialize(target_context)
+        return CompileResult._rebuild(target_context, *pickle.loads(content))
+
+    def save_overload(self, signature, result):
+        """Write the machine code of a signature."""
+        library, *rest = result._reduce()
+        name, kind, code = library
+        if kind == "object" and not self.linked:
+            made = result.fndesc
+            names = made.mangled_name, made.llvm_cpython_wrapper_name, made.llvm_cfunc_wrapper_name
+            stubs = "\n".join(f'define void @"{stub}"() {{ ret void }}' for stub in names)
+            code = code[0], llvm.parse_assembly(stubs).as_bitcode()
+        store.write(self.file(signature), dumps(((name, kind, code), *rest)))
+
+
+def dispatcher(function, given, cache) -> Any:
+    """A dispatcher of numba with a `Cache`, of which one thread and one process compiles at a time."""
+    if PLAIN:
+        return numba.njit(cache=True, **given)(function)
+    made: Any = numba.njit(**given)(function)
+    made._cache, compile_one = cache, made.compile
+
+    def compile_alone(signature):
+        known = made.overloads.get(tuple(sigutils.normalize_signature(signature)[0]))
+        if known is not None:
+            return known.entry_point
+        with lock:
+            if (result := made._cache.load_overload(signature, made.targetctx)) is not None:
+                made.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
+                made.add_overload(result)
+                return result.entry_point
+            with store.alone(cache.file(signature)):
+                return compile_one(signature)
+
+    made.compile = compile_alone
+    return made
+
+
+def ufunc(function, signatures, key):
+    """A numpy ufunc, whose machine code numba keeps in a folder named by a key."""
+    default = _config.CACHE_DIR
+    _config.CACHE_DIR = str(store.folder() / keys.digest(keys.platform_key(host()), key))
+    try:
+        return numba.vectorize(signatures, cache=True)(function)
+    finally:
+        _config.CACHE_DIR = default
+
+
+def address_of(made, signature):
+    """Address of the machine code of a dispatcher for a signature, in numba's own calling convention."""
+    result = made.overloads[tuple(signature.args)]
+    return result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+
+
+class Slot:
+    """Where the address of a kernel stands for its callers, 0 until it is compiled.
+
+    Its symbol is known to LLVM before any caller is compiled or read from disk: a symbol that is not would end the
+    process.
+    """
+
+    def __init__(self, symbol, key):
+        self.symbol, self.key, self._place = symbol, key, ctypes.c_void_p()
+        llvm.add_symbol(symbol, ctypes.addressof(self._place))
+
+    @property
+    def filled(self):
+        """Whether the address is known."""
+        return bool(self._place.value)
+
+    @property
+    def address(self):
+        """The address, 0 where it is not known."""
+        return self._place.value or 0
+
+    def fill(self, address):
+        """Write the address."""
+        self._place.value = address
+
+
+_slots: dict[str, Slot] = {}
+
+
+def slot_of(symbol, key):
+    """The `Slot` of a symbol, which stays for ever; of another symbol where a kernel of another key has it."""
+    own = symbol
+    while own in _slots and _slots[own].key != key:
+        own += "'"
+    if own not in _slots:
+        _slots[own] = Slot(own, key)
+    return _slots[own]
+
+
+def give_back(meminfo):
+    """Give back a reference to an array that a kernel has made, by the address of what counts them."""
+    from numba.core.runtime import _nrt_python
+
+    _nrt_python._MemInfo(meminfo)  # takes the reference, and gives it back at its own end
+
+
+class Called(types.Callable):
+    """Type of a kernel that is called by its address: one of a `Slot`, or of a table of kernels."""
+
+    def __init__(self, signature, symbol=""):
+        self.signature, self.symbol = signature, symbol
+        super().__init__(name=f"called{signature}{symbol}")
+
+    def get_call_type(self, context, args, kws):
+        """The one signature that there is."""
+        if kws or len(args) != len(self.signature.args):
+            return None
+        return Signature(self.signature.return_type, self.signature.args, recvr=self)
+
+    def get_call_signatures(self):
+        """The one signature that there is."""
+        return (self.signature,), False
+
+    def get_impl_key(self, sig):
+        """What the calls are lowered by."""
+        return Called
+
+
+register_model(Called)(models.OpaqueModel)
+
+
+@lower_constant(Called)
+def _read_slot(context, builder, kind, value):
+    place = builder.module.globals.get(kind.symbol)
+    if place is None:
+        place = ir.GlobalVariable(builder.module, _byte, kind.symbol)
+    return builder.load(place)
+
+
+@lower_builtin(Called, Called, types.VarArg(types.Any))
+def _call(context, builder, signature, arguments):
+    kind, result, given = signature.args[0], signature.return_type, signature.args[1:]
+    entry, *values = arguments
+    if kind.symbol:
+        with builder.if_then(cgutils.is_null(builder, entry), likely=False):
+            message = f"{kind.symbol} is not compiled: no feature of the run asks for it"
+            context.call_conv.return_user_exc(builder, RuntimeError, (message,))
+    shape = context.call_conv.get_function_type(result, given)
+    entry = builder.bitcast(entry, shape.as_pointer())
+    status, out = context.call_conv.call_function(builder, entry, result, given, values)
+    with cgutils.if_unlikely(builder, status.is_error):
+        context.call_conv.return_status_propagate(builder, status)
+    return out

@@ -1,0 +1,87 @@
+"""Where machine code is kept: one file a kernel and signature, named by all that it depends on.
+
+It is looked for in a folder of the user's, see `folder`, then in the one that a wheel brings, ``machine_code`` in this
+package. A file is written beside its place and moved there, so that several processes may share a folder, and is read
+only where its name is that of what is asked for. Files unused for `UNUSED` are removed when something is compiled.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import pathlib
+import tempfile
+import time
+
+UNUSED = 90 * 24 * 3600.0
+"""Time after which a file that nobody has read is removed [s]."""
+NOTED = 24 * 3600.0
+"""Age of a file from which on its use is noted [s]."""
+SHIPPED = pathlib.Path(__file__).parent / "machine_code"
+"""What a wheel brings."""
+
+
+@functools.cache
+def folder():
+    """The folder that machine code is kept in: ``REFWEB_CACHE``, else one of the user's for the cache of programs."""
+    if own := os.environ.get("REFWEB_CACHE"):
+        return pathlib.Path(own)
+    import platformdirs
+
+    return pathlib.Path(platformdirs.user_cache_dir("refweb", appauthor=False)) / "kernels"
+
+
+def read(name):
+    """Content of a file in the user's folder; None where there is none."""
+    path = folder() / name
+    with contextlib.suppress(OSError):
+        content = path.read_bytes()
+        if time.time() - path.stat().st_mtime > NOTED:
+            with contextlib.suppress(OSError):
+                os.utime(path)
+        return content
+    return None
+
+
+def read_shipped(name):
+    """Content of a file that a wheel has brought; None where there is none."""
+    with contextlib.suppress(OSError):
+        return (SHIPPED / name).read_bytes()
+    return None
+
+
+def write(name, content):
+    """Write a file of machine code, where the folder can be written to."""
+    with contextlib.suppress(OSError):
+        folder().mkdir(parents=True, exist_ok=True)
+        number, path = tempfile.mkstemp(dir=folder(), suffix=".part")
+        with os.fdopen(number, "wb") as file:
+            file.write(content)
+        os.replace(path, folder() / name)
+        prune()
+
+
+@functools.cache
+def prune():
+    """Remove what nobody has used for long, once a process."""
+    before = time.time() - UNUSED
+    for path in folder().iterdir():
+        with contextlib.suppress(OSError):
+            if path.stat().st_mtime < before:
+                path.unlink()
+
+
+@contextlib.contextmanager
+def alone(name):
+    """Keep other processes from compiling what has a name; they wait, and read what has been written."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(ImportError, OSError):
+            import fcntl  # not on Windows, where each process compiles
+
+            folder().mkdir(parents=True, exist_ok=True)
+            path = folder() / f"{name}.lock"
+            file = stack.enter_context(open(path, "w"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+            stack.callback(path.unlink, missing_ok=True)
+        yield
