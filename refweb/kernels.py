@@ -49,7 +49,7 @@ import numpy as np
 from numba import types
 
 from .compiled.kernel import kernel, ufunc
-from .compiled.records import Arrays, Cube, Functions, IntegerMatrix, Integers, Matrix, Record, Vector, array_of
+from .compiled.records import Arrays, Cube, Functions, IntegerMatrix, Integers, Matrix, Record, Vector
 
 __all__ = [
     "Arrays",
@@ -60,7 +60,6 @@ __all__ = [
     "Matrix",
     "Record",
     "Vector",
-    "array_of",
     "kernel",
     "ufunc",
 ]
@@ -98,14 +97,21 @@ NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 Indices = Annotated[np.ndarray, INDICES]
 """Annotation of cells."""
-IndexTable, MatrixTable, VectorTable, IntegerTable = (
-    Annotated[Arrays, item] for item in (INDICES, MATRIX, VECTOR, INTEGERS)
-)
+IndexTable = Annotated[Arrays, INDICES]
+MatrixTable = Annotated[Arrays, MATRIX]
+VectorTable = Annotated[Arrays, VECTOR]
+IntegerTable = Annotated[Arrays, INTEGERS]
 """Annotations of tables of arrays in records."""
-ForceTable, EnergyTable, BoundTable, LinesTable, MeetTable, KeptTable, SweepTable, GiveTable = (
-    Annotated[Functions, signature] for signature in (FORCE, ENERGY, BOUND, LINES, MEET, KEPT, SWEEP, GIVE)
-)
-MeetsTable, WatchTable = Annotated[Functions, MEETS], Annotated[Functions, WATCH]
+ForceTable = Annotated[Functions, FORCE]
+EnergyTable = Annotated[Functions, ENERGY]
+BoundTable = Annotated[Functions, BOUND]
+LinesTable = Annotated[Functions, LINES]
+MeetTable = Annotated[Functions, MEET]
+KeptTable = Annotated[Functions, KEPT]
+SweepTable = Annotated[Functions, SWEEP]
+GiveTable = Annotated[Functions, GIVE]
+MeetsTable = Annotated[Functions, MEETS]
+WatchTable = Annotated[Functions, WATCH]
 ImpulseTable = EnergyTable
 """Annotations of tables of kernels in records."""
 

@@ -17,7 +17,12 @@ from refweb.registry import EFFECTS
 from refweb.tables import Table
 
 ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of its docstring
-    ("the ground floor", "accepted errors messages tables kernels list_items memory settings registry", ""),
+    (
+        "compiled",
+        "*",
+        "Kernels: what compiles them, keeps their machine code on disk and hands records to them by one pointer.",
+    ),
+    ("the ground floor", "accepted errors messages tables kernels memory settings registry", ""),
     (
         "net",
         "*",

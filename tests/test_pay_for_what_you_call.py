@@ -12,12 +12,12 @@ import sys
 import tomllib
 from functools import cache
 
-import numba
 import numpy as np
 import pytest
 
 import refweb
 from refweb.dynamics.integrators import central_difference
+from refweb.kernels import Functions, Record
 from refweb.registry import EFFECTS, OBSERVABLES, SHAPES, WEBS, load
 from refweb.scene import SHIPPED_SCENES
 
@@ -43,7 +43,8 @@ EVERY |= {
     "net",
     *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web", "groups")),
 }
-EVERY |= {"net.rigid_body", "effects.line_kernels"}
+EVERY |= {"net.rigid_body", "effects.line_kernels", "compiled"}
+EVERY |= {f"compiled.{name}" for name in ("kernel", "keys", "numba_internals", "records", "store")}
 EVERY |= {
     "solution",
     "results",
@@ -70,7 +71,7 @@ NEWTON = (
     | {"statics.load_steps", "statics.newton", "statics.bars", "statics.floating", "statics.energy_search"}
 )
 NEWTON |= {"system.conjugate_gradients"}
-DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book", "list_items"}
+DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
 DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
@@ -410,13 +411,13 @@ def test_entries_without_an_effect(name):
     assert entries(*rest) == expected(*rest)
 
 
-def typed_lists(given):
-    """Typed lists among what the loop is called with, in its records as well, one after another."""
-    if isinstance(given, numba.typed.List):
-        yield given
-    elif isinstance(given, tuple):
-        for one in given:
-            yield from typed_lists(one)
+def tables(record):
+    """Tables of kernels in a record and in its records, one after another."""
+    for value in record.by_name().values():
+        if isinstance(value, Functions):
+            yield value
+        elif isinstance(value, Record):
+            yield from tables(value)
 
 
 @pytest.fixture
@@ -428,8 +429,7 @@ def handed(monkeypatch):
         monkeypatch.setattr(central_difference, "advance_rows", lambda *given: seen.append(given) or 1)
         solver = central_difference.CentralDifference(scene_of(*effects).build())
         solver.advance(solver.start(), [1e-3])
-        lists = typed_lists(seen[0])
-        counts = [len(one) for one in lists if isinstance(one._dtype, numba.types.FunctionType)]
+        counts = [len(table) for given in seen[0] if isinstance(given, Record) for table in tables(given)]
         return dict(zip(LISTED, counts, strict=True))
 
     return count

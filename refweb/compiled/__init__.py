@@ -1,4 +1,4 @@
-"""Compiled kernels: what compiles them, keeps their machine code on disk, and hands them records by one pointer.
+"""Kernels: what compiles them, keeps their machine code on disk and hands records to them by one pointer.
 
 ===================  ==========================================================================================
 `kernel`             what a kernel is: compiled when it is called, listed or prepared, and never before

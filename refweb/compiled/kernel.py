@@ -74,7 +74,8 @@ class Kernel:
 
     @functools.cached_property
     def _key(self):
-        return keys.digest(keys.of_function(self.py_func), self._options, self._counted, self.signature)
+        options = sorted((name, *(sorted(v) if isinstance(v, set) else [v])) for name, v in self._options.items())
+        return keys.digest(keys.of_function(self.py_func), options, self._counted, self.signature)
 
     def machine_code_key(self, seen):
         """What a caller's machine code depends on, see `refweb.compiled.keys.described`."""
@@ -126,23 +127,21 @@ class Kernel:
     @functools.cached_property
     def _entry(self):
         """The dispatcher that Python calls."""
-        own = self.by_address() if self.signature is not None else self
+        name = "entry_" + self.py_func.__qualname__.rpartition(".")[2]
+        given = {**self._options, **numba_internals.ENTRY}
+        if self.signature is None:
+            cache = numba_internals.Cache(name, lambda: f"entry {self._key}", False)
+            return numba_internals.dispatcher(self.py_func, given, cache)
         names = ", ".join(self.py_func.__code__.co_varnames[: self.py_func.__code__.co_argcount])
-        space = {"own": own, "__name__": self.py_func.__module__}
+        space = {"own": _ByAddress(self), "__name__": self.py_func.__module__}
         exec(f"def entry({names}): return own({names})", space)
         entry = space["entry"]
         entry.__qualname__ = f"{self.py_func.__qualname__}.entry"
-        name = "entry_" + self.py_func.__qualname__.rpartition(".")[2]
         cache = numba_internals.Cache(name, lambda: keys.digest(keys.of_function(entry)), False)
-        made = numba_internals.dispatcher(entry, {**COMMON, **numba_internals.ENTRY}, cache)
-        if self.signature is not None:
-            made.compile(self.signature)
-            made.disable_compile()
+        made = numba_internals.dispatcher(entry, given, cache)
+        made.compile(self.signature)
+        made.disable_compile()
         return made
-
-    def by_address(self):
-        """What calls it by its address, whatever kind it is of."""
-        return _ByAddress(self)
 
     def __call__(self, *arguments):
         if not self.prepared:
@@ -221,9 +220,9 @@ def prepare(kernels, features=None, progress=None):
         Called with the number of kernels that have been compiled and of those that are to be, where any are.
     """
     wanted = [one for one in needed(kernels, features) if one.signature is not None]
-    new = [one for one in wanted if progress is not None and not one.known()]
+    new = [one for one in wanted if not one.known()] if progress is not None else []
     for one in wanted:
-        if one in new:
+        if progress is not None and one in new:
             progress(new.index(one), len(new))
         one.address()
     for one in kernels:

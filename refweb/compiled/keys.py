@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import opcode
 import pathlib
 import platform
 import sys
 import types as python
 
 import numpy as np
+
+LOAD_GLOBAL, EXTENDED_ARG = opcode.opmap["LOAD_GLOBAL"], opcode.opmap["EXTENDED_ARG"]
 
 
 def digest(*parts):
@@ -42,23 +45,27 @@ def code_of(code):
     return repr((code.co_code.hex(), constants, names, code.co_argcount, code.co_flags))
 
 
-def names_in(code):
-    """All global names and attributes in a code object and those inside of it."""
-    found = set(code.co_names)
+def globals_in(code):
+    """Names of the globals that a code object and those inside of it load, a set."""
+    found, extended = set(), 0
+    for operation, argument in zip(code.co_code[::2], code.co_code[1::2], strict=True):
+        argument |= extended << 8
+        if operation == LOAD_GLOBAL:
+            found.add(code.co_names[argument >> 1])
+        extended = argument if operation == EXTENDED_ARG else 0
     for one in code.co_consts:
         if isinstance(one, python.CodeType):
-            found |= names_in(one)
+            found |= globals_in(one)
     return found
 
 
 def captured(function):
     """What a function names outside of itself, as pairs of a name and a value, in an order of its own."""
-    names = names_in(function.__code__)
-    for name in sorted(names):
+    for name in sorted(globals_in(function.__code__)):
         if name in function.__globals__:
             value = function.__globals__[name]
             if isinstance(value, python.ModuleType) and value.__name__.partition(".")[0] == "refweb":
-                for inner in sorted(names & vars(value).keys()):
+                for inner in sorted(set(function.__code__.co_names) & vars(value).keys()):
                     yield f"{name}.{inner}", getattr(value, inner)
             else:
                 yield name, value

@@ -20,6 +20,7 @@ both: tables of kernels have them. numba is bounded above in ``pyproject.toml``.
 from __future__ import annotations
 
 import ctypes
+import importlib
 import os
 import pickle
 from typing import Any
@@ -141,7 +142,7 @@ class Cache:
 def dispatcher(function, given, cache) -> Any:
     """A dispatcher of numba with a `Cache`, of which one thread and one process compiles at a time."""
     if PLAIN:
-        return numba.njit(cache=True, **given)(function)
+        return numba.njit(cache=function.__code__.co_filename != "<string>", **given)(function)
     made: Any = numba.njit(**given)(function)
     made._cache, compile_one = cache, made.compile
 
@@ -218,9 +219,8 @@ def slot_of(symbol, key):
 
 def give_back(meminfo):
     """Give back a reference to an array that a kernel has made, by the address of what counts them."""
-    from numba.core.runtime import _nrt_python
-
-    _nrt_python._MemInfo(meminfo)  # takes the reference, and gives it back at its own end
+    runtime: Any = importlib.import_module("numba.core.runtime._nrt_python")
+    runtime._MemInfo(meminfo)  # takes the reference, and gives it back at its own end
 
 
 class Called(types.Callable):

@@ -17,12 +17,13 @@ a record               another record
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import functools
 import operator
 import sys
 import typing
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from llvmlite import ir
@@ -39,11 +40,13 @@ from numba.extending import (
     unbox,
 )
 from numba.np.arrayobj import make_array, populate_array
+from numba.np.numpy_support import as_dtype
 
 from . import kernel, keys, numba_internals
 
 _word, _byte = ir.IntType(64), ir.IntType(8).as_pointer()
 WORD = np.dtype(np.int64)
+_global: Any = infer_global
 
 
 def _words_at(builder, pointer, place):
@@ -145,7 +148,7 @@ def _read_field(context, builder, kind, value, name):
     return word
 
 
-@infer_global(operator.getitem)
+@_global(operator.getitem)
 class _GetItem(AbstractTemplate):
     def generic(self, args, kws):
         if isinstance(args[0], ArraysType | FunctionsType) and isinstance(args[1], types.Integer):
@@ -180,7 +183,7 @@ def _array_in(context, builder, signature, arguments):
     return found
 
 
-@infer_global(operator.setitem)
+@_global(operator.setitem)
 class _SetItem(AbstractTemplate):
     def generic(self, args, kws):
         if isinstance(args[0], ArraysType) and isinstance(args[1], types.Integer):
@@ -204,7 +207,7 @@ def _put(context, builder, signature, arguments):
     return context.get_dummy_value()
 
 
-@infer_global(len)
+@_global(len)
 class _Len(AbstractTemplate):
     def generic(self, args, kws):
         return types.intp(args[0]) if isinstance(args[0], ArraysType | FunctionsType) else None
@@ -275,10 +278,14 @@ class Arrays:
         self._arrays[place] = array
 
     def __getitem__(self, place):
-        """The array that Python has put there; what kernels have put there is theirs."""
-        if self._items[place, 0]:
-            raise LookupError(f"array {place} is of a kernel")
-        return self._arrays[place]
+        """The array that Python has put there, or a view of what a kernel has, while it stands there."""
+        words = self._items[place]
+        if not words[0]:
+            return self._arrays[place]
+        dtype, shape = as_dtype(self.item.dtype), tuple(words[2:].tolist())
+        size = dtype.itemsize * int(np.prod(shape))
+        content: Any = (ctypes.c_char * size).from_address(int(words[1]))
+        return np.frombuffer(content, dtype=dtype).reshape(shape)
 
     def _give_back(self, place):
         if self._items[place, 0]:
@@ -318,6 +325,9 @@ class Functions:
 
     def __len__(self):
         return len(self.kernels)
+
+    def __getitem__(self, place):
+        return self.kernels[place]
 
     @functools.cached_property
     def _items(self):
@@ -371,10 +381,15 @@ class Record:
         """Address of the block, which lives as long as the record."""
         return self._block.ctypes.data
 
+    def __getstate__(self):
+        """Its fields: a copy has a block of its own."""
+        return self.by_name()
+
     @classmethod
     def field_names(cls):
         """Names of the fields."""
-        return [field.name for field in dataclasses.fields(cls)]
+        own: Any = cls
+        return [field.name for field in dataclasses.fields(own)]
 
     def by_name(self):
         """Its fields by name."""
@@ -389,10 +404,9 @@ class Record:
                 yield from value.all_kernels()
 
 
-def array_of(dtype, dimensions):
-    """Annotation of a C-contiguous array."""
-    return Annotated[np.ndarray, types.Array(dtype, dimensions, "C")]
-
-
-Vector, Matrix, Cube = (array_of(types.float64, n) for n in (1, 2, 3))
-Integers, IntegerMatrix = (array_of(types.int64, n) for n in (1, 2))
+Vector = Annotated[np.ndarray, types.Array(types.float64, 1, "C")]
+Matrix = Annotated[np.ndarray, types.Array(types.float64, 2, "C")]
+Cube = Annotated[np.ndarray, types.Array(types.float64, 3, "C")]
+Integers = Annotated[np.ndarray, types.Array(types.int64, 1, "C")]
+IntegerMatrix = Annotated[np.ndarray, types.Array(types.int64, 2, "C")]
+"""Annotations of arrays."""

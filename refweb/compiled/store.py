@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import os
 import pathlib
 import tempfile
@@ -18,6 +19,8 @@ UNUSED = 90 * 24 * 3600.0
 """Time after which a file that nobody has read is removed [s]."""
 NOTED = 24 * 3600.0
 """Age of a file from which on its use is noted [s]."""
+CHECK = 16
+"""Bytes of the checksum that a file begins with."""
 SHIPPED = pathlib.Path(__file__).parent / "machine_code"
 """What a wheel brings."""
 
@@ -32,23 +35,32 @@ def folder():
     return pathlib.Path(platformdirs.user_cache_dir("refweb", appauthor=False)) / "kernels"
 
 
-def read(name):
-    """Content of a file in the user's folder; None where there is none."""
-    path = folder() / name
+def _checked(path):
+    """Content of a file whose checksum fits; None where there is none."""
     with contextlib.suppress(OSError):
         content = path.read_bytes()
-        if time.time() - path.stat().st_mtime > NOTED:
-            with contextlib.suppress(OSError):
-                os.utime(path)
-        return content
+        if content[:CHECK] == _checksum(content[CHECK:]):
+            return content[CHECK:]
     return None
+
+
+def _checksum(content):
+    return hashlib.blake2b(content, digest_size=CHECK).digest()
+
+
+def read(name):
+    """Content of a file in the user's folder; None where there is none, or a damaged one."""
+    path = folder() / name
+    content = _checked(path)
+    with contextlib.suppress(OSError):
+        if content is not None and time.time() - path.stat().st_mtime > NOTED:
+            os.utime(path)
+    return content
 
 
 def read_shipped(name):
     """Content of a file that a wheel has brought; None where there is none."""
-    with contextlib.suppress(OSError):
-        return (SHIPPED / name).read_bytes()
-    return None
+    return _checked(SHIPPED / name)
 
 
 def write(name, content):
@@ -57,7 +69,7 @@ def write(name, content):
         folder().mkdir(parents=True, exist_ok=True)
         number, path = tempfile.mkstemp(dir=folder(), suffix=".part")
         with os.fdopen(number, "wb") as file:
-            file.write(content)
+            file.write(_checksum(content) + content)
         os.replace(path, folder() / name)
         prune()
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numba import types
 
-from ...kernels import Cube, Integers, Matrix, Record, Vector, array_of, copy_rows, inner, kernel
+from ...kernels import Cube, Integers, Matrix, Record, Vector, copy_rows, inner, kernel
 from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .energy_book import book_energies, own_energy
@@ -25,7 +25,7 @@ from .step import add_forces, interpolate, interpolate_kicks, note_state, set_le
 if TYPE_CHECKING:
     from .records import Model, Observed, Running
 
-FourfoldArray = array_of(types.float64, 4)
+FourfoldArray = Annotated[np.ndarray, types.Array(types.float64, 4, "C")]
 LOOKS = PARTS
 """Number of parts of a step of higher order at whose ends peaks are looked for."""
 SAME_PEAK = 1e-3

@@ -139,7 +139,8 @@ class CentralDifference(Integrator):
         """Compile what the run calls, once."""
         if not self._prepared:
             model, observed = self._model, self._observed
-            called = [advance_rows, begin, open_ledger, safe_step, look_anew, *model.all_kernels(), *observed.all_kernels()]
+            called = [advance_rows, begin, open_ledger, safe_step, look_anew]
+            called += [*model.all_kernels(), *observed.all_kernels()]
             prepare(called, features(self._scheme, model, observed, self._events), self.compiling)
             self._prepared = True
 
@@ -312,8 +313,8 @@ class CentralDifference(Integrator):
         if done < len(times):
             since = float(clock[0]["since"])
             if not np.isfinite(history.values[done]).all():
-                self._name_blow_up(course, since, records[-1])
-            self._name_drift(course, since, records[-1])
+                self._name_blow_up(course, since, running)
+            self._name_drift(course, since, running)
         return history
 
     def _way_out(self, x, step):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import numpy as np
-from numba import from_dtype
+from numba import from_dtype, types
 
-from ...kernels import Integers, Matrix, Vector, array_of, inner, kernel
+from ...kernels import Integers, Matrix, Vector, inner, kernel
 from .extremes import look_at
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ EVENT = np.dtype(
 not and 0 before any is known; the time at which it has happened [s], infinite before; and how much earlier that may
 have been [s]."""
 
-EventArray = array_of(from_dtype(EVENT), 1)
+EventArray = Annotated[np.ndarray, types.Array(from_dtype(EVENT), 1, "C")]
 
 
 class Event(NamedTuple):

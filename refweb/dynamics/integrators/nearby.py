@@ -35,7 +35,6 @@ from ...kernels import (
     Matrix,
     MatrixTable,
     Record,
-    array_of,
     copy_rows,
     kernel,
 )
@@ -93,9 +92,10 @@ as what it is [m/s]; largest depth around pairs [m], infinite where none are fou
 NOWHERE = np.zeros((0, 3))
 """Displacements where none are looked at."""
 SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR)))
-"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the tables
-of `refweb.dynamics.integrators.records.Families`, for those within a skin, or for all where that is infinitely deep."""
-SwapTable, SkinArray = Annotated[Functions, SWAP], array_of(from_dtype(SKIN), 1)
+"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the
+tables of `refweb.dynamics.integrators.records.Families`, for those within a skin, or for all where it has no bound."""
+SwapTable = Annotated[Functions, SWAP]
+SkinArray = Annotated[np.ndarray, types.Array(from_dtype(SKIN), 1, "C")]
 
 
 class Nearby(Record):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numba import from_dtype
+from numba import from_dtype, types
 
 from ... import kernels as k
 from ...kernels import (
@@ -35,7 +35,6 @@ from ...kernels import (
     Record,
     Vector,
     VectorTable,
-    array_of,
 )
 from ...net.rotation import Turns
 from ...results.probes import PROBE, plain_of
@@ -71,7 +70,7 @@ CLOCK = np.dtype(
 energy that a drift is held against at least, the time from which steps are equal, how many of these are taken, 0 where
 none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not pass, 0
 where it is not, and whether it is to be cut."""
-ClockArray = array_of(from_dtype(CLOCK), 1)
+ClockArray = Annotated[np.ndarray, types.Array(from_dtype(CLOCK), 1, "C")]
 ProbeTable = Annotated[Functions, PROBE]
 
 LINE = 64

@@ -1,0 +1,278 @@
+"""Kernels: found again on disk, compiled again only where what they do has changed, called by address or linked."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+
+from refweb.compiled import kernel as kernels
+from refweb.kernels import Matrix, Vector, kernel
+
+FACTORY = '''
+import numpy as np
+from refweb.kernels import VECTOR, Vector, kernel
+from numba import types
+
+@kernel(apart=())
+def outer(values: Vector) -> None:
+    """{text}"""
+    # a comment
+    #{lines}
+    for i in range(len(values)):
+        values[i] = 2.0 * inner_of(values[i])
+
+from own.one import inner as inner_of
+'''
+INNER = {
+    "linked": "@kernel()\ndef inner(value):\n    return {number} * value\n",
+    "apart": "@kernel(apart=())\ndef inner(value: float) -> float:\n    return {number} * value\n",
+}
+SHOW = """
+from numba.core import event
+seen = event.RecordingListener()
+event.register("numba:compile", seen)
+import numpy as np
+from own.factory import outer
+values = np.ones(1)
+outer(values)
+names = [e.data["dispatcher"].py_func.__name__ for _, e in seen.buffer if e.is_start]
+print(values[0], *names)
+"""
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Writes a package and runs lines in a process of their own; what they print, in words."""
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "__init__.py").touch()
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    environment |= {"REFWEB_CACHE": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def write(kind, number, text="text", lines=""):
+        (own / "factory.py").write_text(FACTORY.format(text=text, lines=lines))
+        (own / "one.py").write_text("from refweb.kernels import kernel\n\n" + INNER[kind].format(number=number))
+
+    def start(lines=SHOW, **more):
+        command = [sys.executable, "-c", lines]
+        done = subprocess.run(command, env=environment | more, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    start.write = write
+    return start
+
+
+def test_machine_code_is_found_again_whatever_the_words_around_it(run):
+    run.write("linked", 3.0)
+    assert run()[:1] == ["6.0"] and run() == ["6.0"]
+    run.write("linked", 3.0, text="another docstring", lines="\n\n")
+    assert run() == ["6.0"]
+
+
+def test_a_caller_is_compiled_again_where_what_is_linked_into_it_changes(run):
+    run.write("linked", 3.0)
+    run()
+    run.write("linked", 4.0)
+    assert run() == ["8.0", "outer", "inner"]
+
+
+def test_a_caller_stays_where_what_it_calls_by_address_changes(run):
+    run.write("apart", 3.0)
+    assert sorted(run()[1:]) == ["entry", "inner", "outer"] and run() == ["6.0"]
+    run.write("apart", 4.0)
+    assert run() == ["8.0", "inner"]
+
+
+def test_the_public_parts_of_numba_alone_give_the_same(run):
+    """Without the cache, the options and the calls of our own."""
+    for kind in INNER:
+        run.write(kind, 3.0)
+        assert run(REFWEB_PLAIN="1")[0] == "6.0"
+
+
+def test_a_damaged_file_is_compiled_again(run, tmp_path):
+    run.write("apart", 3.0)
+    run()
+    for path in (tmp_path / "cache").iterdir():
+        path.write_bytes(path.read_bytes()[:100])
+    assert sorted(run()) == ["6.0", "entry", "inner", "outer"]
+
+
+def made_of(number):
+    """A kernel that captures a number."""
+
+    @kernel(numba.types.float64(numba.types.float64))
+    def times(value):
+        return number * value
+
+    return times
+
+
+def test_kernels_of_one_factory_that_capture_different_numbers_have_names_of_their_own():
+    two, three, again = made_of(2.0), made_of(3.0), made_of(2.0)
+    assert (two(5.0), three(5.0), again(5.0)) == (10.0, 15.0, 10.0)
+    assert two.name == again.name != three.name
+
+
+@kernel(apart=())
+def always(values: Vector) -> float:
+    total = 0.0
+    for i in range(values.size):
+        total += values[i]
+    return total
+
+
+@kernel(apart=("seldom",))
+def seldom(values: Vector) -> float:
+    return -values[0]
+
+
+@kernel(apart=())
+def chooses(values: Vector, other: bool) -> float:
+    return seldom(values) if other else always(values)
+
+
+def test_only_what_a_run_has_is_prepared():
+    assert {one.name for one in kernels.needed([chooses], set())} == {chooses.name, always.name}
+    assert {one.name for one in kernels.needed([chooses], {"seldom"})} == {chooses.name, always.name, seldom.name}
+    kernels.prepare([chooses], set())
+    values = np.arange(1.0, 4.0)
+    assert chooses(values, False) == 6.0
+    with pytest.raises(RuntimeError, match="seldom.* is not compiled"):
+        chooses(values, True)
+    kernels.prepare([chooses], {"seldom"})
+    assert chooses(values, True) == -1.0
+
+
+def test_progress_counts_what_is_to_be_compiled():
+    @kernel(apart=())
+    def new(value: float) -> float:
+        return value + 0.123456789012345
+
+    kernel_files, seen = new, []
+    known = kernel_files.known()
+    kernels.prepare([new], progress=lambda done, count: seen.append((done, count)))
+    assert seen == ([] if known else [(0, 1)])
+    assert new(1.0) == 1.123456789012345
+
+
+@kernel(apart=())
+def fails(values: Vector, place: int) -> float:
+    if place >= values.size:
+        raise ValueError("no such place")
+    return values[place]
+
+
+@kernel(apart=())
+def passes_on(values: Vector, place: int) -> float:
+    return fails(values, place)
+
+
+def test_an_error_comes_through_a_call_by_address():
+    assert passes_on(np.ones(2), 1) == 1.0
+    with pytest.raises(ValueError, match="no such place"):
+        passes_on(np.ones(2), 2)
+
+
+@kernel(leaf=True, apart=())
+def takes_matrix(values: Matrix) -> int:
+    return values.shape[0]
+
+
+def test_arguments_of_other_types_are_refused():
+    with pytest.raises(TypeError):
+        takes_matrix(np.ones(3))
+    with pytest.raises(TypeError):
+        takes_matrix(np.ones((3, 2))[:, :1])
+
+
+def test_a_leaf_makes_no_arrays():
+    @kernel(leaf=True)
+    def makes(count):
+        return np.zeros(count).size
+
+    @kernel()
+    def call_makes():
+        return makes(3)
+
+    with pytest.raises(numba.core.errors.NumbaError):
+        call_makes()
+
+
+WARM = """
+from numba.core import event
+seen = event.RecordingListener()
+event.register("numba:compile", seen)
+import refweb
+solves = {"square-load": {}, "square-impact": {"solve.duration": 2e-3}, "closing-net": {"solve.duration": 5e-3}}
+runs = [refweb.run(refweb.Scene.load(name, values)) for name, values in solves.items()]
+runs.append(refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 2e-3, "solve.method": "cvode"})))
+print([*(solution.cost["compile_s"] for solution in runs), len(seen.buffer)])
+"""
+
+
+def test_a_warm_process_compiles_nothing():
+    """What an earlier process has run is found on disk, tables of kernels and of arrays among it.
+
+    So says each run, and so does numba from before the package is there until the end.
+    """
+    for _ in range(2):
+        told = subprocess.run([sys.executable, "-c", WARM], capture_output=True, text=True, check=True).stdout
+    assert json.loads(told) == [0.0, 0.0, 0.0, 0.0, 0]
+
+
+QUICK = """
+import json, sys
+import refweb
+refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 2e-3}), out=sys.argv[1])
+heavy = ("scipy.linalg", "scipy.sparse", "skfem", "numba.typed.typeddict", "meshio", "urllib.request")
+print(json.dumps([name for name in heavy if name in sys.modules]))
+"""
+
+
+def test_a_warm_process_imports_nothing_that_only_compiling_needs(tmp_path):
+    """Reading machine code takes no declarations of functions, and none that it names lies in a module with a BLAS."""
+    for run in ("first", "warm"):
+        told = subprocess.run(
+            [sys.executable, "-c", QUICK, str(tmp_path / run)], capture_output=True, text=True, check=True
+        ).stdout
+    assert json.loads(told) == []
+
+
+WANTED = """
+import sys, time
+from numba.core import event
+seen = event.RecordingListener()
+event.register("numba:compile", seen)
+from refweb.kernels import Vector, kernel
+import refweb.kernels
+
+@kernel(apart=())
+def wanted(values: Vector) -> None:
+    for i in range(len(values)):
+        values[i] = 2.0 * values[i]
+
+open(sys.argv[1] + ".ready", "w").close()
+while not open("go").read():
+    time.sleep(0.001)
+wanted.address()
+print(len([1 for _, e in seen.buffer if e.is_start]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no such locks there")
+def test_of_processes_that_want_a_kernel_at_once_one_compiles_it(tmp_path):
+    (tmp_path / "wanted.py").write_text(WANTED)
+    (tmp_path / "go").touch()
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "REFWEB_CACHE": str(tmp_path / "cache")}
+    begun = {"cwd": tmp_path, "env": environment, "stdout": subprocess.PIPE, "text": True}
+    both = [subprocess.Popen([sys.executable, "wanted.py", name], **begun) for name in "ab"]
+    while not all((tmp_path / f"{name}.ready").exists() for name in "ab"):
+        assert all(process.poll() is None for process in both)
+    (tmp_path / "go").write_text("go")
+    assert sorted(process.communicate()[0] for process in both) == ["0\n", "1\n"]
