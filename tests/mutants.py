@@ -481,13 +481,8 @@ MUTANTS = [
 ]
 
 
-def has_kernels(code):
-    """Whether the content of a file decides where machine code is kept, as `refweb.kernels` has it."""
-    return "kernel(" in code or "ufunc(" in code
-
-
 def copied(root):
-    """A copy of the code, with the times of its files, which machine code goes by."""
+    """A copy of the code."""
     for name in COPIED:
         source = ROOT / name
         if source.is_dir():
@@ -498,7 +493,7 @@ def copied(root):
 
 def tested(root, files, cache):
     """How tests end in a copy of the code: status of pytest, None for those that hang, and what fails first."""
-    environment = {**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(root), "REFWEB_CACHE": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *files]
     try:
         done = subprocess.run(
@@ -515,17 +510,15 @@ def tried(mutant, root, cache):
     """The test that notices a bug, None where none does."""
     place = root / mutant.path
     code, times = place.read_text(encoding="utf-8"), place.stat()
-    own = cache / "one" if has_kernels(code) else cache
     try:
         place.write_text(mutant.changed(code), encoding="utf-8")
-        status, first = tested(root, mutant.tests, own)
+        status, first = tested(root, mutant.tests, cache)
         if status not in (0, 1, 2, None):
             raise RuntimeError(f"pytest ended with {status}: {first}")
         return None if status == 0 else first
     finally:
         place.write_text(code, encoding="utf-8")
         os.utime(place, ns=(times.st_atime_ns, times.st_mtime_ns))
-        shutil.rmtree(cache / "one", ignore_errors=True)
 
 
 def chosen(words):

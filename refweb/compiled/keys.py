@@ -32,7 +32,7 @@ def platform_key(processor):
 
     content = [path.read_bytes() for path in sorted(pathlib.Path(__file__).parent.glob("*.py"))]
     own = hashlib.sha256(b"".join(content)).hexdigest()[:16]
-    versions = numba.__version__, llvmlite.__version__, np.__version__
+    versions = numba.__version__, llvmlite.__version__
     return " ".join([sys.implementation.cache_tag, platform.system(), platform.machine(), *versions, *processor, own])
 
 

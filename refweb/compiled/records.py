@@ -277,7 +277,7 @@ class Arrays:
         self._items[place] = [0, *_sizes(array, self.item, "an array")]
         self._arrays[place] = array
 
-    def __getitem__(self, place):
+    def __getitem__(self, place) -> np.ndarray:
         """The array that Python has put there, or a view of what a kernel has, while it stands there."""
         words = self._items[place]
         if not words[0]:

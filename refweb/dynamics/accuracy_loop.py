@@ -85,6 +85,8 @@ def run_within_drift(simulation, folder, tell):
     while True:
         name = simulation.integrator.knob
         text = "running" if standing.knob == standing.first else f"running with {name} = {standing.knob:g}"
+        if (prepare := getattr(simulation.integrator, "prepare", None)) is not None:
+            prepare()  # before a twin asks for the same
         with _twin_of(simulation) as twin:
             try:
                 run = simulation.run(folder, functools.partial(tell, text))

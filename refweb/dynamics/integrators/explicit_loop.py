@@ -207,12 +207,21 @@ class Room(Record):
     @classmethod
     def of(cls, model, running):
         """Space for the steps of a run."""
-        (rows, _), sums = running.x.shape, len(running.work) + 2
-        numbers = np.zeros(2, dtype=np.int64), np.zeros(3), np.zeros(3), np.zeros(3)
-        vectors = [np.zeros((rows, 3)) for _ in range(4)]
-        inside = Inside.of(rows, model.families.outs[0], running.extremes, sums)
-        driven, changing = np.empty((len(model.inertia.driven), 7)), np.empty(len(model.reels.lengths))
-        return cls(*numbers, driven, *vectors, changing, np.zeros(sums), inside)
+        rows, sums, vectors = len(running.x), len(running.work) + 2, (np.zeros((len(running.x), 3)) for _ in range(4))
+        return cls(
+            where=np.zeros(2, dtype=np.int64),
+            reaction=np.zeros(3),
+            known=np.zeros(3),
+            push=np.zeros(3),
+            before=np.empty((len(model.inertia.driven), 7)),
+            aside=next(vectors),
+            extra=next(vectors),
+            half=next(vectors),
+            momenta=next(vectors),
+            was=np.empty(len(model.reels.lengths)),
+            total=np.zeros(sums),
+            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums),
+        )
 
 
 @kernel(leaf=True, apart=())
@@ -220,10 +229,8 @@ def step_on(
     count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running, room: Room
 ) -> int:
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
-    where, reaction, known, push, before, aside = (
-        room.where, room.reaction, room.known, room.push, room.before, room.aside
-    )  # fmt: skip
-    extra, half, was, inside, total = room.extra, room.half, room.was, room.inside, room.total
+    where, reaction, known, push, before = room.where, room.reaction, room.known, room.push, room.before
+    aside, extra, half, was, inside, total = room.aside, room.extra, room.half, room.was, room.inside, room.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power

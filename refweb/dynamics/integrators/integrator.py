@@ -275,7 +275,8 @@ class Integrator(Protocol):
     ``follows_lines = True`` where it notes in the course which lines may have passed through each other; ``variants``,
     a dict of `Variant` s by name, where ``refweb cost`` is to compare several of them or in other settings;
     ``tolerances``, a dict of absolute ones by unit, "m" and "m/s", of which ± is no less than a multiple; and where
-    that is known before a run, a method ``evaluations(duration)``, how many evaluations of forces a time [s] takes, and
+    kernels are to be compiled before a run, a method ``prepare()``; and where that is known before a run, a method
+    ``evaluations(duration)``, how many evaluations of forces a time [s] takes, and
     a method ``steps_in(spans)``, how many steps each of some spans of time [s] takes, shape (spans,).
     """
 
