@@ -471,8 +471,9 @@ FILLED = "from refweb.compiled import numba_internals as n; print(*(s for s, slo
 MANY = 70
 """Kernels of a plain impact, at most: some forty of the loop, and those of its effects and observables."""
 ABSENT = (
-    "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "viscous_kick", "rubbing_kick", "take_pairs",
-    "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers", "add_half_steps", "turning",
+    "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "viscous_kick", "rubbing_kick",
+    "take_pairs", "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers", "add_half_steps",
+    "turning",
 )  # fmt: skip
 """Kernels of the loop that a plain impact has no use for: stages, bodies that turn or carry, motion, reels, damping,
 friction, lines on lines, integrated impulses, averages, events, energies as observables, angular momentum."""
@@ -499,7 +500,7 @@ def test_a_plain_impact_has_machine_code_of_nothing_else():
 
 
 def test_an_effect_brings_its_own_machine_code_alone():
-    """Damping in proportion to mass: its force, bounds and impulse, the kick that is iterated, and the book of its power."""
+    """Damping by mass: its force, bounds and impulse, the kick that is iterated, and the book of its power."""
     plain = "scene = scene.replace(observe=(refweb.Observe(name='d', quantity='displacement', reduce='max'),))"
     damped = "scene = scene.replace(effects=(*scene.effects, refweb.Damping(rate=1.0)))"
     without, more = set(machine_code(plain)), set(machine_code(plain, damped))

@@ -3,6 +3,7 @@
 With ``--ship`` machine code that all usual processors of this kind run is written into the package itself, for a wheel.
 """
 
+import contextlib
 import os
 
 METHODS = ("cvode", "ida", "explicit")
@@ -30,8 +31,20 @@ def run(arguments):
         if scene.solve.kind == "dynamic":
             longest = max([ROWS * (scene.output.interval or 1e-3), *(one.average or 0.0 for one in scene.observe)])
             scene = scene.replace(solve=_for(scene.solve, longest))
+            _foresee(scene)
         cost = refweb.run(scene).cost
         print(f"{name}: {cost['compile_s']:.1f} s of compiling")
+
+
+def _foresee(scene):
+    """What the box before a run says of its steps, where it says it."""
+    from ..dynamics.expected_cost import expected_cost
+    from ..errors import InputError
+    from ..registry import INTEGRATORS
+
+    if INTEGRATORS[scene.solve.method].knob == "safety":
+        with contextlib.suppress(InputError):
+            expected_cost(scene, scene.build())
 
 
 def _by(method):
