@@ -472,8 +472,8 @@ MANY = 70
 """Kernels of a plain impact, at most: some forty of the loop, and those of its effects and observables."""
 ABSENT = (
     "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "viscous_kick", "rubbing_kick",
-    "take_pairs", "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers", "add_half_steps",
-    "turning",
+    "take_pairs", "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers",
+    "add_half_steps", "turning",
 )  # fmt: skip
 """Kernels of the loop that a plain impact has no use for: stages, bodies that turn or carry, motion, reels, damping,
 friction, lines on lines, integrated impulses, averages, events, energies as observables, angular momentum."""
