@@ -95,19 +95,21 @@ class Kernel:
         given = {**numba_internals.options(self._options, self._counted), **numba_internals.BARE}
         linked = self.apart is None
         cache = numba_internals.Cache(self.py_func.__qualname__.rpartition(".")[2], lambda: self._key, linked)
-        made = numba_internals.dispatcher(self.py_func, given, cache)
-        made.own_kernel = self
-        return made
+        return numba_internals.dispatcher(self.py_func, given, cache)
+
+    def _compiled(self):
+        """The same, with its one signature compiled where it has one."""
+        body = self._body
+        if self.signature is not None and not body.overloads:
+            body.compile(self.signature)
+            body.disable_compile()
+        return body
 
     @property
     def _numba_type_(self):
         with numba_internals.lock:
             if self.apart is None or numba_internals.PLAIN:
-                body = self._body
-                if self.signature is not None and not body.overloads:
-                    body.compile(self.signature)
-                    body.disable_compile()
-                return body._numba_type_
+                return self._compiled()._numba_type_
             return numba_internals.Called(self.signature, self._slot.symbol)
 
     def known(self):
@@ -122,8 +124,7 @@ class Kernel:
             if not self._slot.filled:
                 for one in self.callees:
                     _ = one._slot  # symbols that its machine code names
-                self._body.compile(self.signature)
-                self._slot.fill(numba_internals.address_of(self._body, self.signature))
+                self._slot.fill(numba_internals.address_of(self._compiled(), self.signature))
         return self._slot.address
 
     @functools.cached_property
@@ -179,7 +180,7 @@ def _collect(function, found, seen):
         return
     seen.add(function)
     for _, value in keys.captured(function):
-        for one in value if type(value) is tuple else (value,):
+        for one in value if isinstance(value, tuple) else (value,):
             if isinstance(one, Kernel):
                 if one.apart is None:
                     _collect(one.py_func, found, seen)

@@ -2,7 +2,7 @@
 
     v ← v + ½h f/m,   x ← x + h v,   f ← f(t + h, x),   v ← v + ½h f/m
 
-The loop calls the kernels of all effects through typed lists and tracks peaks, in every step and between steps; Python
+The loop calls the kernels of all effects through tables and tracks peaks, in every step and between steps; Python
 sees history rows only. The step comes from Gershgorin's bound on the largest frequency, 2/√(max row sum of M⁻¹K), with
 K's lines at their taut stiffness and the lines that a body can reach within the row at their contact stiffness.
 
