@@ -4,7 +4,7 @@
 
 runs, for each bug or for those of some numbers or words in it, the test files that mirror the changed file, and says
 which test noticed it first. Its exit status is 1 where one survives that is not a named equivalent, and where tests
-fail without any. A bug in a file of kernels has all of them compiled anew, which takes a minute or two.
+fail without any. Kernels with a bug, and those that are compiled with them, are compiled anew.
 
 `test_mutants.py` sees to it that the list stays true: every text stands in its file exactly once.
 """
@@ -28,6 +28,7 @@ COPIED = ("refweb", "tests", "validation", "README.md", "pyproject.toml", "LICEN
 LONGEST = 1800.0
 """Time that the tests of a bug may take [s]; one that makes them hang is noticed as well."""
 MIRRORS = {
+    "compiled": "compiled/test_kernel.py compiled/test_pointers.py",
     "net/web": "net/test_webs.py",
     "net/lattices": "net/test_webs.py",
     "net/single_cable": "net/test_webs.py",
@@ -459,6 +460,13 @@ MUTANTS = [
         'if self.supports is not None:\n            given["supports"]',
         'if self.supports:\n            given["supports"]',
     ),
+    # Machine code
+    Mutant("compiled/keys", "constants = constants[1:]", "pass"),
+    Mutant("compiled/keys", "return value.machine_code_key(seen)", 'return "a kernel"'),
+    Mutant("compiled/store", "if content[:CHECK] == _checksum(content[CHECK:]):", "if content:"),
+    Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
+    Mutant("compiled/records", "and value.flags.c_contiguous", "and value.size"),
+    Mutant("compiled/records", "for _ in range(2):  # what", "for _ in range(1):  # what"),
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),
