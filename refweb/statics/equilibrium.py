@@ -46,6 +46,10 @@ class Equilibrium:
     stats : dict
         ``nsteps`` iterations, ``nfev`` force and energy evaluations, ``njev`` tangents, ``nlu`` factorizations,
         ``residual`` [1], ``smallest_pivot`` (its sign, None where not asked for).
+    stability : refweb.statics.stability.Stability, optional
+        Whether it is stable; None where not asked for.
+    may_turn_over : bool
+        Whether there may be other equilibria as lines can push, see `refweb.statics.other_side`.
     duality_bound : refweb.statics.duality_bound.DualityBound, optional
         Of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional
@@ -63,6 +67,8 @@ class Equilibrium:
     duality_bound: object = None
     deviations: object = None
     floating: object = None
+    stability: object = None
+    may_turn_over: bool = False
 
 
 def add_spent(stats, other):

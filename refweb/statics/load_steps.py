@@ -14,6 +14,7 @@ from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.at_rest import at_rest
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_touches
 from .newton import Newton
+from .stability import ask
 
 MOST = 400
 """Largest number of factorizations from the last state, where no interior point can take over."""
@@ -44,7 +45,7 @@ def solve(system, load_steps, progress=None):
     SolverError
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
-    system = at_rest(system)
+    whole, system = system, at_rest(system)
     newton, states = Newton(system, progress, load_steps[0]), []
     for t in load_steps:
         try:
@@ -58,6 +59,7 @@ def solve(system, load_steps, progress=None):
             state.duality_bound = duality_bound(system, state, newton.factor)
             state.floating = between_slack_lines(system, state)
         state.deviations = newton.deviations(state)
+        ask(whole, system, state, newton.factor if newton.follows else None)
         states = [*states[-1:], state]
         yield state
 
@@ -99,7 +101,7 @@ def _equilibrium(newton, t, x, warm):
         from .lowest import lowest
 
         state = lowest(newton, state)
-    if not (convex or newton.follows):
+    if not (newton.system.convex or newton.follows):
         state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
     add_spent(state.stats, spent)
     return state

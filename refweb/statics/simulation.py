@@ -12,7 +12,9 @@ from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.solution import SOLVER, Result
 from ..results.state import State
+from ..system.at_rest import at_rest
 from .remarks import Remarks, open_rows, remarks_on
+from .stability import ask
 
 
 class Simulation:
@@ -88,6 +90,8 @@ class Simulation:
     def _take(self, found, smoothing):
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        if found.stability is None:  # of a method that knows no tangents
+            ask(self.system, at_rest(self.system), found)
         if self.system.weakness is not None:
             self._refuse_break(found)
         if self._passage is not None:
