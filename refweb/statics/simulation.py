@@ -14,7 +14,7 @@ from ..results.solution import SOLVER, Result
 from ..results.state import State
 from ..system.at_rest import at_rest
 from .remarks import Remarks, open_rows, remarks_on
-from .stability import ask
+from .stability import Question
 
 
 class Simulation:
@@ -91,7 +91,7 @@ class Simulation:
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
         if found.stability is None:  # of a method that knows no tangents
-            ask(self.system, at_rest(self.system), found)
+            Question(self.system, at_rest(self.system), found).answer()
         if self.system.weakness is not None:
             self._refuse_break(found)
         if self._passage is not None:

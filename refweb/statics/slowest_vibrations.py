@@ -5,8 +5,8 @@ With φ the shape of one, all s of (s² M + s C + K) φ = 0 are those of
     μ (a, b) = (−K⁻¹ (ω C a + ω² M b), a),        s = ω/μ,        a = μ φ,        b = φ,
 
 with any ω; without C those of μ φ = K⁻¹ M φ, s² = −1/μ. Arnoldi iteration finds the largest μ, by one solution with K
-in each step. Left vectors, by solutions with Kᵀ, tell how far rounding moves them; they are asked for only where
-something grows.
+in each step. Where something may grow, they are found once more to all digits, and left vectors, by solutions with Kᵀ,
+tell how far rounding moves them.
 """
 
 from __future__ import annotations
@@ -16,12 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
-NUMBER = 6
-"""Number of μ that are looked for without C; with it twice as many."""
+NUMBER, KEPT = 4, 20
+"""Number of μ that are looked for without C, and of vectors that are kept for it; with C twice as many of both."""
+CLOSE = 1e-6
+"""Error of these μ, over them."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
-ABOVE = 1.05
-"""The bound α over what an iteration finds of it, its square to 1e-2."""
+ABOVE = 1.1
+"""The bound α over what an iteration finds of it, its square to `NEARLY`."""
+NEARLY = 0.1
 
 
 class Slowest(NamedTuple):
@@ -82,30 +85,26 @@ class Weighed:
 def slowest(solver, M, C=None):
     """The `Slowest` vibrations of matrices as in `Weighed`."""
     weighed = Weighed(solver, M, C)
-    size = len(weighed.massive)
-    start = np.random.default_rng(0).standard_normal(size)
-    for _ in range(4):
-        start = weighed.once(start / np.linalg.norm(start))
-    weighed.omega = 1.0 / np.sqrt(np.linalg.norm(start))
-    if C is None:
-        by, transposed, start, number = weighed.once, weighed.once_transposed, start, NUMBER
-    else:
-        by, transposed, start, number = weighed.twice, weighed.twice_transposed, np.tile(start, 2), 2 * NUMBER
+    start = np.random.default_rng(0).standard_normal(len(weighed.massive))
+    by, transposed, factor = weighed.once, weighed.once_transposed, 1
+    if C is not None:
+        for _ in range(4):
+            start = weighed.once(start / np.linalg.norm(start))
+        weighed.omega = 1.0 / np.sqrt(np.linalg.norm(start))
+        by, transposed, factor, start = weighed.twice, weighed.twice_transposed, 2, np.tile(start, 2)
 
-    def found(matvec):
+    def found(matvec, close):
         operator = LinearOperator((len(start), len(start)), matvec=matvec, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
-        return eigs(operator, number, which="LM", v0=start)
+        return eigs(operator, factor * NUMBER, which="LM", v0=start, ncv=factor * KEPT, tol=close)
 
-    mu, vectors = found(by)
-    growth = abs(np.sqrt(-1.0 / mu).real) if C is None else weighed.omega * (1.0 / mu).real
-    s = np.sqrt(-1.0 / mu) if C is None else weighed.omega / mu
-    grows = growth > 0.0
-    if grows.any():
-        _, left = found(transposed)
-        off = ROUNDING * abs(mu).max() * _conditions(vectors, left)
-        beyond = (abs(mu.imag) > off) | (mu.real < -off) if C is None else mu.real > off
-        grows &= beyond
-    return Slowest(np.where(s.real < 0.0, -s, s) if C is None else s, grows)
+    mu, right = found(by, CLOSE)
+    suspect = (mu.imag != 0.0) | (mu.real < 0.0) if C is None else mu.real > -CLOSE * abs(mu)
+    grows = np.zeros(len(mu), dtype=bool)
+    if suspect.any():
+        (mu, right), (_, left) = found(by, 0.0), found(transposed, 0.0)
+        off = ROUNDING * abs(mu).max() * _conditions(right, left)
+        grows = (abs(mu.imag) > off) | (mu.real < -off) if C is None else mu.real > off
+    return Slowest(np.sqrt(-1.0 / mu + 0j) if C is None else weighed.omega / mu, grows)
 
 
 def _conditions(right, left):
@@ -134,5 +133,5 @@ def coupling(solve, A, M):
 
     operator = LinearOperator(A.shape, matvec=times, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
     start = np.random.default_rng(0).standard_normal(len(root))
-    (largest,) = eigsh(operator, 1, which="LA", v0=times(start), tol=1e-2, return_eigenvectors=False)
+    (largest,) = eigsh(operator, 1, which="LA", v0=times(start), ncv=6, tol=NEARLY, return_eigenvectors=False)
     return ABOVE * float(np.sqrt(max(largest, 0.0)))

@@ -16,11 +16,13 @@ of the pivots of LDLᵀ say so. Follower loads and wind have no potential, and t
 In a frame that turns Coriolis forces may hold what K does not, as long as nothing damps motion in the frame.
 
 Of up to `DENSE` unknowns with mass all s are found. Of more, the slowest are, by Arnoldi iteration on K⁻¹, whose start
-has a fixed seed. What is left is bounded with S positive definite and A = (K − Kᵀ)/2:
+has a fixed seed; of the others it is said that they are not asked. But where S is positive definite, with A = (K − Kᵀ)/2
+nothing grows where C is symmetric and
 
-    α = ‖S^(−1/2) A M^(−1/2)‖,        Re s ≤ α/2 for symmetric C ≥ 0,        Re s < 0 for symmetric C > α M,
+    C > α M,        α = ‖S^(−1/2) A M^(−1/2)‖,
 
-the latter as all roots of s² + c s + k + i a lie to the left where c > 0 and c² k > a².
+as both roots of s² + c s + k + i a lie to the left where c > 0 and c² k > a². Wind does that where it is slower than
+waves across the lines.
 
 Unknowns without mass follow the others; forces that depend on their velocity are left out. Eigenvalues have errors from
 rounding, by their condition numbers: what is within these counts as none.
@@ -32,6 +34,7 @@ References
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -40,7 +43,7 @@ from scipy.sparse import triu
 
 from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor, Lu, negative_pivots
-from .critical_speed import drifting
+from .critical_speed import ANCHOR, drifting
 
 TINY = 1e-12
 """Tension of all lines over EA by which the smallest pivot is moved, that of a direction without stiffness."""
@@ -50,6 +53,9 @@ ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
 NO_RATE = 1e-9
 """Rate of growth over that of the slowest vibration that counts as none."""
+OPEN = 1e3
+"""λ of the slowest vibration over `TINY` of the fastest, up to which it may have no stiffness."""
+
 
 class Stability(NamedTuple):
     """What is known of the stability of an equilibrium.
@@ -63,11 +69,14 @@ class Stability(NamedTuple):
         Of −1 what drives it away, of None what is missing, in words.
     held : bool
         Whether Coriolis forces hold what K does not, as long as nothing damps motion in the frame.
+    loose : bool
+        Whether some direction may have no stiffness.
     """
 
     sign: int | None
     why: str = ""
     held: bool = False
+    loose: bool = False
 
 
 PIVOT = "a pivot of its tangent is negative"
@@ -75,18 +84,8 @@ EIGENVALUE = "an eigenvalue of its tangent is negative"
 STABLE = Stability(1)
 
 
-def ask(system, rest, state, solver=None):
-    """Write the `Stability` of an equilibrium to it, and whether it may have others; see `stability`."""
-    from .other_side import may_turn_over
-
-    state.stability = stability(system, rest, state, solver)
-    if not rest.convex:
-        state.stats["smallest_pivot"] = state.stability.sign
-    state.may_turn_over = may_turn_over(rest, state)
-
-
-def stability(system, rest, state, solver=None):
-    """The `Stability` of an equilibrium.
+class Question:
+    """Whether an equilibrium is stable; K is assembled where nothing else says it.
 
     Parameters
     ----------
@@ -95,56 +94,66 @@ def stability(system, rest, state, solver=None):
     rest : refweb.system.system.System
         As statics sees it, see `refweb.system.at_rest`.
     state : refweb.statics.equilibrium.Equilibrium
-        Where it is; ``smallest_pivot`` in its stats, where it stands there, is not asked for again.
-    solver : refweb.system.factorization.Lu, optional
-        Of the tangent there, but for rounding.
-    """
-    if not len(rest.free) or (rest.convex and not rest.rotating):
-        return STABLE
-    question = Question(system, rest, state.step, state.x)
-    if question.symmetric:
-        sign = state.stats.get("smallest_pivot")
-        sign = question.smallest_pivot() if sign is None else sign
-        if sign != -1 or not rest.rotating:
-            return Stability(sign, PIVOT if sign == -1 else "")
-        return question.in_frame(PIVOT)
-    return question.unsymmetric(solver)
-
-
-class Question:
-    """K, M and C at an equilibrium.
-
-    Parameters
-    ----------
-    system, rest : refweb.system.system.System
-        As in `stability`.
-    t : float
-        Load step, or time.
-    x : ndarray, shape (rows, 3)
-        Displacement [m].
+        Where it is.
     """
 
-    def __init__(self, system, rest, t, x):
-        self.system, self.rest, self.t, self.x = system, rest, t, x
-        self._values = rest.stiffness(t, x)
-        self.K = rest.pattern.matrix(self._values)
-        across = self.K.T.tocsc()
-        across.sort_indices()
-        self._half = 0.5 * (self._values + across.data)  # of a pattern that is symmetric
-        self._skew = 0.5 * (self._values - across.data)
-        self.symmetric = abs(self._skew).max(initial=0.0) <= ROUNDING * abs(self._values).max(initial=0.0)
-        net = rest.at(t).net
-        axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
-        self._ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
-        for part in rest.unsupported_parts:  # which no pivot is to be 0 for
-            self._ridge[rest.pattern.diagonal[part.unknowns]] += 1e-10 * axial.max()
+    def __init__(self, system, rest, state):
+        self.system, self.rest, self.state, self.t, self.x = system, rest, state, state.step, state.x
         self._drifting = drifting(rest) if rest.rotating else 0
         self._factor = Factor(rest.pattern)
 
-    def smallest_pivot(self):
+    def answer(self, solver=None):
+        """Write the `Stability` to the equilibrium, and whether there may be others.
+
+        ``solver`` is the `refweb.system.factorization.Lu` of K, where there is one.
+        """
+        from .other_side import may_turn_over
+
+        self.state.stability = self._stability(solver)
+        if not self.rest.convex:
+            self.state.stats["smallest_pivot"] = self.state.stability.sign
+        self.state.may_turn_over = may_turn_over(self.rest, self.state)
+
+    def _stability(self, solver):
+        if not len(self.rest.free) or self.rest.convex:
+            return STABLE
+        if not (self.rest.symmetric or self._symmetric):
+            return self._unsymmetric(solver)
+        if (sign := self.state.stats.get("smallest_pivot")) is None:
+            sign = self.definite
+        if sign == -1:
+            found = self._in_frame(PIVOT) if self.rest.rotating else Stability(-1, PIVOT)
+            return found._replace(loose=True)
+        return Stability(sign, loose=sign < 1)
+
+    @cached_property
+    def _parts(self):
+        """Values of K, of S and of A in the pattern."""
+        values = self.rest.stiffness(self.t, self.x)
+        across = self.rest.pattern.matrix(values).T.tocsc().data  # of a pattern that is symmetric
+        return values, 0.5 * (values + across), 0.5 * (values - across)
+
+    @property
+    def _symmetric(self):
+        """Whether K is symmetric but for rounding."""
+        values, _, skew = self._parts
+        return abs(skew).max(initial=0.0) <= ROUNDING * abs(values).max(initial=0.0)
+
+    @cached_property
+    def _ridge(self):
+        """Values of what stiffness counts as none."""
+        rest, net = self.rest, self.rest.at(self.t).net
+        axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+        ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
+        for part in rest.unsupported_parts:  # which no pivot is to be 0 for
+            ridge[rest.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
+        return ridge
+
+    @cached_property
+    def definite(self):
         """Sign of the smallest pivot of S: −1, 0 where it is 0 to rounding, 1."""
         for shift, sign in ((-1.0, 1), (1.0, 0)):
-            self._factor.update(self._half + shift * self._ridge)
+            self._factor.update(self._parts[1] + shift * self._ridge)
             if self._factor.negative_pivots() <= self._drifting:
                 return sign
         return -1
@@ -164,9 +173,8 @@ class Question:
         return self.system.pattern.matrix(values)[of][:, of].tocsc()
 
     def _reduced(self):
-        """K and C of the unknowns with mass, over the roots of that, dense; and whether those without stand by
-        themselves."""
-        heavy, K, C = self._massive(), self.K.toarray(), self._velocity()
+        """K and C of the unknowns with mass, over the roots of that, dense; and whether those without are held."""
+        heavy, K, C = self._massive(), self.rest.pattern.matrix(self._parts[0]).toarray(), self._velocity()
         if not heavy.any():
             return K, None, False
         inner = K[~heavy][:, ~heavy]
@@ -188,7 +196,7 @@ class Question:
 
     # Answers
 
-    def in_frame(self, what):
+    def _in_frame(self, what):
         """Of a K that does not hold the web in a frame that turns."""
         if self._massive().sum() > DENSE:
             return Stability(-1, f"{what}; Coriolis forces are not taken into account")
@@ -196,66 +204,66 @@ class Question:
         growth = _growth(K, C)
         return Stability(-1, what) if growth > 0.0 else Stability(-1, what, held=True)
 
-    def unsymmetric(self, solver):
+    def _unsymmetric(self, solver):
         """Of a K that is not symmetric."""
-        definite = self.smallest_pivot()
         massive = int(self._massive().sum())
         if massive > DENSE:
-            return self._of_many(definite, solver)
+            return self._of_many(solver)
         K, C, stands = self._reduced()
         found, off = _eigenvalues(K)
-        negative = 0 if definite >= 0 else int(_negative(found, off).sum())
+        loose = not (stands and (abs(found) > off).all())
+        negative = 0 if self.definite >= 0 else int(_negative(found, off).sum())
         if negative > self._drifting:
-            turned = bool(self.rest.rotating) and C is not None
-            return self.in_frame(EIGENVALUE) if turned and not negative % 2 else Stability(-1, EIGENVALUE)
-        if not massive:
-            if definite < 0 and not stands:
-                return Stability(None, "nothing that moves has mass")
-            return Stability(definite)
-        if not stands and definite < 0:
-            return Stability(None, "nodes without mass are not held by their lines alone")
-        if (growth := _growth(K, C)) > 0.0:
-            return Stability(-1, _flutter(growth))
-        return Stability(1 if (abs(found) > off).all() else 0)
+            turned = bool(self.rest.rotating) and C is not None and not negative % 2
+            return (self._in_frame(EIGENVALUE) if turned else Stability(-1, EIGENVALUE))._replace(loose=loose)
+        if self.definite < 0 and not stands:
+            return Stability(None, "nodes without mass may not be held by their lines", loose=True)
+        if massive and (growth := _growth(K, C)) > 0.0:
+            return Stability(-1, _flutter(growth), loose=loose)
+        return Stability(0 if loose else 1, loose=loose)
 
-    def _of_many(self, definite, solver):
-        """The same of more unknowns than have all their s found: of the slowest ones, and by bounds on the others."""
+    def _of_many(self, solver):
+        """The same of more unknowns than have all their s found."""
         from scipy.sparse.linalg import ArpackError
 
-        from .slowest_vibrations import coupling, slowest
+        from .slowest_vibrations import slowest
 
+        M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
+        if C is not None and self.definite == 1 and self._damps(C, M):
+            return STABLE
         if solver is None:
             solver = Lu(self.rest.pattern)
-            solver.update(self._values + self._ridge)
-        if (sign := solver.sign_of_determinant()) < 0 and definite < 0:
-            return Stability(-1, EIGENVALUE)
-        if not sign:
-            return Stability(None, "its tangent is singular to rounding")
-        M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
+            solver.update(self._parts[0] + self._ridge)
+        if not (sign := solver.sign_of_determinant()):
+            return Stability(None, "its tangent is singular to rounding", loose=True)
         try:
             slow = slowest(solver, M, C)
         except ArpackError as error:
-            return Stability(None, f"its slowest vibrations are not found ({error})")
+            return Stability(None, f"its slowest vibrations are not found ({error})", loose=True)
+        loose = not self._massive().all() or abs(slow.s).min() ** 2 <= OPEN * TINY * self._fastest(M)
         if slow.grows.any():
             grown = slow.s[slow.grows]
             turns = (abs(grown.imag) > NO_RATE * abs(grown)).all()
-            return Stability(-1, _flutter(grown.real.max()) if turns else EIGENVALUE)
-        rest = f"the {len(slow.s)} slowest of its vibrations do not grow"
-        if definite < 1 or not self._bounded(C):
-            return Stability(None, f"{rest}, the others are too many to be asked")
-        alpha = coupling(self._factor.precondition, self.rest.pattern.matrix(self._skew), M)
-        if self._damps(C, alpha, M) or 0.5 * alpha <= NO_RATE * abs(slow.s).min():
-            return STABLE
-        return Stability(None, f"{rest}, and no other one by more than {0.5 * alpha:.2g} 1/s")
+            return Stability(-1, _flutter(grown.real.max()) if turns else EIGENVALUE, loose=loose)
+        if sign < 0 and self.definite < 0:
+            return Stability(-1, EIGENVALUE, loose=loose)
+        text = f"the {len(slow.s)} slowest of its vibrations do not grow, the others are too many to be asked"
+        return Stability(None, text, loose=loose)
 
-    def _bounded(self, C):
-        """Whether bounds on the growth of all vibrations hold: of lumped mass, which nothing lacks, and symmetric C."""
-        passive = C is None or abs(C - C.T).max() <= ROUNDING * abs(C).max()
-        return passive and self._massive().all() and self.rest.net.consistent_minus_lumped is None
+    def _fastest(self, M):
+        """A bound on all |λ|, where everything has mass [1/s²]."""
+        return (abs(self.rest.pattern.matrix(self._parts[0])).sum(axis=1) / M.diagonal()).max()
 
-    def _damps(self, C, alpha, M):
-        """Whether C > α M, so that nothing grows."""
-        return C is not None and negative_pivots(triu(C - alpha * M, format="csc"), self.rest.library) == 0
+    def _damps(self, C, M):
+        """Whether C is symmetric and above α M, so that nothing grows; of lumped mass, which nothing lacks."""
+        if C is None or abs(C - C.T).max() > ROUNDING * abs(C).max():
+            return False
+        if not self._massive().all() or self.rest.net.consistent_minus_lumped is not None:
+            return False
+        from .slowest_vibrations import coupling
+
+        alpha = coupling(self._factor.precondition, self.rest.pattern.matrix(self._parts[2]), M)
+        return negative_pivots(triu(C - alpha * M, format="csc"), self.rest.library) == 0
 
 
 def _flutter(growth):
