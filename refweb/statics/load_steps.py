@@ -14,7 +14,6 @@ from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.at_rest import at_rest
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_touches
 from .newton import Newton
-from .stability import Question
 
 MOST = 400
 """Largest number of factorizations from the last state, where no interior point can take over."""
@@ -60,7 +59,10 @@ def solve(system, load_steps, progress=None):
             state.floating = between_slack_lines(system, state)
         if newton.follows:
             newton.factorize_at(state)
-        Question(whole, system, state).answer(newton.factor if newton.follows else None)
+        if not system.convex:
+            from .stability import ask
+
+            ask(whole, system, state, newton.factor if newton.follows else None)
         state.deviations = newton.deviations(state)
         states = [*states[-1:], state]
         yield state

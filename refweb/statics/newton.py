@@ -320,7 +320,7 @@ class Newton:
         if not asked:
             self.factorize_at(state)
         solve = self.factor.solve
-        if (not asked or state.stability.loose) and len(system.free):
+        if (state.stability is None or state.stability.loose) and len(system.free):
             null = NullSpace(self.factor, self._tiny * system.pattern.matrix(self.geometric))
             if state.duality_bound is None:
                 state.floating = null.floating(system)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.elasticity import strains
 from ..net.tension_laws import LINEAR
 from ..system.factorization import Factor
 
@@ -31,8 +30,6 @@ def may_turn_over(rest, equilibrium):
     """
     net = rest.at(equilibrium.step).net
     bars = net.laws == LINEAR
-    if not bars.any():
-        return False
     if (bars & (equilibrium.tension < 0.0)).any() or rest.unsupported_parts:
         return True
     values = rest.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
@@ -40,10 +37,9 @@ def may_turn_over(rest, equilibrium):
     factor.update(values)
     x = equilibrium.x.copy()
     x.ravel()[rest.free] = 0.0
-    pull = np.zeros_like(x)
-    along = (net.bars @ (net.points + x)) / net.bar_lengths[:, None]
-    np.subtract(pull, net.bars.T @ along, out=pull)
+    pull = -(net.bars.T @ (net.bar_vectors(x) / net.bar_lengths[:, None]))
     if (y := factor.solve(pull.ravel()[rest.free])) is None:
         return True
     x.ravel()[rest.free] = y
-    return bool((strains(net, x)[bars] < -SHORTER).any())
+    strain = np.linalg.norm(net.bar_vectors(x), axis=1) / net.bar_lengths - 1.0
+    return bool((strain[np.repeat(bars, len(net.weights))] < -SHORTER).any())

@@ -49,6 +49,8 @@ def remark_on_open(state, equilibrium):
 def on_stability(state, equilibrium, subject="the equilibrium"):
     """Whether an equilibrium is stable, and whether there may be others: pairs of a kind and a text."""
     found = equilibrium.stability
+    if found is None:
+        return
     if found.sign == -1:
         yield "saddle", f"{subject} is a saddle ({found.why}): {_way_out(state, found)}"
         return

@@ -16,7 +16,7 @@ of the pivots of LDLᵀ say so. Follower loads and wind have no potential, and t
 In a frame that turns Coriolis forces may hold what K does not, as long as nothing damps motion in the frame.
 
 Of up to `DENSE` unknowns with mass all s are found. Of more, the slowest are, by Arnoldi iteration on K⁻¹, whose start
-has a fixed seed; of the others it is said that they are not asked. But where S is positive definite, with A = (K − Kᵀ)/2
+has a fixed seed; of the others it is said that they are not asked. But with S positive definite and A = (K − Kᵀ)/2
 nothing grows where C is symmetric and
 
     C > α M,        α = ‖S^(−1/2) A M^(−1/2)‖,
@@ -35,53 +35,57 @@ References
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
-import scipy.linalg
-from scipy.sparse import triu
 
 from ..net.net import AXIAL_STIFFNESS
+from ..net.tension_laws import LINEAR
 from ..system.factorization import Factor, Lu, negative_pivots
-from .critical_speed import ANCHOR, drifting
+from .equilibrium import Stability
 
 TINY = 1e-12
 """Tension of all lines over EA by which the smallest pivot is moved, that of a direction without stiffness."""
+HELD = 1e-10
+"""Stiffness over the largest EA/L that holds what nothing supports."""
 DENSE = 150
 """Unknowns with mass up to which all s are found."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
+PIVOT, EIGENVALUE = "a pivot of its tangent is negative", "an eigenvalue of its tangent is negative"
+"""Why."""
 NO_RATE = 1e-9
 """Rate of growth over that of the slowest vibration that counts as none."""
 OPEN = 1e3
 """λ of the slowest vibration over `TINY` of the fastest, up to which it may have no stiffness."""
 
 
-class Stability(NamedTuple):
-    """What is known of the stability of an equilibrium.
+def ask(system, rest, state, solver=None):
+    """Write to an equilibrium whether it is stable, and whether there may be others.
 
-    Attributes
+    Parameters
     ----------
-    sign : {-1, 0, 1, None}
-        −1 where K has what drives the web away or a disturbance grows, 0 where some direction has no stiffness to
-        rounding, 1 where the equilibrium is stable, None where that is not decided.
-    why : str
-        Of −1 what drives it away, of None what is missing, in words.
-    held : bool
-        Whether Coriolis forces hold what K does not, as long as nothing damps motion in the frame.
-    loose : bool
-        Whether some direction may have no stiffness.
+    system, rest : refweb.system.system.System
+        With all that acts, and as statics sees it, see `refweb.system.at_rest`.
+    state : Equilibrium
+        Where it is; the sign of its smallest pivot, where that is in its stats, is not asked for again.
+    solver : refweb.system.factorization.Lu, optional
+        Of a tangent that is not symmetric.
     """
+    sign = state.stats.get("smallest_pivot")
+    if sign is None or (sign == -1 and rest.rotating):
+        state.stability = Question(system, rest, state).answer(solver)
+    else:
+        state.stability = by_pivot(sign)
+    state.stats["smallest_pivot"] = state.stability.sign
+    if (rest.net.laws == LINEAR).any():
+        from .other_side import may_turn_over
 
-    sign: int | None
-    why: str = ""
-    held: bool = False
-    loose: bool = False
+        state.may_turn_over = may_turn_over(rest, state)
 
 
-PIVOT = "a pivot of its tangent is negative"
-EIGENVALUE = "an eigenvalue of its tangent is negative"
-STABLE = Stability(1)
+def by_pivot(sign):
+    """The `Stability` that the sign of the smallest pivot of a symmetric tangent says."""
+    return Stability(sign, PIVOT if sign == -1 else "", loose=sign < 1)
 
 
 class Question:
@@ -99,32 +103,24 @@ class Question:
 
     def __init__(self, system, rest, state):
         self.system, self.rest, self.state, self.t, self.x = system, rest, state, state.step, state.x
-        self._drifting = drifting(rest) if rest.rotating else 0
-        self._factor = Factor(rest.pattern)
+        self._drifting, self._factor = 0, Factor(rest.pattern)
+        if rest.rotating:
+            from .critical_speed import drifting
+
+            self._drifting = drifting(rest)
 
     def answer(self, solver=None):
-        """Write the `Stability` to the equilibrium, and whether there may be others.
+        """The `refweb.statics.equilibrium.Stability`.
 
         ``solver`` is the `refweb.system.factorization.Lu` of K, where there is one.
         """
-        from .other_side import may_turn_over
-
-        self.state.stability = self._stability(solver)
-        if not self.rest.convex:
-            self.state.stats["smallest_pivot"] = self.state.stability.sign
-        self.state.may_turn_over = may_turn_over(self.rest, self.state)
-
-    def _stability(self, solver):
-        if not len(self.rest.free) or self.rest.convex:
-            return STABLE
+        if not len(self.rest.free):
+            return Stability(1)
         if not (self.rest.symmetric or self._symmetric):
             return self._unsymmetric(solver)
-        if (sign := self.state.stats.get("smallest_pivot")) is None:
-            sign = self.definite
-        if sign == -1:
-            found = self._in_frame(PIVOT) if self.rest.rotating else Stability(-1, PIVOT)
-            return found._replace(loose=True)
-        return Stability(sign, loose=sign < 1)
+        if self.definite == -1 and self.rest.rotating:
+            return self._in_frame(PIVOT)._replace(loose=True)
+        return by_pivot(self.definite)
 
     @cached_property
     def _parts(self):
@@ -146,7 +142,7 @@ class Question:
         axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
         ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
         for part in rest.unsupported_parts:  # which no pivot is to be 0 for
-            ridge[rest.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
+            ridge[rest.pattern.diagonal[part.unknowns]] += HELD * axial.max()
         return ridge
 
     @cached_property
@@ -174,6 +170,8 @@ class Question:
 
     def _reduced(self):
         """K and C of the unknowns with mass, over the roots of that, dense; and whether those without are held."""
+        import scipy.linalg
+
         heavy, K, C = self._massive(), self.rest.pattern.matrix(self._parts[0]).toarray(), self._velocity()
         if not heavy.any():
             return K, None, False
@@ -230,7 +228,7 @@ class Question:
 
         M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
         if C is not None and self.definite == 1 and self._damps(C, M):
-            return STABLE
+            return Stability(1)
         if solver is None:
             solver = Lu(self.rest.pattern)
             solver.update(self._parts[0] + self._ridge)
@@ -260,6 +258,8 @@ class Question:
             return False
         if not self._massive().all() or self.rest.net.consistent_minus_lumped is not None:
             return False
+        from scipy.sparse import triu
+
         from .slowest_vibrations import coupling
 
         alpha = coupling(self._factor.precondition, self.rest.pattern.matrix(self._parts[2]), M)
@@ -273,6 +273,8 @@ def _flutter(growth):
 
 def _eigenvalues(A):
     """Eigenvalues of a matrix, and what rounding may make of each, to first order."""
+    import scipy.linalg
+
     found, before, behind = scipy.linalg.eig(A, left=True, right=True)
     overlap = abs((before.conj() * behind).sum(axis=0))  # of unit vectors: 1 over the condition number
     least = np.finfo(float).eps

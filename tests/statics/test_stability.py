@@ -29,7 +29,9 @@ class Net:
             self.supports = [0, count - 1]
         else:
             apart = np.linalg.norm(points[:, None] - points, axis=2)
-            pairs = {tuple(sorted((i, int(np.argsort(apart[i, :i])[k])))) for i in range(1, count) for k in range(min(i, 3))}
+            pairs = {
+                tuple(sorted((i, int(np.argsort(apart[i, :i])[k])))) for i in range(1, count) for k in range(min(i, 3))
+            }
             pairs = sorted(pairs)
             self.supports = sorted(rng.choice(count, min(count - 1, int(rng.integers(2, 5))), replace=False).tolist())
         self.points, self.pairs = points, np.array(pairs)
@@ -45,7 +47,11 @@ class Net:
         size = 10.0 ** rng.uniform(-0.5, 2.5)
         has = dict(zip(["pressure", "thrust", "drag", "frame", "load"], rng.random(5) < 0.35, strict=True))
         self.pressure = size * rng.uniform(-1.0, 1.0) if has["pressure"] else None
-        self.thrust = self.free[0], int(np.flatnonzero((self.pairs == self.free[0]).any(axis=1))[0]), size * rng.uniform(-1.0, 1.0)
+        self.thrust = (
+            self.free[0],
+            int(np.flatnonzero((self.pairs == self.free[0]).any(axis=1))[0]),
+            size * rng.uniform(-1.0, 1.0),
+        )
         self.thrust = self.thrust if has["thrust"] else None
         self.wind = rng.normal(size=3) * 10.0 ** rng.uniform(0.0, 1.3) if has["drag"] else None
         self.turn = np.array([10.0 ** rng.uniform(0.0, 2.0), 0.0, 0.0]) if has["frame"] else None
@@ -104,7 +110,9 @@ class Net:
                 across = u - along[:, None] * unit
                 speed = np.sqrt((across * across).sum(axis=1))
                 share = 0.5 * (0.5 * 1.2 * 0.01 * self.natural)
-                drag = 1.2 * speed[:, None] * across + 0.01 * np.pi * (np.sign(along.real) * along * along)[:, None] * unit
+                drag = (
+                    1.2 * speed[:, None] * across + 0.01 * np.pi * (np.sign(along.real) * along * along)[:, None] * unit
+                )
                 np.subtract.at(f, nodes, share[:, None] * drag)
         if self.turn is not None:
             turned = np.cross(self.turn, np.cross(self.turn, p)) + 2.0 * np.cross(self.turn, v)
