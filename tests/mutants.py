@@ -81,6 +81,9 @@ MIRRORS = {
     "statics/floating": "statics/test_floating.py",
     "statics/interval": "statics/test_floating.py",
     "statics/lowest": "statics/test_lowest.py",
+    "statics/stability": "statics/test_stability.py",
+    "statics/slowest_vibrations": "statics/test_stability.py",
+    "statics/other_side": "statics/test_stability.py",
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
     "statics": "statics/test_factor_at_hand.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "test_faults.py dynamics/test_accuracy.py",
@@ -341,7 +344,14 @@ MUTANTS = [
     Mutant("statics/lowest", "starts[1] < starts[0] - none", "starts[1] > starts[0] + none"),
     Mutant("results/observables/observable", "/ SHARE * ROUNDING", "/ SHARE * ROUNDING / 27.0"),
     Mutant("statics/smoothing_error", "/ (1.0 - SHARE) for", "* (1.0 - SHARE) for"),
-    Mutant("statics/newton", "((-tiny, 1), (tiny, 0))", "((-tiny, 1), (tiny, -1))"),
+    Mutant("statics/newton", "((-self._tiny, 1), (self._tiny, 0))", "((-self._tiny, 1), (self._tiny, -1))"),
+    Mutant(
+        "statics/stability", "0 if self.definite >= 0 else int(_negative", "0 if self.definite >= -1 else int(_negative"
+    ),
+    Mutant("statics/stability", "-K / scale**2, -C / scale", "-K / scale**2, C / scale"),
+    Mutant("statics/stability", "0.5 * (values + across), 0.5", "values, 0.5"),
+    Mutant("statics/slowest_vibrations", "mu.real > off", "mu.real < off"),
+    Mutant("statics/other_side", "bars & (equilibrium.tension < 0.0)", "bars & (equilibrium.tension < -1e99)"),
     Mutant(
         "statics/newton",
         "np.abs(state.tension) + stiffness * moved",

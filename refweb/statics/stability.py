@@ -34,6 +34,7 @@ References
 
 from __future__ import annotations
 
+import contextlib
 from functools import cached_property
 
 import numpy as np
@@ -47,7 +48,7 @@ TINY = 1e-12
 """Tension of all lines over EA by which the smallest pivot is moved, that of a direction without stiffness."""
 HELD = 1e-10
 """Stiffness over the largest EA/L that holds what nothing supports."""
-DENSE = 150
+DENSE = 100
 """Unknowns with mass up to which all s are found."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
@@ -197,7 +198,9 @@ class Question:
     def _in_frame(self, what):
         """Of a K that does not hold the web in a frame that turns."""
         if self._massive().sum() > DENSE:
-            return Stability(-1, f"{what}; Coriolis forces are not taken into account")
+            slow = self._slowest(self._lu, self._velocity())
+            grows = slow is not None and slow.grows.any()
+            return Stability(-1, what if grows else f"{what}; whether Coriolis forces hold the web is not decided")
         K, C, _ = self._reduced()
         growth = _growth(K, C)
         return Stability(-1, what) if growth > 0.0 else Stability(-1, what, held=True)
@@ -222,31 +225,41 @@ class Question:
 
     def _of_many(self, solver):
         """The same of more unknowns than have all their s found."""
-        from scipy.sparse.linalg import ArpackError
-
-        from .slowest_vibrations import slowest
-
         M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
         if C is not None and self.definite == 1 and self._damps(C, M):
             return Stability(1)
-        if solver is None:
-            solver = Lu(self.rest.pattern)
-            solver.update(self._parts[0] + self._ridge)
-        if not (sign := solver.sign_of_determinant()):
-            return Stability(None, "its tangent is singular to rounding", loose=True)
-        try:
-            slow = slowest(solver, M, C)
-        except ArpackError as error:
-            return Stability(None, f"its slowest vibrations are not found ({error})", loose=True)
+        solver = solver or self._lu
+        slow = self._slowest(solver, C)
+        if slow is None:
+            return Stability(None, "its slowest vibrations are not found", loose=True)
         loose = not self._massive().all() or abs(slow.s).min() ** 2 <= OPEN * TINY * self._fastest(M)
         if slow.grows.any():
             grown = slow.s[slow.grows]
             turns = (abs(grown.imag) > NO_RATE * abs(grown)).all()
             return Stability(-1, _flutter(grown.real.max()) if turns else EIGENVALUE, loose=loose)
-        if sign < 0 and self.definite < 0:
+        if solver.sign_of_determinant() < 0 and self.definite < 0:
             return Stability(-1, EIGENVALUE, loose=loose)
         text = f"the {len(slow.s)} slowest of its vibrations do not grow, the others are too many to be asked"
         return Stability(None, text, loose=loose)
+
+    @property
+    def _lu(self):
+        """LU of K, but for what stiffness counts as none."""
+        solver = Lu(self.rest.pattern)
+        solver.update(self._parts[0] + self._ridge)
+        return solver
+
+    def _slowest(self, solver, C):
+        """The `refweb.statics.slowest_vibrations.Slowest`; None where they are not found."""
+        from scipy.sparse.linalg import ArpackError
+
+        from .slowest_vibrations import slowest
+
+        if solver.singular:
+            return None
+        with contextlib.suppress(ArpackError):
+            return slowest(solver, self.rest.pattern.matrix(self.rest.mass.values), C)
+        return None
 
     def _fastest(self, M):
         """A bound on all |λ|, where everything has mass [1/s²]."""

@@ -340,15 +340,18 @@ class Lu:
 
     def solve(self, b, transposed=False):
         """Solution of A y = b, shape (n,), or of Aᵀ y = b; None where there is none."""
-        if self._solver is None:
+        if self.singular:
             return None
         y = self._solver.solve(b, "T" if transposed else "N")
         return y if np.isfinite(y).all() else None
 
+    @property
+    def singular(self):
+        """Whether a pivot is exactly 0."""
+        return self._solver is None
+
     def sign_of_determinant(self):
-        """Sign of det A, 0 where it is singular."""
-        if self._solver is None:
-            return 0
+        """Sign of det A, of a matrix that is not singular."""
         odd = _is_odd(self._solver.perm_r) != _is_odd(self._solver.perm_c)
         return int(np.prod(np.sign(self._solver.U.diagonal()))) * (-1 if odd else 1)
 
