@@ -349,9 +349,11 @@ MUTANTS = [
         "statics/stability", "0 if self.definite >= 0 else int(_negative", "0 if self.definite >= -1 else int(_negative"
     ),
     Mutant("statics/stability", "-K / scale**2, -C / scale", "-K / scale**2, C / scale"),
-    Mutant("statics/stability", "0.5 * (values + across), 0.5", "values, 0.5"),
-    Mutant("statics/slowest_vibrations", "mu.real > off", "mu.real < off"),
-    Mutant("statics/other_side", "bars & (equilibrium.tension < 0.0)", "bars & (equilibrium.tension < -1e99)"),
+    Mutant("statics/stability", "complex_ = abs(found.imag) > off", "complex_ = abs(found.imag) > 1e99"),
+    Mutant(
+        "statics/slowest_vibrations", "[-self.omega * self._root * self.soft", "[self.omega * self._root * self.soft"
+    ),
+    Mutant("statics/other_side", "< -SHORTER).any()", "> -SHORTER).any()"),
     Mutant(
         "statics/newton",
         "np.abs(state.tension) + stiffness * moved",

@@ -11,7 +11,7 @@ tell how far rounding moves them.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
@@ -30,7 +30,7 @@ NEARLY = 0.1
 class Slowest(NamedTuple):
     """The s of the slowest vibrations [1/s], and which of them grow beyond what rounding makes."""
 
-    s: np.ndarray
+    s: Any
     grows: np.ndarray
 
 
@@ -52,7 +52,7 @@ class Weighed:
         self.massive = np.flatnonzero(own > 0.0)
         self._root, self._size, self._solver = np.sqrt(own[self.massive]), len(own), solver
         self.M = M.tocsr()[self.massive][:, self.massive]
-        self.C = None if C is None else C.tocsr()[self.massive][:, self.massive]
+        self.C: Any = None if C is None else C.tocsr()[self.massive][:, self.massive]
         self.omega = 1.0
 
     def soft(self, force, transposed=False):

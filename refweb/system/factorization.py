@@ -327,7 +327,7 @@ class Lu:
 
     def __init__(self, pattern):
         self.pattern = pattern
-        self._solver = None
+        self._solver: Any = None
 
     def update(self, values, held=None):
         """Factorize the matrix of these values."""
