@@ -82,6 +82,9 @@ MIRRORS = {
     "statics/floating": "statics/test_floating.py",
     "statics/interval": "statics/test_floating.py",
     "statics/lowest": "statics/test_lowest.py",
+    "statics/stability": "statics/test_stability.py",
+    "statics/slowest_vibrations": "statics/test_stability.py",
+    "statics/other_side": "statics/test_stability.py",
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
     "statics": "statics/test_factor_at_hand.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "test_faults.py dynamics/test_accuracy.py",
@@ -342,7 +345,16 @@ MUTANTS = [
     Mutant("statics/lowest", "starts[1] < starts[0] - none", "starts[1] > starts[0] + none"),
     Mutant("results/observables/observable", "/ SHARE * ROUNDING", "/ SHARE * ROUNDING / 27.0"),
     Mutant("statics/smoothing_error", "/ (1.0 - SHARE) for", "* (1.0 - SHARE) for"),
-    Mutant("statics/newton", "((-tiny, 1), (tiny, 0))", "((-tiny, 1), (tiny, -1))"),
+    Mutant("statics/newton", "((-self._tiny, 1), (self._tiny, 0))", "((-self._tiny, 1), (self._tiny, -1))"),
+    Mutant(
+        "statics/stability", "0 if self.definite >= 0 else int(_negative", "0 if self.definite >= -1 else int(_negative"
+    ),
+    Mutant("statics/stability", "-K / scale**2, -C / scale", "-K / scale**2, C / scale"),
+    Mutant("statics/stability", "complex_ = abs(found.imag) > off", "complex_ = abs(found.imag) > 1e99"),
+    Mutant(
+        "statics/slowest_vibrations", "[-self.omega * self._root * self.soft", "[self.omega * self._root * self.soft"
+    ),
+    Mutant("statics/other_side", "< -SHORTER).any()", "> -SHORTER).any()"),
     Mutant(
         "statics/newton",
         "np.abs(state.tension) + stiffness * moved",

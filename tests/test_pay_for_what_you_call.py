@@ -186,6 +186,10 @@ def called(given):
             modules |= TANGENT | {"statics.critical_speed"}
         elif tension_only:
             modules |= TANGENT | {"statics.duality_bound", "statics.floating"}
+        if given["cable"]["law"] == "linear":  # bars, which may snap through
+            modules |= TANGENT | {"statics.other_side"}
+        if not tension_only or given.keys() & {"pressure", "thrust", "frame", "orbit", "contact"}:
+            modules |= TANGENT | {"statics.stability"}  # the energy is not convex
         if given.keys() & {"pressure", "thrust"}:
             modules.add("statics.residual_search")
         elif len(solve.get("load_steps", [1.0])) > 1 and tension_only and not given.keys() & {"body"}:

@@ -156,17 +156,13 @@ class Simulation:
 
     def _settle(self, tell):
         """Begin at the equilibrium."""
-        from ..statics.remarks import remark_on_open
+        from ..statics.remarks import on_stability, remark_on_open
 
         found = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
-        self.begin = Start(found.x)
-        if text := remark_on_open(State(self.system, 0.0, found.x), found):
+        self.begin, there = Start(found.x), State(self.system, 0.0, found.x)
+        if text := remark_on_open(there, found):
             self.solution.warnings.append(f"of the equilibrium it starts from: {text}")
-        if found.stats.get("smallest_pivot") == -1:
-            self.solution.warnings.append(
-                "the equilibrium it starts from is a saddle (a pivot of its tangent is negative): the motion "
-                'leaves it by itself; without a [frame] law = "tension-only" has no such states'
-            )
+        self.solution.warnings += [text for _, text in on_stability(there, found, "the equilibrium it starts from")]
         self.solution.warnings += remarks_on(self.begin, self.system)
         if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
             from ..statics.passage import Passage

@@ -12,6 +12,7 @@ from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.solution import SOLVER, Result
 from ..results.state import State
+from ..system.at_rest import at_rest
 from .remarks import Remarks, open_rows, remarks_on
 
 
@@ -88,6 +89,11 @@ class Simulation:
     def _take(self, found, smoothing):
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        rest = at_rest(self.system)
+        if found.stability is None and not rest.convex:  # of a method that knows no tangents
+            from .stability import ask
+
+            ask(self.system, rest, found)
         if self.system.weakness is not None:
             self._refuse_break(found)
         if self._passage is not None:
