@@ -41,7 +41,8 @@ class Probe(NamedTuple):
     average : float
         Length of a window [s] whose mean is looked at instead of the value, 0 for none.
     family : int
-        Number of the family of the system whose values per cell stand in place of ``data``, −1 for none.
+        Number of the family of the system whose values per cell stand in place of ``data``, or
+        `refweb.system.forces.CONTACT` for all contact with bodies, −1 for none.
     """
 
     kernel: Callable
@@ -162,49 +163,26 @@ def velocity(t, x, v, f, lines, rows, data, where):
     return largest_of(v, data, rows, where)
 
 
-@kernel()
-def _outer(data, n, first, k, x, v, row):
-    """Component k of g + B x + C v at a row; data has g, and then B and C where they are not zero, from ``first``."""
-    outer = data[n, first + k]
-    if data.shape[1] > first + 3:
-        at = first + 3 + 3 * k
-        for i in range(3):
-            outer += data[n, at + i] * x[row, i] + data[n, at + 9 + i] * v[row, i]
-    return outer
-
-
 @kernel(PROBE)
 def reaction(t, x, v, f, lines, rows, data, where):
-    """Component or magnitude of Σ w (g + B x + C v − f) over rows; data holds w, g, B, C, shape (rows, 6 or 24)."""
+    """Component or magnitude of −Σ w f over rows; data holds w, shape (rows, 3)."""
     total0 = total1 = total2 = 0.0
     first = rows[1]
     for n in range(data.shape[0]):
         r = first + n if first >= 0 else rows[3 + n]
-        total0 += data[n, 0] * (_outer(data, n, 3, 0, x, v, r) - f[r, 0])
-        total1 += data[n, 1] * (_outer(data, n, 3, 1, x, v, r) - f[r, 1])
-        total2 += data[n, 2] * (_outer(data, n, 3, 2, x, v, r) - f[r, 2])
+        total0 -= data[n, 0] * f[r, 0]
+        total1 -= data[n, 1] * f[r, 1]
+        total2 -= data[n, 2] * f[r, 2]
     where[0] = first if first >= 0 else rows[3]
-    if rows[0] == MAGNITUDE:
-        return math.sqrt(total0 * total0 + total1 * total1 + total2 * total2)
-    return total0 if rows[0] == 0 else total1 if rows[0] == 1 else total2
+    return component_of(rows[0], total0, total1, total2)
 
 
-@kernel(PROBE)
-def push(t, x, v, f, lines, rows, data, where):
-    """Largest magnitude of g + B x + C v − f over rows, the force of contact on bodies, 0 where it is of rounding.
-
-    data holds g, B, C, shape (rows, 3 or 21).
-    """
-    best = 0.0
-    for n in range(rows.size):
-        square = scale = 0.0
-        for k in range(3):
-            outer, whole = _outer(data, n, 0, k, x, v, rows[n]), f[rows[n], k]
-            square += (outer - whole) ** 2
-            scale += outer * outer + whole * whole
-        if square > 1e-26 * scale:
-            best = max(best, square)
-    return math.sqrt(best)
+@kernel()
+def component_of(component, x, y, z):
+    """Component or magnitude of a vector."""
+    if component == MAGNITUDE:
+        return math.sqrt(x * x + y * y + z * z)
+    return x if component == 0 else y if component == 1 else z
 
 
 @kernel(PROBE)
@@ -246,27 +224,31 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def deepest(t, x, v, f, lines, rows, data, where):
-    """Largest of data, of one column, over some of its rows, (first, last + 1); the place is counted from there.
+    """Largest of the first column of data over ranges of its rows, (first, last + 1, first, ...), 0 where none is above.
 
-    Eight maxima at once take a ninth of the time of one, which waits for itself.
+    The place is counted from the beginning of its range. Eight maxima at once take a ninth of the time of one, which
+    waits for itself.
     """
-    values = data.reshape(-1)[rows[0] : rows[1]]
-    a = b = c = d = e = g = h = i = 0.0
-    whole = values.size // 8 * 8
-    for n in range(0, whole, 8):
-        a, b = _larger(a, values[n]), _larger(b, values[n + 1])
-        c, d = _larger(c, values[n + 2]), _larger(d, values[n + 3])
-        e, g = _larger(e, values[n + 4]), _larger(g, values[n + 5])
-        h, i = _larger(h, values[n + 6]), _larger(i, values[n + 7])
-    for n in range(whole, values.size):
-        a = _larger(a, values[n])
-    best = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
-    if where[1] == PLACE:
-        where[0] = -1
-        for n in range(values.size if best > 0.0 else 0):
-            if values[n] == best:
-                where[0] = n
-                break
+    best, where[0] = 0.0, -1
+    for m in range(0, rows.size, 2):
+        values = data[rows[m] : rows[m + 1]]
+        a = b = c = d = e = g = h = i = 0.0
+        whole = values.shape[0] // 8 * 8
+        for n in range(0, whole, 8):
+            a, b = _larger(a, values[n, 0]), _larger(b, values[n + 1, 0])
+            c, d = _larger(c, values[n + 2, 0]), _larger(d, values[n + 3, 0])
+            e, g = _larger(e, values[n + 4, 0]), _larger(g, values[n + 5, 0])
+            h, i = _larger(h, values[n + 6, 0]), _larger(i, values[n + 7, 0])
+        for n in range(whole, values.shape[0]):
+            a = _larger(a, values[n, 0])
+        most = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
+        if most > best:
+            best = most
+            if where[1] == PLACE:
+                for n in range(values.shape[0]):
+                    if values[n, 0] == most:
+                        where[0] = n
+                        break
     return best
 
 

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..effects.base import OWN
 from ..net.tension_laws import LINEAR, SMOOTH, Law
 
 
@@ -31,13 +32,18 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, 0].copy() for i, f in enumerate(self.system.families) if f.contact}
-        return force, per_cell.tension.copy(), contact
+        return force, per_cell.tension.copy(), per_cell.contact.copy()
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
-        family, cells = self.system.touching(body)
-        return self._forces[2][family][cells]
+        first, last = self.system.contact_rows.lines_on(body)
+        return self._forces[2][first:last, OWN]
+
+    def contact_force(self, body):
+        """Force of all contacts on a body [N], shape (3,)."""
+        from ..system.contact_rows import force_on
+
+        return np.array(force_on(self._forces[2], self.system.contact_rows.acting_on(body).ravel(), 0))
 
     def _by_line(self, values):
         """Largest value over the elements of each line."""
@@ -105,8 +111,7 @@ class State:
         """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
         force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
         for body in self.system.net.bodies:
-            internal = (f for f in self.system.families if f.internal)
-            force[body.row] = sum(self.system.force_of(f, self.time, self.x, self.v)[body.row] for f in internal)
+            force[body.row] = self.contact_force(body)
         return force
 
     @cached_property

@@ -210,7 +210,8 @@ class Room(Record):
         (rows, _), sums = running.x.shape, len(running.work) + 2
         numbers = np.zeros(2, dtype=np.int64), np.zeros(3), np.zeros(3), np.zeros(3)
         vectors = [np.zeros((rows, 3)) for _ in range(4)]
-        inside = Inside.of(rows, model.families.outs[0], running.extremes, sums)
+        losses = [np.empty_like(model.families.outs[i]) for i in model.rubbed.families.tolist()]
+        inside = Inside.of(rows, model.families.outs[0], running.extremes, sums, losses)
         driven, changing = np.empty((len(model.inertia.driven), 7)), np.empty(len(model.reels.lengths))
         return cls(*numbers, driven, *vectors, changing, np.zeros(sums), inside)
 

@@ -348,8 +348,9 @@ class Observed(Record):
 
     @classmethod
     def of(cls, probes, sums, outs):
-        """Probes and sums of a system whose families write ``outs`` per cell."""
-        numbers = [outs[p.family] if p.family >= 0 else np.ascontiguousarray(p.data, dtype=float) for p in probes]
+        """Probes and sums of a system whose families write ``outs`` per cell, a `refweb.system.forces.PerCell`."""
+        numbers = [np.ascontiguousarray(p.data, dtype=float) if p.family == -1 else outs.of(p.family) for p in probes]
+        shown = [i for number in {p.family for p in probes} - {-1} for i in outs.families_of(number)]
         windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
         signs[windows.slots] = 0.0
         plain = [plain_of(probe) for probe in probes]
@@ -361,7 +362,7 @@ class Observed(Record):
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
-            shown=np.unique([probe.family for probe in probes if probe.family >= 0]).astype(np.int64),
+            shown=np.unique(shown).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
         )

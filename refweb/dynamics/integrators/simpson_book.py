@@ -178,7 +178,7 @@ class SimpsonBook:
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return Sample(t, x, v, force, out.lines.copy(), power, {i: out[i].copy() for i in self._shown})
+        return Sample(t, x, v, force, out.lines.copy(), power, {i: out.of(i).copy() for i in self._shown})
 
     def refuse_endless(self, t, force):
         """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""

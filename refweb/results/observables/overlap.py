@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...effects.base import pairs_of
 from ...errors import InputError
+from ...system.forces import CONTACT
 from .observable import Observable, Value
 
 
@@ -31,7 +33,7 @@ class Overlap(Observable):
         return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
 
     def probe(self, system):
-        """Of what the family of its contact shows."""
+        """Of what its contacts show."""
         return probe_of(system, self.body(system.net))
 
     def place(self, system, at):
@@ -41,21 +43,26 @@ class Overlap(Observable):
 
 def probe_of(system, body):
     """The `refweb.results.probes.Probe` of the deepest contact of a body."""
+    return _deepest_in([system.contact_rows.lines_on(body)])
+
+
+def _deepest_in(ranges):
+    """The probe of the deepest contact in ranges of `refweb.system.contact_rows.ContactRows`."""
     from ..probes import Probe, deepest
 
-    family, cells = system.touching(body)
-    return Probe(deepest, [cells.start, cells.stop], np.zeros((1, 1)), family=family)
+    return Probe(deepest, np.ravel(ranges), np.zeros((0, 0)), family=CONTACT)
 
 
 def probes_between(system):
     """Probes of the deepest contact of each pair of bodies, by name."""
-    from ..probes import Probe, deepest
+    pairs = [system.contact_rows.between(one, [other]) for one, other in pairs_of(system)]
+    return {("between", k): _deepest_in(ranges)._replace(sign=1.0) for k, ranges in enumerate(pairs)}
 
-    cells = [(i, n) for i, family in enumerate(system.families) for n in range(len(family.pairs))]
-    return {
-        ("between", k): Probe(deepest, [n, n + 1], np.zeros((1, 1)), sign=1.0, family=i)
-        for k, (i, n) in enumerate(cells)
-    }
+
+def probe_of_touch(system, body, other):
+    """The probe of the deepest contact of a body, None for any, with the web, or with another body."""
+    bodies, rows = [body] if body is not None else system.net.bodies, system.contact_rows
+    return _deepest_in(rows.with_web(bodies) if other is None else rows.between(other, bodies))
 
 
 def probe_of_speed(system):
