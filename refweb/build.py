@@ -279,7 +279,7 @@ def _check_touch(event, system):
     if event.with_ not in bodies:
         raise InputError(f"with = {shown(event.with_)} is no body and not the web, {nearest(event.with_, [*bodies, 'web'])}")
     others = [bodies[event.body]] if event.body else list(bodies.values())
-    if not system.contact_rows.between(bodies[event.with_], others):
+    if not system.contact_forces.pair_rows(bodies[event.with_], others):
         what = "another body" if event.body is None else f"body {shown(event.body)}"
         raise InputError(
             f"with = {shown(event.with_)} does not touch {what}: it takes two bodies, one of them free, and "

@@ -42,7 +42,7 @@ class Probe(NamedTuple):
         Length of a window [s] whose mean is looked at instead of the value, 0 for none.
     family : int
         Number of the family of the system whose values per cell stand in place of ``data``, or
-        `refweb.system.forces.CONTACT` for all contact with bodies, −1 for none.
+        `refweb.system.contact_forces.CONTACT` for what bodies feel of contact, −1 for none.
     """
 
     kernel: Callable
@@ -224,31 +224,27 @@ def slack_fraction(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def deepest(t, x, v, f, lines, rows, data, where):
-    """Largest of the first column of data over ranges of its rows, (first, last + 1, first, ...), 0 where none is above.
+    """Largest of data, of one column, over some of its rows, (first, last + 1); the place is counted from there.
 
-    The place is counted from the beginning of its range. Eight maxima at once take a ninth of the time of one, which
-    waits for itself.
+    Eight maxima at once take a ninth of the time of one, which waits for itself.
     """
-    best, where[0] = 0.0, -1
-    for m in range(0, rows.size, 2):
-        values = data[rows[m] : rows[m + 1]]
-        a = b = c = d = e = g = h = i = 0.0
-        whole = values.shape[0] // 8 * 8
-        for n in range(0, whole, 8):
-            a, b = _larger(a, values[n, 0]), _larger(b, values[n + 1, 0])
-            c, d = _larger(c, values[n + 2, 0]), _larger(d, values[n + 3, 0])
-            e, g = _larger(e, values[n + 4, 0]), _larger(g, values[n + 5, 0])
-            h, i = _larger(h, values[n + 6, 0]), _larger(i, values[n + 7, 0])
-        for n in range(whole, values.shape[0]):
-            a = _larger(a, values[n, 0])
-        most = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
-        if most > best:
-            best = most
-            if where[1] == PLACE:
-                for n in range(values.shape[0]):
-                    if values[n, 0] == most:
-                        where[0] = n
-                        break
+    values = data.reshape(-1)[rows[0] : rows[1]]
+    a = b = c = d = e = g = h = i = 0.0
+    whole = values.size // 8 * 8
+    for n in range(0, whole, 8):
+        a, b = _larger(a, values[n]), _larger(b, values[n + 1])
+        c, d = _larger(c, values[n + 2]), _larger(d, values[n + 3])
+        e, g = _larger(e, values[n + 4]), _larger(g, values[n + 5])
+        h, i = _larger(h, values[n + 6]), _larger(i, values[n + 7])
+    for n in range(whole, values.size):
+        a = _larger(a, values[n])
+    best = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
+    if where[1] == PLACE:
+        where[0] = -1
+        for n in range(values.size if best > 0.0 else 0):
+            if values[n] == best:
+                where[0] = n
+                break
     return best
 
 

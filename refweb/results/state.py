@@ -32,18 +32,14 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        return force, per_cell.tension.copy(), per_cell.contact.copy()
+        contact = {i: per_cell[i][:, OWN].copy() for i, f in enumerate(self.system.families) if f.contact}
+        felt = self.system.contact_forces.of(per_cell) if self.system.net.bodies else None
+        return force, per_cell.tension.copy(), contact, felt
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
-        first, last = self.system.contact_rows.lines_on(body)
-        return self._forces[2][first:last, OWN]
-
-    def contact_force(self, body):
-        """Force of all contacts on a body [N], shape (3,)."""
-        from ..system.contact_rows import force_on
-
-        return np.array(force_on(self._forces[2], self.system.contact_rows.acting_on(body).ravel(), 0))
+        family, cells = self.system.touching(body)
+        return self._forces[2][family][cells]
 
     def _by_line(self, values):
         """Largest value over the elements of each line."""
@@ -110,8 +106,8 @@ class State:
     def reaction(self):
         """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
         force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
-        for body in self.system.net.bodies:
-            force[body.row] = self.contact_force(body)
+        if bodies := self.system.net.bodies:
+            force[[body.row for body in bodies]] = self.system.contact_forces.force_on(bodies, self._forces[3])
         return force
 
     @cached_property

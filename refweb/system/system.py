@@ -175,8 +175,9 @@ class System:
         return found(self)
 
     def per_cell(self):
-        """`PerCell` of new arrays."""
-        return PerCell(self.families, len(self.net.cells))
+        """`PerCell` of new arrays; those of families over the lines are one."""
+        lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.lines)])))
+        return PerCell([lines if f.lines else np.zeros((len(f.cells), f.observed)) for f in self.families], lines)
 
     @property
     def working(self):
@@ -360,12 +361,21 @@ class System:
         """Whether the web may touch bodies."""
         return any(family.contact for family in self.families)
 
-    @cached_property
-    def contact_rows(self):
-        """The `refweb.system.contact_rows.ContactRows` of `PerCell.contact`."""
-        from .contact_rows import ContactRows
+    def touching(self, body):
+        """(number of the family, slice of its cells) whose penalty is of a body; the cells are in order of elements."""
+        for i, family in enumerate(self.families):
+            if family.contact and family.energy is not None:
+                own = np.flatnonzero(family.cells[:, self.net.order + 1] == body.row)
+                if len(own):
+                    return i, slice(int(own[0]), int(own[-1]) + 1)
+        raise ValueError(f'nothing touches body "{body.name}"')
 
-        return ContactRows(self.families)
+    @cached_property
+    def contact_forces(self):
+        """The `refweb.system.contact_forces.ContactForces` on its bodies."""
+        from .contact_forces import ContactForces
+
+        return ContactForces(self)
 
     @property
     def rotating(self):

@@ -30,6 +30,7 @@ from ...kernels import (
 )
 from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
+from .contacts import feel
 from .energy_book import book_energies, own_energy
 from .extremes import EDGE, Extremes, correction, look, look_at, look_at_sums, take_over, time_of_top
 from .nearby import show_near
@@ -148,6 +149,8 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     hand_on(x, f, model.inertia.turns)
     if model.nearby.families.size:
         show_near(model.nearby, families)
+    if model.contacts.families.shape[0]:
+        feel(model.contacts, families)
 
 
 @kernel(apart=("watched", "kicks"))
@@ -205,7 +208,7 @@ def exchange_losses(keep: bool, inside: Inside, model: Model) -> None:
 def show_again(now: float, inside: Inside, model: Model, observed: Observed, running: Running) -> None:
     """Write natural lengths, and what families show that probes read, of the end of a step over that of its inside.
 
-    Losses that kicks are solved for are those of the step, see `keep_losses`.
+    Losses that kicks are solved for are those of the step, see `exchange_losses`.
     """
     families = model.families
     if model.reels.lengths.size:
@@ -219,6 +222,8 @@ def show_again(now: float, inside: Inside, model: Model, observed: Observed, run
         exchange_losses(False, inside, model)
     if model.nearby.families.size:
         show_near(model.nearby, families)
+    if model.contacts.families.shape[0]:
+        feel(model.contacts, families)
 
 
 @kernel(apart=("watched",))

@@ -19,6 +19,7 @@ from ...net.rotation_bounds import fastest_point, hardest_push
 from ...results.probes import PLACE
 from .averages import average, look_for_means
 from .between_steps import Inside, look_at_books, look_at_tops, look_back, look_inside, show_again
+from .contacts import feel
 from .energy_book import (
     act,
     begin_powers,
@@ -242,6 +243,7 @@ def step_on(
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
     guarded, moves = model.guard.families.size + model.walls.families.size > 0, driven.size + len(motions.kernels) > 0
+    touched = model.contacts.families.shape[0] > 0
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -274,6 +276,8 @@ def step_on(
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
+        if touched:
+            feel(model.contacts, families)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, families)
         book_motion(driven, mass, x, v, f, before, work)
@@ -449,6 +453,8 @@ def begin(
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
     hand_on(x, f, model.inertia.turns)
+    if model.contacts.families.shape[0]:
+        feel(model.contacts, families)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE
         extremes.values[i] = observed.probes[i](

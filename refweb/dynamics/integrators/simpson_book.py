@@ -16,6 +16,7 @@ import numpy as np
 from ...errors import NoEnd, OpenBook
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import Turns, more_kinetic
+from ...system.contact_forces import CONTACT
 from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
 from .momentum_book import Outside, note_momentum, open_ledger
 
@@ -178,7 +179,11 @@ class SimpsonBook:
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return Sample(t, x, v, force, out.lines.copy(), power, {i: out.of(i).copy() for i in self._shown})
+        return Sample(t, x, v, force, out.lines.copy(), power, {i: self._show(out, i) for i in self._shown})
+
+    def _show(self, out, number):
+        """What probes read of families that show ``out``."""
+        return self.system.contact_forces.of(out) if number == CONTACT else out[number].copy()
 
     def refuse_endless(self, t, force):
         """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""

@@ -6,7 +6,9 @@ import numpy as np
 
 from ...effects.base import pairs_of
 from ...errors import InputError
-from ...system.forces import CONTACT
+from ...kernels import kernel
+from ...system.contact_forces import CONTACT, DEPTH, PLACE
+from ..probes import PROBE, Probe
 from .observable import Observable, Value
 
 
@@ -33,7 +35,7 @@ class Overlap(Observable):
         return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
 
     def probe(self, system):
-        """Of what its contacts show."""
+        """Of what its body feels."""
         return probe_of(system, self.body(system.net))
 
     def place(self, system, at):
@@ -43,31 +45,38 @@ class Overlap(Observable):
 
 def probe_of(system, body):
     """The `refweb.results.probes.Probe` of the deepest contact of a body."""
-    return _deepest_in([system.contact_rows.lines_on(body)])
+    return _deepest_of([system.contact_forces.row(body)])
 
 
-def _deepest_in(ranges):
-    """The probe of the deepest contact in ranges of `refweb.system.contact_rows.ContactRows`."""
-    from ..probes import Probe, deepest
-
-    return Probe(deepest, np.ravel(ranges), np.zeros((0, 0)), family=CONTACT)
+def _deepest_of(rows):
+    return Probe(depth, rows, np.zeros((0, 0)), family=CONTACT)
 
 
 def probes_between(system):
     """Probes of the deepest contact of each pair of bodies, by name."""
-    pairs = [system.contact_rows.between(one, [other]) for one, other in pairs_of(system)]
-    return {("between", k): _deepest_in(ranges)._replace(sign=1.0) for k, ranges in enumerate(pairs)}
+    pairs = [system.contact_forces.pair_rows(one, [other]) for one, other in pairs_of(system)]
+    return {("between", k): _deepest_of(rows)._replace(sign=1.0) for k, rows in enumerate(pairs)}
 
 
 def probe_of_touch(system, body, other):
     """The probe of the deepest contact of a body, None for any, with the web, or with another body."""
-    bodies, rows = [body] if body is not None else system.net.bodies, system.contact_rows
-    return _deepest_in(rows.with_web(bodies) if other is None else rows.between(other, bodies))
+    bodies, forces = system.net.bodies if body is None else [body], system.contact_forces
+    return _deepest_of([forces.row(one) for one in bodies] if other is None else forces.pair_rows(other, bodies))
+
+
+@kernel(PROBE)
+def depth(t, x, v, f, lines, rows, data, where):
+    """Largest depth among what some bodies or pairs feel, 0 where nothing touches; ``rows`` are those of data."""
+    deepest, where[0] = 0.0, -1
+    for r in rows:
+        if data[r, DEPTH] > deepest:
+            deepest, where[0] = data[r, DEPTH], int(data[r, PLACE])
+    return deepest
 
 
 def probe_of_speed(system):
     """Probe of the largest speed of a point of a body."""
-    from ..probes import Probe, surface_speed
+    from ..probes import surface_speed
 
     rows, reach = [], []
     for body in system.net.bodies:

@@ -1,8 +1,7 @@
 """Reactions: the force of supports on nodes, of several nodes their sum, and the force of contact on a body.
 
-A kernel has the whole force f on each row, and what supports add to it is −f. What contact adds to a body is the sum
-over what its contacts show, see `refweb.system.contact_rows`: a body that nothing touches feels none, whatever else acts
-on it.
+A kernel has the whole force f on each row, and what supports add to it is −f. What contact adds to a body is the
+sum over its contacts, see `refweb.system.contact_forces`: where nothing touches it that is zero, whatever else acts.
 """
 
 from __future__ import annotations
@@ -10,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...kernels import kernel
-from ...system.contact_rows import force_on
-from ...system.forces import CONTACT
+from ...system.contact_forces import CONTACT, FORCE
 from ..probes import PROBE, Probe, component_of, reaction
 from .nodal import Nodal
 from .observable import Value
@@ -38,13 +36,12 @@ class Reaction(Nodal):
         numbers = self.numbers(rows)
         if self.observe.body is None:
             return Probe(reaction, numbers, np.where(system.supported[rows], 1.0, 0.0))
-        ranges = system.contact_rows.acting_on(self.body(system.net))
-        return Probe(contact, [numbers[0], *ranges.ravel()], np.zeros((0, 0)), family=CONTACT)
+        row = system.contact_forces.row(self.body(system.net))
+        return Probe(contact, [numbers[0], row], np.zeros((0, 0)), family=CONTACT)
 
 
 @kernel(PROBE)
 def contact(t, x, v, f, lines, rows, data, where):
-    """Component or magnitude of the force of contact on a body; ``rows`` is (component, first, last + 1, sign, ...)."""
-    x0, x1, x2 = force_on(data, rows, 1)
-    where[0] = -1
-    return component_of(rows[0], x0, x1, x2)
+    """Component or magnitude of the force of contact on a body; ``rows`` is (component, row of data)."""
+    where[0], r = -1, rows[1]
+    return component_of(rows[0], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2])
