@@ -277,7 +277,9 @@ def _check_touch(event, system):
     if event.with_ in (None, "web"):
         return
     if event.with_ not in bodies:
-        raise InputError(f"with = {shown(event.with_)} is no body and not the web, {nearest(event.with_, [*bodies, 'web'])}")
+        raise InputError(
+            f"with = {shown(event.with_)} is not a body or the web, {nearest(event.with_, ['web', *bodies])}"
+        )
     others = [bodies[event.body]] if event.body else list(bodies.values())
     if not system.contact_forces.pair_rows(bodies[event.with_], others):
         what = "another body" if event.body is None else f"body {shown(event.body)}"

@@ -291,7 +291,7 @@ def by_group(kind, where, *, default_factory=dict) -> Any:
 
 
 def key_of(f):
-    """Key of a field in scenes: its name, without the ``_`` behind a word that Python keeps for itself."""
+    """Key of a field in scenes: its name, without the ``_`` behind a word of Python's own."""
     return f.name.removesuffix("_")
 
 
@@ -331,22 +331,19 @@ def refuse_keys(cls, given):
 def table(cls):
     """Make a frozen dataclass of keywords alone, which names the nearest key where one is misspelt.
 
-    A key that is a word of Python has a field with a ``_`` behind it, and Python may write either.
-
     Raises
     ------
     InputError
         From the class, where a key is unknown or missing.
     """
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-    own, names = made.__init__, {key_of(f): f.name for f in dataclasses.fields(made)}
-    keys = {name: key for key, name in names.items()}
+    own, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
 
     @functools.wraps(own)
     def __init__(self, **given):
         given = {keys.get(name, name): value for name, value in given.items()}
         refuse_keys(made, given)
-        own(self, **{names.get(key, key): value for key, value in given.items()})
+        own(self, **{f"{key}_" if f"{key}_" in keys else key: value for key, value in given.items()})
 
     made.__init__ = __init__
     return made
@@ -400,5 +397,4 @@ class Table:
                 return {k: plain(x) for k, x in value.items()}
             return value
 
-        pairs = ((key_of(f), getattr(self, f.name)) for f in dataclasses.fields(self))
-        return {name: plain(value) for name, value in pairs if value is not None}
+        return {key_of(f): plain(v) for f in dataclasses.fields(self) if (v := getattr(self, f.name)) is not None}

@@ -191,7 +191,7 @@ def remembering(along, push_apart):
 
     @kernel(GIVE)
     def give(number, memory, v, touches, begin, end, out):
-        """Write the power of each cell at the velocities v, and what is felt of it where it shows that; remember forces."""
+        """Write the power of each cell at the velocities v, with the force that a body feels; remember forces."""
         out[:] = 0.0
         for n in range(begin, end):
             c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])

@@ -83,8 +83,8 @@ class Inside(Record):
         """Space for a number of rows, what lines show, the extremes of a run, a number of energies, and ``losses``."""
         space = np.empty((5, 3, rows, 3))
         alone = replace(extremes, recent=np.empty_like(extremes.recent), looked=np.empty_like(extremes.looked))
-        where = np.zeros(2, dtype=np.int64)
-        return cls(space[0], space[1], space[2:], np.empty_like(lines), alone, where, np.empty(sums), Arrays(MATRIX, losses))
+        more = np.zeros(2, dtype=np.int64), np.empty(sums), Arrays(MATRIX, losses)
+        return cls(space[0], space[1], space[2:], np.empty_like(lines), alone, *more)
 
 
 @kernel(apart=("books",))

@@ -243,7 +243,6 @@ def step_on(
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
     guarded, moves = model.guard.families.size + model.walls.families.size > 0, driven.size + len(motions.kernels) > 0
-    touched = model.contacts.families.shape[0] > 0
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -276,7 +275,7 @@ def step_on(
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
-        if touched:
+        if model.contacts.families.shape[0]:
             feel(model.contacts, families)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, families)

@@ -70,7 +70,7 @@ def add_push(f, cells, data, c, contacts, n, size):
 
 @functools.cache
 def force_of(space_of, add_forces):
-    """Kernel of the forces of all pairs, see `slopes_of`; each shows what ``add_forces`` returns, a number and a force."""
+    """Kernel of the forces of all pairs, see `slopes_of`; each shows what ``add_forces`` returns."""
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
