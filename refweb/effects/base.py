@@ -34,6 +34,11 @@ CELL = 0
 OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
 """Columns of what families of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
 a loss; the first of three of the force on the body that `Family.felt` names [N]; and their number."""
+CONTACT = -2
+"""Number that stands, in place of that of a family, for what bodies feel of contact."""
+DEPTH, FORCE, ELEMENT, FELT_COLUMNS = 0, 1, 4, 5
+"""Columns of that: the largest depth of lines in a body, or that of a pair of bodies [m]; the first of three of the
+force on the body [N]; the element of that depth, −1 where nothing touches; and their number."""
 
 
 class Rubbing(NamedTuple):

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
+from ..effects.base import DEPTH, ELEMENT, FORCE
 from ..kernels import INTEGERS, MATRIX, kernel
 
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
@@ -42,7 +43,7 @@ class Probe(NamedTuple):
         Length of a window [s] whose mean is looked at instead of the value, 0 for none.
     family : int
         Number of the family of the system whose values per cell stand in place of ``data``, or
-        `refweb.system.contact_forces.CONTACT` for what bodies feel of contact, −1 for none.
+        `refweb.effects.base.CONTACT` for what bodies feel of contact, −1 for none.
     """
 
     kernel: Callable
@@ -175,6 +176,23 @@ def reaction(t, x, v, f, lines, rows, data, where):
         total2 -= data[n, 2] * f[r, 2]
     where[0] = first if first >= 0 else rows[3]
     return component_of(rows[0], total0, total1, total2)
+
+
+@kernel(PROBE)
+def contact_force(t, x, v, f, lines, rows, data, where):
+    """Component or magnitude of the force of contact on a body; ``rows`` is (component, row of what bodies feel)."""
+    where[0], r = -1, rows[1]
+    return component_of(rows[0], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2])
+
+
+@kernel(PROBE)
+def contact_depth(t, x, v, f, lines, rows, data, where):
+    """Largest depth in some rows of what bodies feel, 0 where nothing touches."""
+    deepest, where[0] = 0.0, -1
+    for r in rows:
+        if data[r, DEPTH] > deepest:
+            deepest, where[0] = data[r, DEPTH], int(data[r, ELEMENT])
+    return deepest
 
 
 @kernel()

@@ -33,12 +33,12 @@ class State:
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
         contact = {i: per_cell[i][:, OWN].copy() for i, f in enumerate(self.system.families) if f.contact}
-        felt = self.system.contact_forces.of(per_cell) if self.system.net.bodies else None
+        felt = self.system.contact_forces.of(per_cell) if any(f.felt for f in self.system.families) else None
         return force, per_cell.tension.copy(), contact, felt
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
-        family, cells = self.system.touching(body)
+        family, cells = self.system.contact_forces.lines_on(body)
         return self._forces[2][family][cells]
 
     def _by_line(self, values):
@@ -106,8 +106,9 @@ class State:
     def reaction(self):
         """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
         force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
-        if bodies := self.system.net.bodies:
-            force[[body.row for body in bodies]] = self.system.contact_forces.force_on(bodies, self._forces[3])
+        felt = self._forces[3]
+        for body in self.system.net.bodies:
+            force[body.row] = 0.0 if felt is None else self.system.contact_forces.force_on(body, felt)
         return force
 
     @cached_property

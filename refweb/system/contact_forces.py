@@ -10,14 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.base import FELT, OWN, pairs_of
+from ..effects.base import DEPTH, ELEMENT, FELT, FELT_COLUMNS, FORCE, OWN, pairs_of
 from ..kernels import kernel
 
-CONTACT = -2
-"""Number that stands, in place of that of a family, for what bodies feel."""
-DEPTH, FORCE, PLACE, COLUMNS = 0, 1, 4, 5
-"""Columns of what bodies feel: the largest depth of lines [m], or of a pair; the first of three of the force [N]; the
-element of that depth, −1 where nothing touches; and their number."""
 FAMILY, BODY, OTHER, ELEMENTS, PAIRS, CHOSEN = range(6)
 """Columns of what is known of a family of contact: its number; columns of its cells with the row of the body that it
 touches, and of the other one or −1; the number of elements where it is the push of lines, else 0; the row of the depth
@@ -61,9 +56,17 @@ class ContactForces:
         """Number of the row of a body."""
         return body.row - self.first
 
-    def force_on(self, bodies, felt):
-        """Force of contact on some bodies [N], shape (bodies, 3)."""
-        return felt[[self.row(body) for body in bodies], FORCE : FORCE + 3]
+    def force_on(self, body, felt):
+        """Force of contact on a body [N], shape (3,), of what bodies feel."""
+        return felt[self.row(body), FORCE : FORCE + 3]
+
+    def lines_on(self, body):
+        """(number of the family, slice of its cells) of the push of lines on a body; cells are in order of elements."""
+        for known in self.families:
+            own = np.flatnonzero(self._cells[known[FAMILY]][:, known[BODY]] == body.row)
+            if known[ELEMENTS] and len(own):
+                return int(known[FAMILY]), slice(int(own[0]), int(own[-1]) + 1)
+        raise ValueError(f'nothing touches body "{body.name}"')
 
     def pair_rows(self, one, others):
         """Numbers of the rows of the pairs that a body makes with some others, a list."""
@@ -71,8 +74,8 @@ class ContactForces:
         return [row for row in found if row is not None]
 
     def of(self, per_cell):
-        """What bodies feel where families show ``per_cell``, shape (rows, `COLUMNS`)."""
-        felt = np.empty((self.rows, COLUMNS))
+        """What bodies feel where families show ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
+        felt = np.empty((self.rows, FELT_COLUMNS))
         forget(felt)
         none = np.empty((0, 1), dtype=np.int32)
         for known in self.families:
@@ -85,9 +88,9 @@ class ContactForces:
 def forget(felt):
     """Begin with no contact."""
     for r in range(felt.shape[0]):
-        for k in range(PLACE):
+        for k in range(ELEMENT):
             felt[r, k] = 0.0
-        felt[r, PLACE] = -1.0
+        felt[r, ELEMENT] = -1.0
 
 
 @kernel(leaf=True)
@@ -107,6 +110,6 @@ def add_felt(first, known, cells, chosen, out, felt):
             felt[other, FORCE + 1] -= y
             felt[other, FORCE + 2] -= z
         if known[ELEMENTS] > 0 and own > felt[body, DEPTH]:
-            felt[body, DEPTH], felt[body, PLACE] = own, float(cell % known[ELEMENTS])
+            felt[body, DEPTH], felt[body, ELEMENT] = own, float(cell % known[ELEMENTS])
         if known[PAIRS] >= 0:
             felt[known[PAIRS] + cell, DEPTH] = own

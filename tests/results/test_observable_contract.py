@@ -11,12 +11,12 @@ import pytest
 from nets import LAWS, skew_net
 
 import refweb
+from refweb.effects.base import CONTACT
 from refweb.effects.elasticity import Elasticity
 from refweb.errors import InputError
 from refweb.registry import OBSERVABLES
 from refweb.results.probes import PLACE
 from refweb.results.state import State
-from refweb.system.contact_forces import CONTACT
 from refweb.system.system import System
 
 BODIES = (

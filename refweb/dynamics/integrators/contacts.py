@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.base import FELT_COLUMNS
 from ...kernels import Indices, IntegerMatrix, Matrix, Record, kernel
-from ...system.contact_forces import CHOSEN, COLUMNS, FAMILY, add_felt, forget
+from ...system.contact_forces import CHOSEN, FAMILY, add_felt, forget
 from .nearby import near_of
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class Contacts(Record):
         for known in families:
             if known[FAMILY] in near:
                 known[CHOSEN] = len(system.families) + len(near) + near.index(known[FAMILY])
-        return cls(families, np.zeros((forces.rows, COLUMNS)), forces.first, np.empty((0, 1), dtype=np.int32))
+        return cls(families, np.zeros((forces.rows, FELT_COLUMNS)), forces.first, np.empty((0, 1), dtype=np.int32))
 
 
 @kernel(leaf=True, apart=("contacts",))

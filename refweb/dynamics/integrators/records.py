@@ -13,6 +13,7 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
+from ...effects.base import CONTACT
 from ...kernels import (
     INDICES,
     INTEGERS,
@@ -38,7 +39,7 @@ from ...kernels import (
 )
 from ...net.rotation import Turns
 from ...results.probes import PROBE, plain_of
-from ...system.contact_forces import CONTACT, FAMILY
+from ...system.contact_forces import FAMILY
 from .averages import Averages, Windows
 from .contacts import Contacts
 from .energy_book import no_energy

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...effects.base import CONTACT
 from ...errors import NoEnd, OpenBook
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import Turns, more_kinetic
-from ...system.contact_forces import CONTACT
 from .energy_book import CLOSING, DRIFT, book_energies, least_energy, no_energy
 from .momentum_book import Outside, note_momentum, open_ledger
 

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...effects.base import pairs_of
+from ...effects.base import CONTACT, pairs_of
 from ...errors import InputError
-from ...kernels import kernel
-from ...system.contact_forces import CONTACT, DEPTH, PLACE
-from ..probes import PROBE, Probe
 from .observable import Observable, Value
 
 
@@ -49,7 +46,9 @@ def probe_of(system, body):
 
 
 def _deepest_of(rows):
-    return Probe(depth, rows, np.zeros((0, 0)), family=CONTACT)
+    from ..probes import Probe, contact_depth
+
+    return Probe(contact_depth, rows, np.zeros((0, 0)), family=CONTACT)
 
 
 def probes_between(system):
@@ -64,19 +63,9 @@ def probe_of_touch(system, body, other):
     return _deepest_of([forces.row(one) for one in bodies] if other is None else forces.pair_rows(other, bodies))
 
 
-@kernel(PROBE)
-def depth(t, x, v, f, lines, rows, data, where):
-    """Largest depth among what some bodies or pairs feel, 0 where nothing touches; ``rows`` are those of data."""
-    deepest, where[0] = 0.0, -1
-    for r in rows:
-        if data[r, DEPTH] > deepest:
-            deepest, where[0] = data[r, DEPTH], int(data[r, PLACE])
-    return deepest
-
-
 def probe_of_speed(system):
     """Probe of the largest speed of a point of a body."""
-    from ..probes import surface_speed
+    from ..probes import Probe, surface_speed
 
     rows, reach = [], []
     for body in system.net.bodies:

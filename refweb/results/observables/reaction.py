@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kernels import kernel
-from ...system.contact_forces import CONTACT, FORCE
-from ..probes import PROBE, Probe, component_of, reaction
+from ...effects.base import CONTACT
 from .nodal import Nodal
 from .observable import Value
 
@@ -32,16 +30,11 @@ class Reaction(Nodal):
 
     def probe(self, system):
         """Of what is supported on nodes, of all that contact does to a body."""
+        from ..probes import Probe, contact_force, reaction
+
         rows = self.rows(system)
         numbers = self.numbers(rows)
         if self.observe.body is None:
             return Probe(reaction, numbers, np.where(system.supported[rows], 1.0, 0.0))
         row = system.contact_forces.row(self.body(system.net))
-        return Probe(contact, [numbers[0], row], np.zeros((0, 0)), family=CONTACT)
-
-
-@kernel(PROBE)
-def contact(t, x, v, f, lines, rows, data, where):
-    """Component or magnitude of the force of contact on a body; ``rows`` is (component, row of data)."""
-    where[0], r = -1, rows[1]
-    return component_of(rows[0], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2])
+        return Probe(contact_force, [numbers[0], row], np.zeros((0, 0)), family=CONTACT)
