@@ -257,15 +257,7 @@ def _check_event(event, earlier, observables, system):
     if event.kind == "contact":
         if not system.contact:
             raise InputError('kind = "contact" needs a [contact] in the scene')
-        bodies = [body.name for body in system.net.bodies]
-        pulled = [b.name for b in system.net.bodies if b.carried and not b.fixed and event.body in (None, b.name)]
-        for name in pulled:
-            raise InputError(
-                f'kind = "contact" does not tell what touches body "{name}" from what the nodes of [[attach]] pull at '
-                'it with: use kind = "threshold" and an observable of quantity = "overlap"'
-            )
-        if event.body is not None and event.body not in bodies:
-            raise InputError(f"body = {shown(event.body)} is not a body, {nearest(event.body, bodies)}")
+        _check_touch(event, system)
     if event.kind == "taut":
         _check_taut(event, system.net)
     if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
@@ -274,6 +266,26 @@ def _check_event(event, earlier, observables, system):
         raise InputError(
             f"observe = {shown(event.observe)} is a mean, average = {average:g}, and events are found by values of an "
             "instant: name an observable without average"
+        )
+
+
+def _check_touch(event, system):
+    """Refuse bodies that the scene does not have, and such as do not touch each other."""
+    bodies = {body.name: body for body in system.net.bodies}
+    if event.body is not None and event.body not in bodies:
+        raise InputError(f"body = {shown(event.body)} is not a body, {nearest(event.body, bodies)}")
+    if event.with_ in (None, "web"):
+        return
+    if event.with_ not in bodies:
+        raise InputError(
+            f"with = {shown(event.with_)} is not a body or the web, {nearest(event.with_, ['web', *bodies])}"
+        )
+    others = [bodies[event.body]] if event.body else list(bodies.values())
+    if not system.contact_forces.pair_rows(bodies[event.with_], others):
+        what = "another body" if event.body is None else f"body {shown(event.body)}"
+        raise InputError(
+            f"with = {shown(event.with_)} does not touch {what}: it takes two bodies, one of them free, and "
+            "between_bodies = true in [contact]"
         )
 
 

@@ -23,7 +23,7 @@ all its digits, which it loses when positions are the unknowns.
 `SWEEP`        ``(h, number, f, inverse, touches, count)``: solves contacts one after the other and adds what their
                forces change by to f; the largest change of a velocity in a kick [m/s]
 `GIVE`         ``(number, memory, v, touches, begin, end, out)``: notes forces in the ``memory`` of a step, and writes
-               the power of each cell to ``out`` [W]
+               the power of each cell to ``out`` [W], with the force that a body feels [N] where families show it
 `NEAR`         ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come nearer
                by ``skin`` [m] to ``chosen``; their number
 `MEETS`        ``(room, way, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come nearer

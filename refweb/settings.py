@@ -203,10 +203,13 @@ class Event(Table):
     name : str
         Its name.
     kind : {"contact", "taut", "threshold"}
-        A body first touches the web; a line that is slack snaps taut, of several slack ones the first; an observable
-        passes a value, either way: one that comes back within the same step may not be seen.
+        A body first touches the web, or another body; a line that is slack snaps taut, of several slack ones the
+        first; an observable passes a value, either way: one that comes back within the same step may not be seen.
     body : str, optional
         Body of a contact, by default any.
+    with : str, optional
+        What the body touches: "web", which is the default, or the name of another body, with ``between_bodies = true``
+        in ``[contact]``. They touch where they overlap, at t = 0 if they do so at once.
     line : int, str or list, optional
         Lines, by number or group, see `refweb.net.groups`, of which the first to become taut counts.
     observe : str, optional
@@ -221,7 +224,8 @@ class Event(Table):
     InputError
         Where the line of "taut", or the observable or value of "threshold", is missing, and for a key of another kind;
         from `Scene.build`, for a body, line or observable that the scene does not have, lines of different slackness,
-        "contact" without a contact, and two events of one name.
+        "contact" without a contact, with a body that does not touch bodies or none but itself, and two events of one
+        name.
 
     Examples
     --------
@@ -235,6 +239,7 @@ class Event(Table):
     name: str = text(most=80)
     kind: str = choice("contact", "taut", "threshold")
     body: str | None = text(default=None)
+    with_: str | None = text(default=None)
     line: Several = nodes(default=None, what="line")
     observe: str | None = text(default=None)
     value: float | None = real(default=None)
@@ -243,11 +248,12 @@ class Event(Table):
     def check(self):
         """Refuse keys of another kind, and what a kind lacks."""
         needs = {"contact": (), "taut": ("line",), "threshold": ("observe", "value")}[self.kind]
-        for key in ("body", "line", "observe", "value"):
-            value = getattr(self, key)
+        may = ("body", "with") if self.kind == "contact" else needs
+        for key in ("body", "with", "line", "observe", "value"):
+            value = self.with_ if key == "with" else getattr(self, key)
             if value is None and key in needs:
                 raise InputError(f'{key} is missing: kind = "{self.kind}" needs {key} = ...')
-            if value is not None and key not in needs and not (key == "body" and self.kind == "contact"):
+            if value is not None and key not in may:
                 raise InputError(f'{key} = {shown(value)} has no meaning for kind = "{self.kind}": leave it out')
 
 

@@ -290,16 +290,21 @@ def by_group(kind, where, *, default_factory=dict) -> Any:
     return field(read, default_factory=default_factory)
 
 
+def key_of(f):
+    """Key of a field in scenes: its name, without the ``_`` behind a word of Python's own."""
+    return f.name.removesuffix("_")
+
+
 def refuse_keys(cls, given):
     """Refuse what is no key of a class of `table`, with the nearest that is, and a key that is missing."""
-    known = cls.keys(given) if issubclass(cls, Table) else [f.name for f in dataclasses.fields(cls)]
+    known = cls.keys(given) if issubclass(cls, Table) else [key_of(f) for f in dataclasses.fields(cls)]
     for key in given:
         if key not in known:
             raise InputError(f"{short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")
     for f in dataclasses.fields(cls):
-        if f.default is MISSING and f.default_factory is MISSING and f.name not in given:
+        if f.default is MISSING and f.default_factory is MISSING and key_of(f) not in given:
             unit = f" [{f.metadata['unit']}]" if f.metadata.get("unit") else ""
-            raise InputError(f"{f.name} is missing: give {f.name} = ...{unit}")
+            raise InputError(f"{key_of(f)} is missing: give {key_of(f)} = ...{unit}")
 
 
 @dataclass_transform(
@@ -332,12 +337,13 @@ def table(cls):
         From the class, where a key is unknown or missing.
     """
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-    own = made.__init__
+    own, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
 
     @functools.wraps(own)
     def __init__(self, **given):
+        given = {keys.get(name, name): value for name, value in given.items()}
         refuse_keys(made, given)
-        own(self, **given)
+        own(self, **{f"{key}_" if f"{key}_" in keys else key: value for key, value in given.items()})
 
     made.__init__ = __init__
     return made
@@ -360,7 +366,7 @@ class Table:
             value = getattr(self, f.name)
             if value is None and f.default is None:
                 continue
-            object.__setattr__(self, f.name, checked(f.name, value, f))
+            object.__setattr__(self, f.name, checked(key_of(f), value, f))
         self.check()
 
     def check(self):
@@ -369,7 +375,7 @@ class Table:
     @classmethod
     def keys(cls, given):
         """Names of the keys that the table may have when it is read from a dict."""
-        return [f.name for f in dataclasses.fields(cls)]
+        return [key_of(f) for f in dataclasses.fields(cls)]
 
     @classmethod
     def read(cls, where, given):
@@ -391,5 +397,4 @@ class Table:
                 return {k: plain(x) for k, x in value.items()}
             return value
 
-        pairs = ((f.name, getattr(self, f.name)) for f in dataclasses.fields(self))
-        return {name: plain(value) for name, value in pairs if value is not None}
+        return {key_of(f): plain(v) for f in dataclasses.fields(self) if (v := getattr(self, f.name)) is not None}

@@ -80,10 +80,11 @@ def _tells_strain(system, scale):
 def _event_of(event, system):
     """(probe, event) of an event of a scene, the probe None where it is an observable's; its slot is not known yet."""
     if event.kind == "contact":
-        from ..results.observables.reaction import push_on
+        from ..results.observables.overlap import probe_of_touch
 
-        rows = [body.row for body in system.net.bodies if event.body in (None, body.name)]
-        return push_on(system, rows), Event(-1, 0.0, True, event.stop, at_once=True)
+        named = {body.name: body for body in system.net.bodies}
+        touch = probe_of_touch(system, named.get(event.body), named.get(event.with_))
+        return touch, Event(-1, 0.0, True, event.stop, at_once=True)
     if event.kind == "taut":
         probe = Observe(name="_", quantity="strain", line=event.line).probe(system)
         return probe, Event(-1, float(system.net.slackness[probe.rows[1]]), True, event.stop)

@@ -31,6 +31,14 @@ TENSION, STRAIN, POWER = range(3)
 
 CELL = 0
 """Column of what touches that has the number of the cell, in all families whose kicks are solved for."""
+OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
+"""Columns of what families of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
+a loss; the first of three of the force on the body that `Family.felt` names [N]; and their number."""
+CONTACT = -2
+"""Number that stands, in place of that of a family, for what bodies feel of contact."""
+DEPTH, FORCE, ELEMENT, FELT_COLUMNS = 0, 1, 4, 5
+"""Columns of that: the largest depth of lines in a body, or that of a pair of bodies [m]; the first of three of the
+force on the body [N]; the element of that depth, −1 where nothing touches; and their number."""
 
 
 class Rubbing(NamedTuple):
@@ -118,8 +126,11 @@ class Family:
         strain, in the columns `TENSION` and `STRAIN`, and the `POWER` of a force beside that of the law.
     contact : bool
         Whether it is contact of lines with bodies.
+    felt : tuple of int
+        Where it is contact with bodies, columns of ``cells`` with the row of the body that feels the force in ``out``,
+        see `FELT`, and, between bodies, with that of the one that feels its negative.
     pairs : tuple of (RigidBody, RigidBody)
-        The bodies of each cell, where it is contact between bodies; ``out`` is then how deep they are in each other.
+        The bodies of each cell, where it is the push of bodies on each other.
     angular_velocity : sequence of 3 float, optional
         That of the frame [rad/s], where the forces are those of inertia in a frame that turns.
     orbit_radius : float, optional
@@ -177,6 +188,7 @@ class Family:
     power: int | None = None
     lines: bool = False
     contact: bool = False
+    felt: tuple = ()
     pairs: tuple = ()
     angular_velocity: tuple | None = None
     orbit_radius: float | None = None

@@ -35,7 +35,7 @@ import functools
 import math
 
 from ..kernels import GIVE, KEPT, SWEEP, kernel
-from .base import CELL
+from .base import CELL, FELT
 
 ROWS, SHARES, AXES, LEVERS, START = 1, 5, 7, 16, 25
 """Columns of what touches, behind its cell: rows of the nodes, the body and its rotation, −1 without; shares of the
@@ -191,8 +191,8 @@ def remembering(along, push_apart):
 
     @kernel(GIVE)
     def give(number, memory, v, touches, begin, end, out):
-        """Write the power of each cell at the velocities v, and remember forces."""
-        out[:, 0] = 0.0
+        """Write the power of each cell at the velocities v, with the force that a body feels; remember forces."""
+        out[:] = 0.0
         for n in range(begin, end):
             c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
             memory[c, at] = number
@@ -200,6 +200,8 @@ def remembering(along, push_apart):
                 memory[c, at + 1 + k] = 0.0
                 for i in range(3):
                     memory[c, at + 1 + k] += touches[n, FORCES + i] * touches[n, AXES + 3 * i + k]
+            for k in range(out.shape[1] - FELT):
+                out[c, FELT + k] -= memory[c, at + 1 + k]
             for i in range(3):
                 out[c, 0] += touches[n, FORCES + i] * along(touches, n, i, v)
 

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..messages import nearest
 from ..registry import EFFECTS, INTEGRATORS, LISTS, OBSERVABLES, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
 from ..settings import Head
+from ..tables import key_of
 from .docstrings import example, parameters, prose, refusals, summary
 from .schema import accepted
 
@@ -131,7 +132,7 @@ def header_of(name):
 def _page(name, header, kind, like=None, without=(), **more):
     """The page of a class of tables; ``like`` describes keys of which the class itself says nothing."""
     said = (parameters(like) if like else {}) | parameters(kind)
-    keys = [_key(f, said.get(f.name, "")) for f in dataclasses.fields(kind) if f.name not in without]
+    keys = [_key(f, said.get(key_of(f), "")) for f in dataclasses.fields(kind) if f.name not in without]
     given = {"summary": summary(kind), "prose": prose(kind), "refused": refusals(kind), "example": example(kind)}
     return Page(name=name, header=header, keys=keys, **(given | more))
 
@@ -142,7 +143,7 @@ def _key(f, meaning):
         default = "" if f.default is None else _toml(f.default)
     elif f.default_factory is not MISSING:
         default = ""
-    return Key(f.name, takes(accepted(f)), f.metadata["unit"], default, meaning)
+    return Key(key_of(f), takes(accepted(f)), f.metadata["unit"], default, meaning)
 
 
 def _toml(value):

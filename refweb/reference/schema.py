@@ -8,7 +8,7 @@ from typing import Any
 
 from ..registry import EFFECTS, INTEGRATORS, LISTS, PARTS, SHAPES, SOLVES, WEBS, load
 from ..settings import Head
-from ..tables import Table
+from ..tables import Table, key_of
 from .docstrings import parameters, summary
 
 DRAFT = "http://json-schema.org/draft-04/schema#"
@@ -74,9 +74,9 @@ def _table(kind, *more, fixed=None, without=(), optional=(), like=None) -> dict:
             if f.name in without or (f.name in properties and f.name in fixed):
                 continue
             own = {"enum": [fixed[f.name]]} if f.name in fixed else accepted(f, kind)
-            properties[f.name] = {**own, **_described(f, said.get(f.name, ""))}
+            properties[key_of(f)] = {**own, **_described(f, said.get(key_of(f), ""))}
             if f.default is MISSING and f.default_factory is MISSING and f.name not in fixed:
-                required.append(f.name)
+                required.append(key_of(f))
     found = {"type": "object", "description": summary(kind), "properties": properties}
     return found | ({"required": required} if required else {}) | {"additionalProperties": False}
 

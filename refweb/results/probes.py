@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
+from ..effects.base import DEPTH, ELEMENT, FORCE
 from ..kernels import INTEGERS, MATRIX, kernel
 
 PROBE = types.float64(types.float64, MATRIX, MATRIX, MATRIX, MATRIX, INTEGERS, MATRIX, INTEGERS)
@@ -41,7 +42,8 @@ class Probe(NamedTuple):
     average : float
         Length of a window [s] whose mean is looked at instead of the value, 0 for none.
     family : int
-        Number of the family of the system whose values per cell stand in place of ``data``, −1 for none.
+        Number of the family of the system whose values per cell stand in place of ``data``, or
+        `refweb.effects.base.CONTACT` for what bodies feel of contact, −1 for none.
     """
 
     kernel: Callable
@@ -162,49 +164,43 @@ def velocity(t, x, v, f, lines, rows, data, where):
     return largest_of(v, data, rows, where)
 
 
-@kernel()
-def _outer(data, n, first, k, x, v, row):
-    """Component k of g + B x + C v at a row; data has g, and then B and C where they are not zero, from ``first``."""
-    outer = data[n, first + k]
-    if data.shape[1] > first + 3:
-        at = first + 3 + 3 * k
-        for i in range(3):
-            outer += data[n, at + i] * x[row, i] + data[n, at + 9 + i] * v[row, i]
-    return outer
-
-
 @kernel(PROBE)
 def reaction(t, x, v, f, lines, rows, data, where):
-    """Component or magnitude of Σ w (g + B x + C v − f) over rows; data holds w, g, B, C, shape (rows, 6 or 24)."""
+    """Component or magnitude of −Σ w f over rows; data holds w, shape (rows, 3)."""
     total0 = total1 = total2 = 0.0
     first = rows[1]
     for n in range(data.shape[0]):
         r = first + n if first >= 0 else rows[3 + n]
-        total0 += data[n, 0] * (_outer(data, n, 3, 0, x, v, r) - f[r, 0])
-        total1 += data[n, 1] * (_outer(data, n, 3, 1, x, v, r) - f[r, 1])
-        total2 += data[n, 2] * (_outer(data, n, 3, 2, x, v, r) - f[r, 2])
+        total0 -= data[n, 0] * f[r, 0]
+        total1 -= data[n, 1] * f[r, 1]
+        total2 -= data[n, 2] * f[r, 2]
     where[0] = first if first >= 0 else rows[3]
-    if rows[0] == MAGNITUDE:
-        return math.sqrt(total0 * total0 + total1 * total1 + total2 * total2)
-    return total0 if rows[0] == 0 else total1 if rows[0] == 1 else total2
+    return component_of(rows[0], total0, total1, total2)
 
 
 @kernel(PROBE)
-def push(t, x, v, f, lines, rows, data, where):
-    """Largest magnitude of g + B x + C v − f over rows, the force of contact on bodies, 0 where it is of rounding.
+def contact_force(t, x, v, f, lines, rows, data, where):
+    """Component or magnitude of the force of contact on a body; ``rows`` is (component, row of what bodies feel)."""
+    where[0], r = -1, rows[1]
+    return component_of(rows[0], data[r, FORCE], data[r, FORCE + 1], data[r, FORCE + 2])
 
-    data holds g, B, C, shape (rows, 3 or 21).
-    """
-    best = 0.0
-    for n in range(rows.size):
-        square = scale = 0.0
-        for k in range(3):
-            outer, whole = _outer(data, n, 0, k, x, v, rows[n]), f[rows[n], k]
-            square += (outer - whole) ** 2
-            scale += outer * outer + whole * whole
-        if square > 1e-26 * scale:
-            best = max(best, square)
-    return math.sqrt(best)
+
+@kernel(PROBE)
+def contact_depth(t, x, v, f, lines, rows, data, where):
+    """Largest depth in some rows of what bodies feel, 0 where nothing touches."""
+    deepest, where[0] = 0.0, -1
+    for r in rows:
+        if data[r, DEPTH] > deepest:
+            deepest, where[0] = data[r, DEPTH], int(data[r, ELEMENT])
+    return deepest
+
+
+@kernel()
+def component_of(component, x, y, z):
+    """Component or magnitude of a vector."""
+    if component == MAGNITUDE:
+        return math.sqrt(x * x + y * y + z * z)
+    return x if component == 0 else y if component == 1 else z
 
 
 @kernel(PROBE)

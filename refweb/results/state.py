@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..effects.base import OWN
 from ..net.tension_laws import LINEAR, SMOOTH, Law
 
 
@@ -31,12 +32,13 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, 0].copy() for i, f in enumerate(self.system.families) if f.contact}
-        return force, per_cell.tension.copy(), contact
+        contact = {i: per_cell[i][:, OWN].copy() for i, f in enumerate(self.system.families) if f.contact}
+        felt = self.system.contact_forces.of(per_cell) if any(f.felt for f in self.system.families) else None
+        return force, per_cell.tension.copy(), contact, felt
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
-        family, cells = self.system.touching(body)
+        family, cells = self.system.contact_forces.lines_on(body)
         return self._forces[2][family][cells]
 
     def _by_line(self, values):
@@ -104,9 +106,9 @@ class State:
     def reaction(self):
         """Force of the supports on nodes, of contact on bodies [N], shape (rows, 3)."""
         force = np.where(self.system.supported, -self.system.balance(self.time, self.x, self.v)[0], 0.0)
+        felt = self._forces[3]
         for body in self.system.net.bodies:
-            internal = (f for f in self.system.families if f.internal)
-            force[body.row] = sum(self.system.force_of(f, self.time, self.x, self.v)[body.row] for f in internal)
+            force[body.row] = 0.0 if felt is None else self.system.contact_forces.force_on(body, felt)
         return force
 
     @cached_property

@@ -361,14 +361,12 @@ class System:
         """Whether the web may touch bodies."""
         return any(family.contact for family in self.families)
 
-    def touching(self, body):
-        """(number of the family, slice of its cells) whose penalty is of a body; the cells are in order of elements."""
-        for i, family in enumerate(self.families):
-            if family.contact and family.energy is not None:
-                own = np.flatnonzero(family.cells[:, self.net.order + 1] == body.row)
-                if len(own):
-                    return i, slice(int(own[0]), int(own[-1]) + 1)
-        raise ValueError(f'nothing touches body "{body.name}"')
+    @cached_property
+    def contact_forces(self):
+        """The `refweb.system.contact_forces.ContactForces` on its bodies."""
+        from .contact_forces import ContactForces
+
+        return ContactForces(self)
 
     @property
     def rotating(self):

@@ -464,10 +464,6 @@ REFUSED = [
         r'\[\[velocity\]\] 1 node = 0 is on body "satellite" by \[\[attach\]\] and has the velocity of that',
     ),
     (
-        dict(event=[{"name": "hit", "kind": "contact"}]),
-        r'\[\[event\]\] 1 kind = "contact" does not tell .* quantity = "overlap"',
-    ),
-    (
         dict(body=[{"name": "satellite", "shape": "ring", "radius": 0.1, "normal": [0, 0, 1], "mass": 1.0,
                     "position": [0, 0, 0]}]),
         r'\[\[attach\]\] 1 body = "satellite" is a ring, which keeps its plane: give it another shape',

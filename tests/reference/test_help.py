@@ -17,6 +17,7 @@ from refweb.reference.schema import schema
 from refweb.reference.words import as_markdown, as_text
 from refweb.registry import EFFECTS, LISTS, PARTS, SHAPES, SOLVES, STUDY, WEBS, load
 from refweb.scene import shipped
+from refweb.tables import key_of
 
 REFERENCE = pathlib.Path(__file__).parents[2] / "validation" / "REFERENCE.md"
 PAGES = {page.name: page for name in names() for page in pages_of(name)}
@@ -118,7 +119,7 @@ def test_a_page_has_every_key_with_what_it_takes_and_means(name, capsys):
     kinds = {f"web.{k}": r for k, r in WEBS.items()} | {f"solve.{k}": r for k, r in SOLVES.items()}
     kinds |= {f"body.{k}": r for k, r in SHAPES.items()} | PARTS | LISTS | EFFECTS | {"study": STUDY}
     for f in dataclasses.fields(load(kinds[name])) if name in kinds else ():
-        assert f.name in ("kind", "form", "folder") or any(key.name == f.name for key in page.keys)
+        assert f.name in ("kind", "form", "folder") or any(key.name == key_of(f) for key in page.keys)
     for key in page.keys:
         assert key.meaning.endswith(".") and key.takes != "value", key
         assert f" {key.name} {key.takes}" in words and key.meaning in words

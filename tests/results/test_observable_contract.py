@@ -11,6 +11,7 @@ import pytest
 from nets import LAWS, skew_net
 
 import refweb
+from refweb.effects.base import CONTACT
 from refweb.effects.elasticity import Elasticity
 from refweb.errors import InputError
 from refweb.registry import OBSERVABLES
@@ -76,7 +77,8 @@ def probed(observe, state):
     system, found = state.system, observe.probe(state.system)
     force, shown = system.forces(0.0, state.x, state.v)
     strained = np.column_stack([state.element_tension, state.element_strain])
-    rows, data = np.array(found.rows, dtype=np.int64), found.data if found.family < 0 else shown[found.family]
+    shared = {CONTACT: system.contact_forces.of(shown), **dict(enumerate(shown))}
+    rows, data = np.array(found.rows, dtype=np.int64), shared.get(found.family, found.data)
     where = np.array([-1, PLACE])
     data = np.ascontiguousarray(data, dtype=float)
     value = found.kernel(0.0, state.x, state.v, force, strained, rows, data, where)

@@ -14,9 +14,23 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numba import types
 
-from ...kernels import Cube, Integers, Matrix, Record, Vector, copy_rows, inner, kernel
+from ...kernels import (
+    MATRIX,
+    Arrays,
+    Cube,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Record,
+    Vector,
+    among,
+    copy_rows,
+    inner,
+    kernel,
+)
 from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
+from .contacts import feel
 from .energy_book import book_energies, own_energy
 from .extremes import EDGE, Extremes, correction, look, look_at, look_at_sums, take_over, time_of_top
 from .nearby import show_near
@@ -51,6 +65,8 @@ class Inside(Record):
         Space for the place of a value.
     total : ndarray, shape (families + 3,)
         Space for energies.
+    losses : table
+        Space for what families show whose kicks are solved for.
     """
 
     before: Cube
@@ -60,14 +76,15 @@ class Inside(Record):
     alone: Extremes
     where: Integers
     total: Vector
+    losses: MatrixTable
 
     @classmethod
-    def of(cls, rows, lines, extremes, sums):
-        """Space for a number of rows, what lines show, the extremes of a run, and a number of energies."""
+    def of(cls, rows, lines, extremes, sums, losses):
+        """Space for a number of rows, what lines show, the extremes of a run, a number of energies, and ``losses``."""
         space = np.empty((5, 3, rows, 3))
         alone = replace(extremes, recent=np.empty_like(extremes.recent), looked=np.empty_like(extremes.looked))
-        where = np.zeros(2, dtype=np.int64)
-        return cls(space[0], space[1], space[2:], np.empty_like(lines), alone, where, np.empty(sums))
+        more = np.zeros(2, dtype=np.int64), np.empty(sums), Arrays(MATRIX, losses)
+        return cls(space[0], space[1], space[2:], np.empty_like(lines), alone, *more)
 
 
 @kernel(apart=("books",))
@@ -132,6 +149,8 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     hand_on(x, f, model.inertia.turns)
     if model.nearby.families.size:
         show_near(model.nearby, families)
+    if model.contacts.families.shape[0]:
+        feel(model.contacts, families)
 
 
 @kernel(apart=("watched", "kicks"))
@@ -172,18 +191,39 @@ def state_within(
     forces_at(t, here[0], here[1], here[2], inside.lines, model)
 
 
+@kernel(apart=("looks", "rubbing"))
+def exchange_losses(keep: bool, inside: Inside, model: Model) -> None:
+    """Keep what families show whose kicks are solved for, which forces at other states write over, or show it again."""
+    for m in range(model.rubbed.families.size):
+        shown, kept = model.families.outs[model.rubbed.families[m]], inside.losses[m]
+        for c in range(shown.shape[0]):
+            for k in range(shown.shape[1]):
+                if keep:
+                    kept[c, k] = shown[c, k]
+                else:
+                    shown[c, k] = kept[c, k]
+
+
 @kernel(apart=("looks",))
 def show_again(now: float, inside: Inside, model: Model, observed: Observed, running: Running) -> None:
-    """Write natural lengths, and what families show that probes read, of the end of a step over that of its inside."""
+    """Write natural lengths, and what families show that probes read, of the end of a step over that of its inside.
+
+    Losses that kicks are solved for are those of the step, see `exchange_losses`.
+    """
     families = model.families
     if model.reels.lengths.size:
         set_lengths(now, model.reels, families.data[0])
     for i in observed.shown:
-        families.forces[i](
-            now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
-        )  # fmt: skip
+        if not among(model.rubbed.families, i):
+            families.forces[i](
+                now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
+            )  # fmt: skip
+    if model.rubbed.families.size:
+        exchange_losses(False, inside, model)
     if model.nearby.families.size:
         show_near(model.nearby, families)
+    if model.contacts.families.shape[0]:
+        feel(model.contacts, families)
 
 
 @kernel(apart=("watched",))
@@ -244,6 +284,8 @@ def look_at_tops(
 def look_back(inside: Inside, total: Vector, model: Model, observed: Observed, running: Running) -> None:
     """Look where parabolas turn back, in the last two steps."""
     extremes, last = running.extremes, -math.inf
+    if model.rubbed.families.size:
+        exchange_losses(True, inside, model)
     before, at, now = extremes.looked[0], extremes.looked[1], extremes.looked[2]
     inverse, ends = model.inertia.inverse, inside.ends
     for i in range(observed.signs.size):
@@ -286,6 +328,8 @@ def look_inside(
     """
     own, x, v = running.extremes, inside.state[0], inside.state[1]
     extremes = inside.alone if alone else own
+    if model.rubbed.families.size:
+        exchange_losses(True, inside, model)
     if alone:
         copy_rows(own.recent, extremes.recent)
         for k in range(3):

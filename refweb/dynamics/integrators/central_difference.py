@@ -129,7 +129,8 @@ class CentralDifference(Integrator):
                 'nodes by [[attach]] does not allow: use method = "cvode", or leave them out'
             )
         self._outs = outs = tuple(system.per_cell())
-        self._model, self._observed = Model.of(system, outs), Observed.of(probes, sums, outs)
+        self._model = Model.of(system, outs)
+        self._observed = Observed.of(probes, sums, outs, self._model.contacts)
         self._touches = Arrays(MATRIX, [np.empty((0, self._model.rubbed.width))])
         self._events, self._least, self._taken, self._prepared = event_rows(events), least_energy(net), None, False
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):

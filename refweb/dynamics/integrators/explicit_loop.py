@@ -19,6 +19,7 @@ from ...net.rotation_bounds import fastest_point, hardest_push
 from ...results.probes import PLACE
 from .averages import average, look_for_means
 from .between_steps import Inside, look_at_books, look_at_tops, look_back, look_inside, show_again
+from .contacts import feel
 from .energy_book import (
     act,
     begin_powers,
@@ -208,6 +209,7 @@ class Room(Record):
     def of(cls, model, running):
         """Space for the steps of a run."""
         rows, sums, vectors = len(running.x), len(running.work) + 2, (np.zeros((len(running.x), 3)) for _ in range(4))
+        losses = [np.empty_like(model.families.outs[i]) for i in model.rubbed.families.tolist()]
         return cls(
             where=np.zeros(2, dtype=np.int64),
             reaction=np.zeros(3),
@@ -220,7 +222,7 @@ class Room(Record):
             momenta=next(vectors),
             was=np.empty(len(model.reels.lengths)),
             total=np.zeros(sums),
-            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums),
+            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums, losses),
         )
 
 
@@ -280,6 +282,8 @@ def step_on(
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
+        if model.contacts.families.shape[0]:
+            feel(model.contacts, families)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, families)
         book_motion(driven, mass, x, v, f, before, work)
@@ -455,6 +459,8 @@ def begin(
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
     hand_on(x, f, model.inertia.turns)
+    if model.contacts.families.shape[0]:
+        feel(model.contacts, families)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE
         extremes.values[i] = observed.probes[i](

@@ -50,7 +50,7 @@ class Measurements:
     probed : int
         Number of probes.
     shown : list of int
-        Numbers of the families of whose cells probes read what they show.
+        Numbers of the families of whose cells probes read what they show, see `refweb.results.probes.Probe`.
     """
 
     def __init__(self, probes, sums, families):
@@ -70,7 +70,7 @@ class Measurements:
     def probe(self, i, sample):
         """Value of a probe at a `refweb.dynamics.integrators.simpson_book.Sample`."""
         kernel, rows, data, family = self._probes[i]
-        data = data if family < 0 else sample.shown[family]
+        data = sample.shown.get(family, data)
         return kernel(sample.time, sample.x, sample.v, sample.force, sample.lines, rows, data, self._where)
 
     def _place(self, i, sample):

@@ -13,6 +13,7 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
+from ...effects.base import CONTACT
 from ...kernels import (
     INDICES,
     INTEGERS,
@@ -38,7 +39,9 @@ from ...kernels import (
 )
 from ...net.rotation import Turns
 from ...results.probes import PROBE, plain_of
+from ...system.contact_forces import FAMILY
 from .averages import Averages, Windows
+from .contacts import Contacts
 from .energy_book import no_energy
 from .events import EventArray
 from .extremes import Extremes
@@ -302,13 +305,14 @@ class Model(Record):
     nearby: Nearby
     guard: Guard
     walls: Walls
+    contacts: Contacts
 
     @classmethod
     def of(cls, system, outs):
         """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
         inertia, families, rubbed = Inertia.of(system), Families.of(system, outs), Rubbed.of(system)
         motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
-        kept = Nearby.of(system), Guard.of(system), Walls.of(system)
+        kept = Nearby.of(system), Guard.of(system), Walls.of(system), Contacts.of(system)
         return cls(inertia, families, rubbed, motions, reels, system.corners, outside, *kept)
 
 
@@ -347,9 +351,13 @@ class Observed(Record):
     scales: Vector
 
     @classmethod
-    def of(cls, probes, sums, outs):
-        """Probes and sums of a system whose families write ``outs`` per cell."""
-        numbers = [outs[p.family] if p.family >= 0 else np.ascontiguousarray(p.data, dtype=float) for p in probes]
+    def of(cls, probes, sums, outs, contacts):
+        """Probes and sums of a system whose families write ``outs`` per cell, and bodies feel ``contacts``."""
+        shared = {CONTACT: contacts.felt, **dict(enumerate(outs))}
+        numbers = [shared.get(p.family, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
+        shown = [probe.family for probe in probes if probe.family >= 0]
+        if any(probe.family == CONTACT for probe in probes):
+            shown += contacts.families[:, FAMILY].tolist()
         windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
         signs[windows.slots] = 0.0
         plain = [plain_of(probe) for probe in probes]
@@ -361,7 +369,7 @@ class Observed(Record):
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
-            shown=np.unique([probe.family for probe in probes if probe.family >= 0]).astype(np.int64),
+            shown=np.unique(shown).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
         )
@@ -427,7 +435,8 @@ def features(scheme, model, observed, events):
         ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
         that change; ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
         ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
-        found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either).
+        found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either);
+        ``contacts`` of bodies.
     """
     inertia, families, outside, windows = model.inertia, model.families, model.outside, observed.windows
     has = {
@@ -454,5 +463,6 @@ def features(scheme, model, observed, events):
         "guard": len(model.guard.families),
         "walls": len(model.walls.families),
         "guarded": len(model.guard.families) + len(model.walls.families),
+        "contacts": len(model.contacts.families),
     }
     return {name for name, count in has.items() if count}

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...effects.base import CONTACT
 from ...errors import NoEnd, OpenBook
 from ...kernels import ENERGY, INDICES, MATRIX, VECTOR, Arrays, Functions
 from ...net.rotation import Turns, more_kinetic
@@ -178,7 +179,11 @@ class SimpsonBook:
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return Sample(t, x, v, force, out.lines.copy(), power, {i: out[i].copy() for i in self._shown})
+        return Sample(t, x, v, force, out.lines.copy(), power, {i: self._show(out, i) for i in self._shown})
+
+    def _show(self, out, number):
+        """What probes read of families that show ``out``."""
+        return self.system.contact_forces.of(out) if number == CONTACT else out[number].copy()
 
     def refuse_endless(self, t, force):
         """Refuse forces on rows, shape (rows, 3), that are not finite; names the first such row."""

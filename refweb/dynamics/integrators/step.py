@@ -10,6 +10,7 @@ import numpy as np
 from ...kernels import Cube, ForceTable, IndexTable, Matrix, MatrixTable, copy_rows, kernel, sum_of
 from ...net.net import LENGTH
 from ...net.rotation import Turns, carry, hand_on, note_turns, turn_on
+from .contacts import feel
 from .energy_book import act
 from .rubbed import meet_all
 
@@ -256,6 +257,8 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
         for i in range(len(forces)):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
         hand_on(x, f, model.inertia.turns)
+        if model.contacts.families.shape[0]:
+            feel(model.contacts, families)
         for i in model.rubbed.families:
             running.power[i] = sum_of(families.outs[i][:, 0])
     return turned

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, NEAR, STIFFNESS, kernel
+from ..base import FELT, OWN
 from ..vectors import cross, dot
 from .pair import power_of_depth
 from .penalty import SHALLOW, slope_of_power
@@ -75,7 +76,8 @@ def force_of(space_of, add_forces):
     def force(t, x, v, f, cells, data, out):
         space = space_of(data)
         for c in range(cells.shape[0]):
-            out[c, 0] = add_forces(x, v, f, cells, data, c, space)
+            own, (f0, f1, f2) = add_forces(x, v, f, cells, data, c, space)
+            out[c, OWN], out[c, FELT], out[c, FELT + 1], out[c, FELT + 2] = own, f0, f1, f2
 
     return force
 
@@ -171,14 +173,17 @@ def kernels(first, second):
 
     @kernel()
     def add_forces(x, v, f, cells, data, c, space):
-        deepest, law = 0.0, law_of(data, c)
+        """Add the forces of a pair; how deep it is [m], and the force on the second body [N]."""
+        deepest, felt, law = 0.0, (0.0, 0.0, 0.0), law_of(data, c)
         count = meet(0.0, x, cells, data, c, space)
         for n in range(count):
+            size, g = push(law, space.contacts, n, WEIGHT), vector_at(space.contacts, n, NORMAL)
             deepest = max(deepest, space.contacts[n, DEPTH])
-            add_push(f, cells, data, c, space.contacts, n, push(law, space.contacts, n, WEIGHT))
+            felt = felt[0] + size * g[0], felt[1] + size * g[1], felt[2] + size * g[2]
+            add_push(f, cells, data, c, space.contacts, n, size)
         if count == space.contacts.shape[0]:  # there is no room for all: the run is to end
             f[cells[c, 0], 0] = math.nan
-        return deepest
+        return deepest, felt
 
     slopes, force = slopes_of(space_of, add_forces), force_of(space_of, add_forces)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...net.skeleton import COLUMNS, THICKNESS
-from ..base import Family
+from ..base import CONTACT_COLUMNS, OWN, Family
 from .pair import lever
 from .pressing import PARTS, SIDE, SIDES
 
@@ -93,7 +93,7 @@ def _friction(net, depths, group):
         energy=None,
         stiffness=stiffness,
         book="dissipated_energy",
-        power=0,
+        power=OWN,
         damping=damping,
         rubbing=rubbing(int(parts.max())),
         symmetric=False,
@@ -108,7 +108,8 @@ def _shared(net, group) -> dict:
     for row, own in zip(room, data, strict=True):
         row[: len(own)] = own
     room[:, 0] = room[:, 0].max()
-    return dict(name="contact", internal=True, cells=np.array(cells, dtype=np.int32), data=room, observed=1)
+    cells = np.array(cells, dtype=np.int32)
+    return dict(name="contact", internal=True, felt=(1, 0), cells=cells, data=room, observed=CONTACT_COLUMNS)
 
 
 def _pair(net, first, second, law):

@@ -28,6 +28,7 @@ import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from ...net.rotation import times, times_transposed, to_quaternion
+from ..base import FELT
 from ..vectors import cross, dot
 from .nearest_point import lightness, share
 from .pair import lever_of, pair_of, pairing
@@ -269,7 +270,7 @@ def kernels(depth, pieces, nodes, functions, spins):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         found = np.empty((most * pieces, columns))
-        out[:, 0] = 0.0
+        out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
@@ -282,6 +283,7 @@ def kernels(depth, pieces, nodes, functions, spins):
                     for a in range(nodes):
                         f[cells[c, a], k] += share(a, nodes, functions, place)[0] * turned[k]
                     f[cells[c, nodes], k] -= turned[k]
+                    out[c, FELT + k] -= turned[k]
                 if spins:
                     moment = times_transposed(pair.axes, turned_by(pair.planar, cross(y, own)))
                     for k in range(3):

@@ -21,6 +21,7 @@ import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ...net.rotation import times_transposed, to_quaternion
+from ..base import FELT
 from ..vectors import cross, dot
 from .nearest_point import lightness, point, share
 from .pair import lever_of, pair_of, pairing, power_of_depth
@@ -203,7 +204,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         found = np.empty((most * pieces, columns))
-        out[:, 0] = 0.0
+        out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
                 touch = touch_of(x, cells, data, nodes, functions, found, n)
@@ -214,6 +215,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                     for a in range(nodes):
                         f[cells[c, a], k] -= share(a, nodes, functions, touch.place)[0] * push * g[k]
                     f[cells[c, nodes], k] += push * g[k]
+                    out[c, FELT + k] += push * g[k]
                 if spins:
                     moment = times_transposed(touch.pair.axes, cross(touch.spot.y, touch.spot.gradient))
                     for k in range(3):

@@ -194,8 +194,9 @@ def kernels(first, second):
 
     @kernel()
     def add_forces(x, v, f, cells, data, c, space):
-        """Add the forces of a pair; their power [W]."""
-        law, one, two, power = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1), 0.0
+        """Add the forces of a pair; their power [W], and the force on the second body [N]."""
+        law, one, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
+        power, felt = 0.0, (0.0, 0.0, 0.0)
         a, b, contacts = cells[c, 0], cells[c, 1], space.contacts
         w, o = turned_velocity(v, data, cells, c, 0, one), turned_velocity(v, data, cells, c, 1, two)
         for n in range(meet(0.0, x, cells, data, c, space)):
@@ -208,6 +209,7 @@ def kernels(first, second):
             )
             own = friction_force(law, push(law, contacts, n, SHARE), vector_at(contacts, n, NORMAL), u)
             power += dot(own, u)
+            felt = felt[0] - own[0], felt[1] - own[1], felt[2] - own[2]
             for s in range(2):
                 frame, arm, sign, spins = (one, y, 1.0, data[c, SIDES + SPINS])
                 if s == 1:
@@ -219,7 +221,7 @@ def kernels(first, second):
                     moment = times_transposed(frame.axes, moment)
                     for k in range(3):
                         f[cells[c, 2 + 2 * s], k] += sign * moment[k]
-        return power
+        return power, felt
 
     slopes, force = slopes_of(space_of, add_forces), force_of(space_of, add_forces)
 

@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..base import CONTACT_COLUMNS, FELT
 from ..vectors import dot
 from .nearest_point import closest, lightness, point, share, touched
 from .pair import PENALTY, RADIUS
@@ -37,7 +38,8 @@ def kernels(pieces, nodes, functions):
     def force(t, x, v, f, cells, data, out):
         for first in range(0, cells.shape[0], pieces):
             for c in range(first, first + pieces):
-                out[c, 0] = 0.0
+                for k in range(CONTACT_COLUMNS):
+                    out[c, k] = 0.0
             c, place, square = touched(x, cells, data, first, pieces, nodes, functions)
             if c < 0:
                 continue
@@ -52,6 +54,7 @@ def kernels(pieces, nodes, functions):
                 for a in range(nodes):
                     f[cells[c, a], k] += share(a, nodes, functions, place)[0] * pull
                 f[cells[c, nodes], k] -= pull
+                out[c, FELT + k] = -pull
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):

@@ -16,7 +16,7 @@ from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest, shown
 from ...tables import Table, boolean, field, real, table
-from ..base import Family
+from ..base import CONTACT_COLUMNS, OWN, Family
 from .nearest_point import in_sphere, near
 from .pair import AWAY, pair_data
 from .passing import passing
@@ -158,8 +158,8 @@ class Contact(Table):
         return replace(net, bodies=tuple(replace(body, turns=turns(body)) for body in net.bodies))
 
     def on(self, net):
-        """The families of all pairs of a line and a body, of one kind each; ``out`` is the depth of the deepest
-        contact [m], or the power of what is lost [W]."""
+        """The families of all pairs of a line and a body, of one kind each; ``out`` has the depth of the deepest
+        contact [m], or the power of what is lost [W], and the force on the body [N]."""
         names = [body.name for body in net.bodies]
         if not names:
             raise InputError("there is no [[body]] that the web could touch: add one")
@@ -210,6 +210,8 @@ class Contact(Table):
         return dict(
             name="contact",
             contact=True,
+            felt=(nodes,),
+            observed=CONTACT_COLUMNS,
             internal=True,
             cells=np.ascontiguousarray(np.vstack(cells), dtype=np.int32),
             data=np.ascontiguousarray(np.vstack(data)),
@@ -239,7 +241,6 @@ class Contact(Table):
             bound=bound,
             near=near(*element, within) if net.order == 1 else None,  # explicit steps take no other elements
             book="contact_energy",
-            observed=1,
             symmetric=spins == 0,  # moments, and quaternions
         )
 
@@ -265,8 +266,7 @@ class Contact(Table):
             stiffness=stiffness,
             bound=bound,
             book="dissipated_energy",
-            observed=1,
-            power=0,
+            power=OWN,
             damping=damping,
             rubbing=rubbing,
             symmetric=False,

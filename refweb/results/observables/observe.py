@@ -33,7 +33,9 @@ class Observe(Table):
         Node of a nodal quantity. Of several nodes the one with the largest value counts, for a reaction their sum;
         without ``node`` that is over all.
     body : str, optional
-        Body of a nodal quantity; its reaction is the contact force on it.
+        Body of a nodal quantity. Its reaction is the force of contact on it, of lines and other bodies together: 0
+        where nothing touches it, whatever drag, gravity, a frame or the lines that it holds by ``[[attach]]`` do to it.
+        The force with which it holds these is the reaction of their nodes.
     to : str, optional
         Body that a distance ends at, of one node or another body; without it that of two nodes.
     line : int, str or list, optional

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...effects.base import CONTACT, pairs_of
 from ...errors import InputError
 from .observable import Observable, Value
 
@@ -31,7 +32,7 @@ class Overlap(Observable):
         return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
 
     def probe(self, system):
-        """Of what the family of its contact shows."""
+        """Of what its body feels."""
         return probe_of(system, self.body(system.net))
 
     def place(self, system, at):
@@ -41,21 +42,25 @@ class Overlap(Observable):
 
 def probe_of(system, body):
     """The `refweb.results.probes.Probe` of the deepest contact of a body."""
-    from ..probes import Probe, deepest
+    return _deepest_of([system.contact_forces.row(body)])
 
-    family, cells = system.touching(body)
-    return Probe(deepest, [cells.start, cells.stop], np.zeros((1, 1)), family=family)
+
+def _deepest_of(rows):
+    from ..probes import Probe, contact_depth
+
+    return Probe(contact_depth, rows, np.zeros((0, 0)), family=CONTACT)
 
 
 def probes_between(system):
     """Probes of the deepest contact of each pair of bodies, by name."""
-    from ..probes import Probe, deepest
+    pairs = [system.contact_forces.pair_rows(one, [other]) for one, other in pairs_of(system)]
+    return {("between", k): _deepest_of(rows)._replace(sign=1.0) for k, rows in enumerate(pairs)}
 
-    cells = [(i, n) for i, family in enumerate(system.families) for n in range(len(family.pairs))]
-    return {
-        ("between", k): Probe(deepest, [n, n + 1], np.zeros((1, 1)), sign=1.0, family=i)
-        for k, (i, n) in enumerate(cells)
-    }
+
+def probe_of_touch(system, body, other):
+    """The probe of the deepest contact of a body, None for any, with the web, or with another body."""
+    bodies, forces = system.net.bodies if body is None else [body], system.contact_forces
+    return _deepest_of([forces.row(one) for one in bodies] if other is None else forces.pair_rows(other, bodies))
 
 
 def probe_of_speed(system):

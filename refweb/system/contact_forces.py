@@ -1,0 +1,115 @@
+"""What bodies feel of contact: its force on each, how deep lines are in each, and how deep pairs are in each other.
+
+Each contact shows, in its cell, how deep it is and the force on the body that it touches, where two bodies touch that
+on the second of them, see `refweb.effects.base.Family.felt`. What a body feels is the sum over its cells, and nothing
+else is: where nothing touches it, that is zero whatever else acts. One kernel sums for all: over the cells that are
+near in a step of the compiled loop, over all in a state.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.base import DEPTH, ELEMENT, FELT, FELT_COLUMNS, FORCE, OWN, pairs_of
+from ..kernels import kernel
+
+FAMILY, BODY, OTHER, ELEMENTS, PAIRS, CHOSEN = range(6)
+"""Columns of what is known of a family of contact: its number; columns of its cells with the row of the body that it
+touches, and of the other one or −1; the number of elements where it is the push of lines, else 0; the row of the depth
+of its first pair where it is the push of bodies, else −1; and where the numbers of chosen cells stand, −1 for none."""
+
+
+class ContactForces:
+    """What bodies of a system feel: a row for each of its rows behind the nodes, then one for each pair of bodies.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+
+    Attributes
+    ----------
+    first : int
+        Number of the row of the system that the first row is of.
+    families : ndarray of int, shape (families, 6)
+        What is known of each family of contact.
+    rows : int
+        Number of rows.
+    """
+
+    def __init__(self, system):
+        self.first, elements, known = system.net.nodes, len(system.net.cells), []
+        self.rows = pairs = system.rows - self.first
+        self._cells, self._pairs = [family.cells for family in system.families], {}
+        for i, family in enumerate(system.families):
+            if family.felt:
+                body, other = (*family.felt, -1)[:2]
+                lines = elements if family.contact and family.energy is not None else 0
+                known.append((i, body, other, lines, pairs if family.pairs else -1, -1))
+                pairs += len(family.pairs)
+        self.families = np.array(known, dtype=np.int64).reshape(len(known), 6)
+        for n, pair in enumerate(pairs_of(system)):
+            self._pairs[frozenset(body.row for body in pair)] = self.rows + n
+        self.rows = pairs
+
+    def row(self, body):
+        """Number of the row of a body."""
+        return body.row - self.first
+
+    def force_on(self, body, felt):
+        """Force of contact on a body [N], shape (3,), of what bodies feel."""
+        return felt[self.row(body), FORCE : FORCE + 3]
+
+    def lines_on(self, body):
+        """(number of the family, slice of its cells) of the push of lines on a body; cells are in order of elements."""
+        for known in self.families:
+            own = np.flatnonzero(self._cells[known[FAMILY]][:, known[BODY]] == body.row)
+            if known[ELEMENTS] and len(own):
+                return int(known[FAMILY]), slice(int(own[0]), int(own[-1]) + 1)
+        raise ValueError(f'nothing touches body "{body.name}"')
+
+    def pair_rows(self, one, others):
+        """Numbers of the rows of the pairs that a body makes with some others, a list."""
+        found = [self._pairs.get(frozenset((one.row, other.row))) for other in others]
+        return [row for row in found if row is not None]
+
+    def of(self, per_cell):
+        """What bodies feel where families show ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
+        felt = np.empty((self.rows, FELT_COLUMNS))
+        forget(felt)
+        none = np.empty((0, 1), dtype=np.int32)
+        for known in self.families:
+            i = known[FAMILY]
+            add_felt(self.first, known, self._cells[i], none, per_cell[i], felt)
+        return felt
+
+
+@kernel(leaf=True, forceinline=True)
+def forget(felt):
+    """Begin with no contact."""
+    for r in range(felt.shape[0]):
+        for k in range(ELEMENT):
+            felt[r, k] = 0.0
+        felt[r, ELEMENT] = -1.0
+
+
+@kernel(leaf=True)
+def add_felt(first, known, cells, chosen, out, felt):
+    """Add what bodies feel of the cells of a family; of those that are ``chosen`` where any are, shape (cells, 1)."""
+    for c in range(cells.shape[0]):
+        x, y, z, own = out[c, FELT], out[c, FELT + 1], out[c, FELT + 2], out[c, OWN]
+        if own == 0.0 and x == 0.0 and y == 0.0 and z == 0.0:
+            continue
+        body, cell = cells[c, known[BODY]] - first, chosen[c, 0] if chosen.shape[0] else c
+        felt[body, FORCE] += x
+        felt[body, FORCE + 1] += y
+        felt[body, FORCE + 2] += z
+        if known[OTHER] >= 0:
+            other = cells[c, known[OTHER]] - first
+            felt[other, FORCE] -= x
+            felt[other, FORCE + 1] -= y
+            felt[other, FORCE + 2] -= z
+        if known[ELEMENTS] > 0 and own > felt[body, DEPTH]:
+            felt[body, DEPTH], felt[body, ELEMENT] = own, float(cell % known[ELEMENTS])
+        if known[PAIRS] >= 0:
+            felt[known[PAIRS] + cell, DEPTH] = own
