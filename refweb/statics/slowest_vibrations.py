@@ -28,10 +28,11 @@ NEARLY = 0.1
 
 
 class Slowest(NamedTuple):
-    """The s of the slowest vibrations [1/s], and which of them grow beyond what rounding makes."""
+    """The s of the slowest vibrations [1/s], which of them grow beyond rounding, and whether there are more."""
 
     s: Any
     grows: np.ndarray
+    more: bool
 
 
 class Weighed:
@@ -93,7 +94,9 @@ def slowest(solver, M, C=None):
         weighed.omega = 1.0 / np.sqrt(np.linalg.norm(start))
         by, transposed, factor, start = weighed.twice, weighed.twice_transposed, 2, np.tile(start, 2)
 
-    def found(matvec, close):
+    def found(matvec, close) -> Any:
+        if len(start) <= 2 * factor * KEPT:
+            return np.linalg.eig(np.column_stack([matvec(e) for e in np.eye(len(start))]))
         operator = LinearOperator((len(start), len(start)), matvec=matvec, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
         return eigs(operator, factor * NUMBER, which="LM", v0=start, ncv=factor * KEPT, tol=close)
 
@@ -104,7 +107,7 @@ def slowest(solver, M, C=None):
         (mu, right), (_, left) = found(by, 0.0), found(transposed, 0.0)
         off = ROUNDING * abs(mu).max() * _conditions(right, left)
         grows = (abs(mu.imag) > off) | (mu.real < -off) if C is None else mu.real > off
-    return Slowest(np.sqrt(-1.0 / mu + 0j) if C is None else weighed.omega / mu, grows)
+    return Slowest(np.sqrt(-1.0 / mu + 0j) if C is None else weighed.omega / mu, grows, len(mu) < len(start))
 
 
 def _conditions(right, left):

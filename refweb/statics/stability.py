@@ -15,7 +15,7 @@ of the pivots of LDLᵀ say so. Follower loads and wind have no potential, and t
 
 In a frame that turns Coriolis forces may hold what K does not, as long as nothing damps motion in the frame.
 
-Of up to `DENSE` unknowns with mass all s are found. Of more, the slowest are, by Arnoldi iteration on K⁻¹, whose start
+Of up to `DENSE` unknowns all s are found. Of more, the slowest are, by Arnoldi iteration on K⁻¹, whose start
 has a fixed seed; of the others it is said that they are not asked. But with S positive definite and A = (K − Kᵀ)/2
 nothing grows where C is symmetric and
 
@@ -24,8 +24,10 @@ nothing grows where C is symmetric and
 as both roots of s² + c s + k + i a lie to the left where c > 0 and c² k > a². Wind does that where it is slower than
 waves across the lines.
 
-Unknowns without mass follow the others; forces that depend on their velocity are left out. Eigenvalues have errors from
-rounding, by their condition numbers: what is within these counts as none.
+Unknowns without mass follow the others; forces that depend on their velocity are left out. Where nothing has mass, all
+have the same and flutter is not asked: whether the number of ways in which a web diverges is odd depends on no mass.
+Eigenvalues have errors from rounding, by their condition numbers: what is within these counts as none. Lines between
+slack and taut count as taut; where slack ones would not hold the web, nothing is decided.
 
 References
 ----------
@@ -39,8 +41,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS
-from ..net.tension_laws import LINEAR
+from ..net.net import AXIAL_STIFFNESS, LENGTH
+from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.factorization import Factor, Lu, negative_pivots
 from .equilibrium import Stability
 
@@ -49,7 +51,9 @@ TINY = 1e-12
 HELD = 1e-10
 """Stiffness over the largest EA/L that holds what nothing supports."""
 DENSE = 100
-"""Unknowns with mass up to which all s are found."""
+"""Unknowns up to which all s are found."""
+KINK = 1e-12
+"""Strain within which a line that only pulls is between slack and taut."""
 ROUNDING = 64.0 * np.finfo(float).eps
 """Error of a matrix over its norm."""
 PIVOT, EIGENVALUE = "a pivot of its tangent is negative", "an eigenvalue of its tangent is negative"
@@ -77,11 +81,26 @@ def ask(system, rest, state, solver=None):
         state.stability = Question(system, rest, state).answer(solver)
     else:
         state.stability = by_pivot(sign)
+    _ask_of_kinks(system, rest, state)
     state.stats["smallest_pivot"] = state.stability.sign
     if (rest.net.laws == LINEAR).any():
         from .other_side import may_turn_over
 
         state.may_turn_over = may_turn_over(rest, state)
+
+
+def _ask_of_kinks(system, rest, state):
+    """Leave open what lines between slack and taut hold: the tangent takes them as taut, and slack ones may not."""
+    rest = rest.at(state.step)
+    net, numbers = rest.net, rest.net.line_data.copy()
+    strain = np.linalg.norm(net.bar_vectors(state.x), axis=1) / net.bar_lengths - 1.0
+    kinked = (net.laws == TENSION_ONLY) & (abs(strain).reshape(len(net.laws), -1).min(axis=1) <= KINK)
+    if state.stability.sign not in (0, 1) or not kinked.any():
+        return
+    numbers[kinked, LENGTH] *= 1.0 + 4.0 * KINK
+    if Question(system, rest.with_line_data(numbers), state).answer().sign == -1:
+        why = f"{np.count_nonzero(kinked)} elements are between slack and taut, and slack they would not hold it"
+        state.stability = Stability(None, why, loose=True)
 
 
 def by_pivot(sign):
@@ -197,7 +216,7 @@ class Question:
 
     def _in_frame(self, what):
         """Of a K that does not hold the web in a frame that turns."""
-        if self._massive().sum() > DENSE:
+        if len(self.rest.free) > DENSE:
             slow = self._slowest(self._lu, self._velocity())
             grows = slow is not None and slow.grows.any()
             return Stability(-1, what if grows else f"{what}; whether Coriolis forces hold the web is not decided")
@@ -207,8 +226,7 @@ class Question:
 
     def _unsymmetric(self, solver):
         """Of a K that is not symmetric."""
-        massive = int(self._massive().sum())
-        if massive > DENSE:
+        if len(self.rest.free) > DENSE:
             return self._of_many(solver)
         K, C, stands = self._reduced()
         found, off = _eigenvalues(K)
@@ -219,13 +237,15 @@ class Question:
             return (self._in_frame(EIGENVALUE) if turned else Stability(-1, EIGENVALUE))._replace(loose=loose)
         if self.definite < 0 and not stands:
             return Stability(None, "nodes without mass may not be held by their lines", loose=True)
-        if massive and (growth := _growth(K, C)) > 0.0:
+        if self._massive().any() and (growth := _growth(K, C)) > 0.0:
             return Stability(-1, _flutter(growth), loose=loose)
         return Stability(0 if loose else 1, loose=loose)
 
     def _of_many(self, solver):
         """The same of more unknowns than have all their s found."""
         M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
+        if not self._massive().any() and self.definite >= 0:
+            return by_pivot(self.definite)
         if C is not None and self.definite == 1 and self._damps(C, M):
             return Stability(1)
         solver = solver or self._lu
@@ -233,12 +253,15 @@ class Question:
         if slow is None:
             return Stability(None, "its slowest vibrations are not found", loose=True)
         loose = not self._massive().all() or abs(slow.s).min() ** 2 <= OPEN * TINY * self._fastest(M)
-        if slow.grows.any():
-            grown = slow.s[slow.grows]
-            turns = (abs(grown.imag) > NO_RATE * abs(grown)).all()
-            return Stability(-1, _flutter(grown.real.max()) if turns else EIGENVALUE, loose=loose)
+        turns = abs(slow.s.imag) > NO_RATE * abs(slow.s)
+        if (slow.grows & ~turns).any():
+            return Stability(-1, EIGENVALUE, loose=loose)
+        if slow.grows.any() and self._massive().any():
+            return Stability(-1, _flutter(slow.s.real[slow.grows].max()), loose=loose)
         if solver.sign_of_determinant() < 0 and self.definite < 0:
             return Stability(-1, EIGENVALUE, loose=loose)
+        if not slow.more and self.definite == 1:
+            return Stability(1)
         text = f"the {len(slow.s)} slowest of its vibrations do not grow, the others are too many to be asked"
         return Stability(None, text, loose=loose)
 
@@ -251,6 +274,7 @@ class Question:
 
     def _slowest(self, solver, C):
         """The `refweb.statics.slowest_vibrations.Slowest`; None where they are not found."""
+        from scipy.sparse import eye_array
         from scipy.sparse.linalg import ArpackError
 
         from .slowest_vibrations import slowest
@@ -258,7 +282,9 @@ class Question:
         if solver.singular:
             return None
         with contextlib.suppress(ArpackError):
-            return slowest(solver, self.rest.pattern.matrix(self.rest.mass.values), C)
+            if self._massive().any():
+                return slowest(solver, self.rest.pattern.matrix(self.rest.mass.values), C)
+            return slowest(solver, eye_array(len(self.rest.free), format="csr"))
         return None
 
     def _fastest(self, M):

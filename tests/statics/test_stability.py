@@ -146,6 +146,34 @@ def test_damping_in_the_frame_lets_it_go(rate):
     assert "saddle" in text and ("hold it" in text) != grows
 
 
+@pytest.mark.parametrize("natural, said", [(0.99, ""), (1.0, "is not decided"), (1.01, "is a saddle")])
+def test_lines_between_slack_and_taut(natural, said):
+    """Two bars push the middle to a side with 20 N/m; two lines that only pull hold it if they are taut, not if slack.
+
+    Where they are as long as they are apart one of them comes taut, which no tangent knows.
+    """
+    solution = refweb.run(
+        straight().replace(
+            web=refweb.Inline(
+                points=[[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0]],
+                lines=[[0, 1], [1, 2], [1, 3], [1, 4]],
+                groups=["bars", "bars", "", ""],
+                natural_length=[1.01, 1.01, natural, natural],
+                supports=[0, 2, 3, 4],
+            ),
+            cable=refweb.Cable(
+                law="tension-only",
+                modulus=1e7,
+                area=1e-4,
+                density=100.0,
+                groups={"bars": refweb.Group(law="linear")},
+            ),
+            support=[PIN],
+        )
+    )
+    assert said in words(solution) and bool(words(solution)) == bool(said)
+
+
 # Three straight lines, whose second node is pulled along the middle one, which turns with the third node
 
 
