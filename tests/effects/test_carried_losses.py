@@ -12,6 +12,7 @@ import refweb
 from refweb.dynamics.expected_cost import expected_cost
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.method_choice import decided
+from refweb.effects.base import OWN
 from refweb.effects.kicks import CELL, SHARES, THETA
 
 G = 9.81
@@ -64,9 +65,9 @@ class Kick:
         system.drive(0.0, self.x.copy(), self.after)
         self.mean, self.power = 0.5 * (self.v + self.after), 0.0
         for one, touches in zip(self.families, self.touches, strict=True):
-            out, room = np.zeros((len(one.cells), 1)), np.zeros((len(one.cells), one.rubbing.memory))
+            out, room = np.zeros((len(one.cells), one.observed)), np.zeros((len(one.cells), one.rubbing.memory))
             one.rubbing.give(1, room, self.mean, touches, 0, len(touches), out)
-            self.power += out.sum()
+            self.power += out[:, OWN].sum()
 
     def energy(self, v):
         """Of motion, by masses and moments alone [J]."""
@@ -114,7 +115,7 @@ def test_forces_of_contact_are_those_of_the_law(loss, column):
             theta, cell = touch[column], slice(int(touch[CELL]), int(touch[CELL]) + 1)
             seen = (1.0 - theta) * kick.v + theta * kick.after
             where = family.cells[cell], family.data[cell]
-            family.force(0.0, kick.x, seen, total, *where, np.zeros((1, 1)))
+            family.force(0.0, kick.x, seen, total, *where, np.zeros((1, family.observed)))
         kick.system.carriers.hand_on(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-8 * np.abs(kick.own).max())
         found += bool(np.isin(family.cells[touches[:, CELL].astype(int), :2], kick.system.net.carried).any())
@@ -127,7 +128,7 @@ def test_forces_of_drag_are_those_of_the_law():
         kick = Kick(seed, LOSSES["drag"])
         total = np.zeros_like(kick.v)
         for one in kick.families:
-            one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), 1)))
+            one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), one.observed)))
         kick.system.carriers.hand_on(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-10 * np.abs(kick.own).max())
 

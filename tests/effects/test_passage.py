@@ -75,7 +75,7 @@ def test_lines_are_hardly_deeper_than_what_is_shown(shape, exponent):
     assert most == MIDDLE * body.thickness and shown == (1.0 if shape == "sphere" else SHOWN)
     for _ in range(150):
         ends = rng.standard_normal((2, 3)) * 0.7 * body.extent
-        x, out = at(system, ends), np.zeros((1, 1))
+        x, out = at(system, ends), np.zeros((1, family.observed))
         family.force(0.0, x, 0 * x, np.zeros_like(x), family.cells, family.data, out)
         share = np.linspace(0.0, 1.0, 301)[:, None]
         deep = depths(body, (1 - share) * ends[0] + share * ends[1]).max()

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
+from refweb.effects.base import CONTACT_COLUMNS, FELT, OWN
 from refweb.effects.kicks import CELL, DAMPING, FRICTION, ROWS, SHARES, THETA, fitted
 
 GRAVITY = 9.81
@@ -74,9 +75,9 @@ class Kick:
             if not change > 1e-15 * np.abs(self.v).max():
                 break
         self.own, self.after = total - self.f, self.v + self.h * self.inverse * total
-        self.mean, out = 0.5 * (self.v + self.after), np.zeros((len(self.family.cells), 1))
+        self.mean, out = 0.5 * (self.v + self.after), np.ones((len(self.family.cells), CONTACT_COLUMNS))
         give(1, np.zeros((len(out), memory)), self.mean, self.touches, 0, self.count, out)
-        self.power = out.sum()
+        self.power, self.felt = out[:, OWN].sum(), out[:, FELT:].sum(axis=0)
 
     def by_law(self, column):
         """The forces of all contacts as the law has them at the velocities that each sees, with its own θ."""
@@ -88,7 +89,7 @@ class Kick:
             for touch in touches[own if own.any() else at_node]:  # lines that end at a node touch there as one
                 theta = touch[column]
                 seen = (1.0 - theta) * self.v + theta * self.after
-                one = self.family.cells[n : n + 1], self.family.data[n : n + 1], np.zeros((1, 1))
+                one = self.family.cells[n : n + 1], self.family.data[n : n + 1], np.zeros((1, CONTACT_COLUMNS))
                 self.family.force(0.0, self.x, seen, total, *one)
         return total
 
@@ -116,11 +117,16 @@ def test_energy_is_never_gained(shape, slip):
 
 @pytest.mark.parametrize("shape", ["sphere", "ring"])
 def test_momenta_are_kept(shape):
-    """Contact has no resultant, and no moment, of a ring about its normal, with that on the rotation of the body."""
+    """Contact has no resultant, and no moment, of a ring about its normal, with that on the rotation of the body.
+
+    What its cells show as felt is the force on the body.
+    """
     for kick in kicks(shape, 1e-3, friction=0.5, damping=0.3):
         linear, place = kick.system.rows - 1, kick.system.net.points + kick.x
         most = np.abs(kick.own).max()
         assert np.abs(kick.own[:linear].sum(axis=0)).max() <= 1e-12 * most
+        (body,) = kick.system.net.bodies
+        assert np.abs(kick.felt - kick.own[body.row]).max() <= 1e-12 * most
         moment = np.cross(place[:linear], kick.own[:linear]).sum(axis=0) + kick.own[-1]
         axes = np.eye(3) if shape == "sphere" else np.array([SHAPES["ring"]["normal"]])
         assert np.abs(axes @ moment).max() <= 1e-11 * most
