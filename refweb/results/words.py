@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .units import other_errors, place, readable, scale_of, with_error
+from .units import larger, other_errors, place, readable, scale_of, with_error
 
 FEW_BREAKS = 5
 """Number of breaks that are told one by one."""
@@ -38,7 +38,8 @@ def rows_of_steps(steps):
     columns = {name: [step["results"][name] for step in steps] for name in steps[-1]["results"]}
     factors = {}
     for name, column in columns.items():
-        factors[name], unit = scale_of(max(abs(result["value"]) for result in column), column[-1]["unit"])
+        size = max(larger(result["value"], result["error"]) for result in column)
+        factors[name], unit = scale_of(size, column[-1]["unit"])
         names.append(f"{name} [{unit}]" if unit else name)
     rows = []
     for n, step in enumerate(steps):
