@@ -108,6 +108,9 @@ def run_within_drift(simulation, folder, tell):
         from .twin_error import add_errors
 
         known = add_errors(simulation, run, ended, rows)
+        named = {o.name: o for o in scene.observables}
+        bounded = {name: named[name].bounded(one, simulation.system) for name, one in solution.reduced.items()}
+        solution.reduced = bounded
         if folder is not None:
             folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:

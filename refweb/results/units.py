@@ -41,11 +41,17 @@ def with_error(value, error):
     return f"{value:.{min(left, MOST_DIGITS - whole)}f} ± {text}"
 
 
-def readable(value, error, unit):
-    """A value with its error in the unit of the larger of both: ``31.4848 mm``, ``100.66 ± 0.55 mm``, ``0 ± 90 mm``."""
+def readable(value, error, unit, within=None):
+    """A value with its error in the unit of the larger of both: ``31.4848 mm``, ``100.66 ± 0.55 mm``, ``0 ± 90 mm``.
+
+    ``within`` are the least and the largest value of those that are possible, where ± goes beyond them.
+    """
     factor, name = scale_of(larger(value, error), unit)
-    text = with_error(value / factor, error and error / factor)
-    return f"{text} {name}".rstrip()
+    text = f"{with_error(value / factor, error and error / factor)} {name}".rstrip()
+    if within is None:
+        return text
+    least, most = (f"{end / factor:.3g}" for end in within)
+    return f"{text}, from {least} to {most}"
 
 
 def larger(value, error):

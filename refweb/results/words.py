@@ -25,7 +25,7 @@ def rows_of_results(results, dynamic):
     """Results with their ±, where and, in dynamics, when they are."""
     rows = []
     for name, result in results.items():
-        value = readable(result["value"], result["error"], result["unit"])
+        value = readable(result["value"], result["error"], result["unit"], result.get("within"))
         time = [f"t = {result['time']:.6g} s"] if dynamic else []
         rows.append([name, value, *time, f"at {where}" if (where := _place(result)) else ""])
     return Rows(["result", "value", *(["time"] if dynamic else []), "place"], rows, [])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from .observable import Observable, Value
+from .observable import NOT_NEGATIVE, Observable, Value
 
 
 class Overlap(Observable):
@@ -29,6 +29,10 @@ class Overlap(Observable):
         deep = state.overlap(self.body(state.system.net))
         at = int(np.argmax(deep))
         return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
+
+    def bounds(self, system):
+        """A depth."""
+        return NOT_NEGATIVE
 
     def probe(self, system):
         """Of what the family of its contact shows."""
