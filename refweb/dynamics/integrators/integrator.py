@@ -264,8 +264,8 @@ class Integrator(Protocol):
     beside : bool
         Whether ``advance`` runs compiled and releases the interpreter, so that a twin may run in a thread beside it.
     breathe : callable
-        Called with the time [s] some times a second of ``advance``; it may raise, and then the run is as it was at the
-        row before.
+        Called with the time [s] some times a second of ``advance``, or once in some steps; it may raise, which ends the
+        run: one of a compiled loop is then as it was at the row before.
 
     Notes
     -----
