@@ -86,7 +86,7 @@ def described(value, seen):
     if hasattr(value, "machine_code_key"):
         return value.machine_code_key(seen)
     if isinstance(value, tuple):
-        return f"{type(value).__qualname__}({', '.join(described(one, seen) for one in value)})"
+        return f"{type(value).__qualname__} {[described(one, seen) for one in value]}"
     if isinstance(value, bool | int | float | str | bytes | type(None) | np.generic | np.dtype):
         return repr(value)
     if isinstance(value, np.ndarray):

@@ -50,7 +50,7 @@ class Budget:
     """
 
     def __init__(self, given):
-        self._given, self._began, self._begun = given, clock(), None
+        self._given, self._began, self._begun = given, clock(), (clock(), 0.0)
         self.runs, self.kept = [], True
 
     @property

@@ -240,8 +240,7 @@ def step_on(
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    lines, first = families.outs[0], families.forces[0]
-    cells_of_lines, data_of_lines = families.cells[0], families.data[0]
+    lines, first, data_of_lines = families.outs[0], families.forces[0], families.data[0]
     near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
     pushing, pushed, length_force = model.outside.pushing.size > 0, running.ledger.pushed, running.length_force
     stages, looked = scheme.drifts.size - 1, extremes.looked
@@ -270,7 +269,7 @@ def step_on(
         if near:
             follow_near(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
-        first(now, x, v, f, cells_of_lines, data_of_lines, lines)
+        first(now, x, v, f, families.cells[0], data_of_lines, lines)
         for i in still:
             act(i, now, x, v, f, families)
         if near:
@@ -282,8 +281,7 @@ def step_on(
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
-        if model.contacts.families.shape[0]:
-            feel(model.contacts, families)
+        feel(model.contacts, families)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, families)
         book_motion(driven, mass, x, v, f, before, work)
@@ -459,8 +457,7 @@ def begin(
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
     hand_on(x, f, model.inertia.turns)
-    if model.contacts.families.shape[0]:
-        feel(model.contacts, families)
+    feel(model.contacts, families)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE
         extremes.values[i] = observed.probes[i](
