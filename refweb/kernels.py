@@ -49,7 +49,8 @@ import numpy as np
 from numba import types
 
 from .compiled.kernel import kernel
-from .compiled.records import Arrays, Cube, Functions, IntegerMatrix, Integers, Matrix, Record, Vector
+from .compiled.records import Cube, IntegerMatrix, Integers, Matrix, Record, Vector
+from .compiled.tables import Arrays, Functions
 
 __all__ = [
     "Arrays",

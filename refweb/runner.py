@@ -253,7 +253,7 @@ def _cpu_by_effect(system, solution):
     state, share, scene = solution.state, {}, solution.scene
     calls = solution.solver["nfev"] or 0
     if scene.solve.kind == "dynamic":
-        from .dynamics.twin_error import steps_with_twin
+        from .dynamics.budget import steps_with_twin
 
         calls *= steps_with_twin(scene)
     for family in system.families:

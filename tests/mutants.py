@@ -474,11 +474,11 @@ MUTANTS = [
     ),
     # Machine code
     Mutant("compiled/keys", "constants = constants[1:]", "pass"),
-    Mutant("compiled/keys", "return value.machine_code_key(seen)", 'return "a kernel"'),
+    Mutant("compiled/keys", "return value.machine_code_key()", 'return "a kernel"'),
     Mutant("compiled/store", "if content[:CHECK] == _checksum(content[CHECK:]):", "if content:"),
     Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
-    Mutant("compiled/records", "and value.flags.c_contiguous", "and value.size"),
-    Mutant("compiled/records", "for _ in range(2):  # what", "for _ in range(1):  # what"),
+    Mutant("compiled/tables", "and value.flags.c_contiguous", "and value.size"),
+    Mutant("compiled/tables", "for _ in range(2):  # what", "for _ in range(1):  # what"),
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),

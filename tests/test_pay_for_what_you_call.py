@@ -44,7 +44,7 @@ EVERY |= {
     *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web", "groups")),
 }
 EVERY |= {"net.rigid_body", "effects.line_kernels", "compiled"}
-EVERY |= {f"compiled.{name}" for name in ("kernel", "keys", "numba_internals", "records", "store")}
+EVERY |= {f"compiled.{name}" for name in ("kernel", "keys", "numba_internals", "records", "store", "tables")}
 EVERY |= {
     "solution",
     "results",
@@ -89,9 +89,28 @@ DYNAMICS |= {
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
 LOOP = ("central_difference", "explicit_loop", "between_steps", "rows", "step", "step_bound")
-LOOP += ("records", "rubbed", "nearby", "guard", "contacts")
+LOOP += (
+    "records",
+    "rubbed",
+    "nearby",
+    "guard",
+    "contacts",
+    "features",
+    "observed",
+    "room",
+    "spread",
+    "explicit_course",
+)
 EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP} | {"net.rotation_bounds", "system.contact_forces"}
-AROUND_STEPS = "step_observer", "step_limits", "simpson_book", "measurements", "event_search", "tolerances"
+AROUND_STEPS = (
+    "step_observer",
+    "observed_course",
+    "step_limits",
+    "simpson_book",
+    "measurements",
+    "event_search",
+    "tolerances",
+)
 SUNDIALS = TANGENT | {"system.mass"} | {f"dynamics.integrators.{name}" for name in ("sundials", *AROUND_STEPS)}
 METHOD = {
     "newton": NEWTON | LOAD_STEPS,

@@ -2,9 +2,9 @@
 
 ===================  ==========================================================================================
 `kernel`             what a kernel is: compiled when it is called, listed or prepared, and never before
-`records`            records and tables that kernels take by one pointer, with the public means of numba
+`records`, `tables`  what kernels take by one pointer
 `keys`               what the machine code of a kernel depends on
-`store`              where it is kept: a folder of the user's, and one beside the package in a wheel
+`store`              where it is kept: a folder of the user's, and one in the package of a wheel
 `numba_internals`    all that relies on private parts of numba, each with its reason and a way without it
 ===================  ==========================================================================================
 """

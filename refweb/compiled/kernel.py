@@ -79,9 +79,14 @@ class Kernel:
         options = sorted((name, *(sorted(v) if isinstance(v, set) else [v])) for name, v in self._options.items())
         return keys.digest(keys.of_function(self.py_func), options, self._counted, self.signature)
 
-    def machine_code_key(self, seen):
+    @property
+    def _linked(self):
+        """Whether kernels that name it are optimized with it."""
+        return self.apart is None or numba_internals.PLAIN
+
+    def machine_code_key(self):
         """What a caller's machine code depends on, see `refweb.compiled.keys.described`."""
-        return self._key if self.apart is None or numba_internals.PLAIN else f"apart {self._slot.symbol}"
+        return self._key if self._linked else _ByAddress(self).machine_code_key()
 
     @functools.cached_property
     def _slot(self):
@@ -108,9 +113,7 @@ class Kernel:
     @property
     def _numba_type_(self):
         with numba_internals.lock:
-            if self.apart is None or numba_internals.PLAIN:
-                return self._compiled()._numba_type_
-            return numba_internals.Called(self.signature, self._slot.symbol)
+            return (self._compiled() if self._linked else _ByAddress(self))._numba_type_
 
     def known(self):
         """Whether its machine code is loaded, or on disk."""
@@ -169,7 +172,7 @@ class _ByAddress:
     def _numba_type_(self):
         return numba_internals.Called(self.kernel.signature, self.kernel._slot.symbol)
 
-    def machine_code_key(self, seen):
+    def machine_code_key(self):
         """As of one that is ``apart``."""
         return f"apart {self.kernel._slot.symbol}"
 

@@ -36,10 +36,10 @@ def platform_key(processor):
     return " ".join([sys.implementation.cache_tag, platform.system(), platform.machine(), *versions, *processor, own])
 
 
-def code_of(code):
-    """What a code object does, as a text: neither line numbers nor a docstring."""
+def code_of(code, docstring=None):
+    """What a code object does, as a text: neither line numbers nor its docstring, which is its first constant."""
     constants = [code_of(one) if isinstance(one, python.CodeType) else repr(one) for one in code.co_consts]
-    if code.co_consts and isinstance(code.co_consts[0], str):  # a docstring, or a text that does not matter to numba
+    if docstring is not None and code.co_consts[:1] == (docstring,):
         constants = constants[1:]
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
     return repr((code.co_code.hex(), constants, names, code.co_argcount, code.co_flags))
@@ -84,7 +84,7 @@ def described(value, seen):
         Functions that are being described, of which no more is said.
     """
     if hasattr(value, "machine_code_key"):
-        return value.machine_code_key(seen)
+        return value.machine_code_key()
     if isinstance(value, tuple):
         return f"{type(value).__qualname__} {[described(one, seen) for one in value]}"
     if isinstance(value, bool | int | float | str | bytes | type(None) | np.generic | np.dtype):
@@ -107,4 +107,4 @@ def of_function(function, seen=()):
         return f"again {function.__qualname__}"
     seen = (*seen, function)
     parts = [f"{name} = {described(value, seen)}" for name, value in captured(function)]
-    return digest(function.__module__, function.__qualname__, code_of(function.__code__), *parts)
+    return digest(function.__module__, function.__qualname__, code_of(function.__code__, function.__doc__), *parts)

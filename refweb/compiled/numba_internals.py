@@ -7,10 +7,13 @@ part                   reason                                                  w
                        that a changed callee leaves stale machine code, and
                        a comment makes all of a file stale
 options of `njit`      entries from Python are two fifths of what it takes to  they are compiled, references are
-(`BARE`, `UNCOUNTED`)  compile, and counting of references costs 10 ns an      counted
+(`BARE`, ``_nrt``)     compile, and counting of references costs 10 ns an      counted
                        array and call
 call by address        a caller that links its callees optimizes all that is   kernels are linked
                        below it again
+operators of types     kernels read records and tables as Python does         none: what `records` and `tables`
+of one's own                                                                   need of numba beside its
+                                                                               ``extending`` stands here
 =====================  ======================================================  ====================================
 
 ``REFWEB_PLAIN=1`` takes the right column. Addresses of functions and the calling convention of numba are needed in
@@ -20,6 +23,7 @@ both: tables of kernels have them. numba is bounded above in ``pyproject.toml``.
 from __future__ import annotations
 
 import ctypes
+import functools
 import importlib
 import os
 import pickle
@@ -35,10 +39,13 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.imputils import lower_builtin, lower_constant
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
-from numba.core.typing.templates import Signature
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, Signature, infer_global
 from numba.extending import models, register_model
+from numba.np.arrayobj import make_array, populate_array
 
 from . import keys, store
+
+__all__ = ["AbstractTemplate", "AttributeTemplate", "infer_global", "lower_builtin", "make_array", "populate_array"]
 
 PLAIN = os.environ.get("REFWEB_PLAIN") == "1"
 """Whether kernels do with the public parts of numba."""
@@ -52,6 +59,7 @@ lock = global_compiler_lock
 """numba's own: one thread compiles at a time."""
 
 
+@functools.cache
 def host():
     """(name, features) of the processor that numba compiles for."""
     features = _config.CPU_FEATURES
@@ -61,6 +69,7 @@ def host():
     return _config.CPU_NAME or llvm.get_host_cpu_name(), features
 
 
+@functools.cache
 def shipped():
     """(processor, features) whose machine code this processor runs and a wheel may bring; None where none does."""
     found, own = store.portable(), llvm.get_host_cpu_features()
@@ -94,19 +103,19 @@ class Cache:
         made = keys.digest(keys.platform_key(processor or host()), self.key(), *map(str, arguments))
         return f"{self.name}-{made}"
 
-    def _content(self, signature):
-        content = store.read(self.file(signature))
-        if content is None and store.SHIPPED.is_dir() and (other := shipped()):
-            content = store.read_shipped(self.file(signature, other))
-        return content
+    def _paths(self, signature):
+        """Files that may have the machine code of a signature: the user's own, and that of a wheel."""
+        yield store.folder() / self.file(signature)
+        if store.SHIPPED.is_dir() and (other := shipped()):
+            yield store.SHIPPED / self.file(signature, other)
 
     def has(self, signature):
         """Whether there is machine code of a signature."""
-        return self._content(signature) is not None
+        return any(path.exists() for path in self._paths(signature))
 
     def load_overload(self, signature, target_context):
         """The machine code of a signature, None where there is none."""
-        content = self._content(signature)
+        content = next((found for path in self._paths(signature) if (found := store.read(path)) is not None), None)
         if content is None:
             return None
         rtsys.initialize(target_context)

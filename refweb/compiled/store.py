@@ -46,32 +46,25 @@ def portable():
     return ("generic", "") if machine in ("aarch64", "arm64") else None
 
 
-def _checked(path):
-    """Content of a file whose checksum fits; None where there is none."""
-    with contextlib.suppress(OSError):
-        content = path.read_bytes()
-        if content[:CHECK] == _checksum(content[CHECK:]):
-            return content[CHECK:]
-    return None
-
-
 def _checksum(content):
     return hashlib.blake2b(content, digest_size=CHECK).digest()
 
 
-def read(name):
-    """Content of a file in the user's folder; None where there is none, or a damaged one."""
-    path = folder() / name
-    content = _checked(path)
+def read(path):
+    """Content of a file, whose use is noted; None where there is none, or a damaged one."""
     with contextlib.suppress(OSError):
-        if content is not None and time.time() - path.stat().st_mtime > NOTED:
+        content = path.read_bytes()
+        if content[:CHECK] == _checksum(content[CHECK:]):
+            _note_use(path)
+            return content[CHECK:]
+    return None
+
+
+def _note_use(path):
+    """Give a file the present time, where its own is older than `NOTED`."""
+    with contextlib.suppress(OSError):
+        if time.time() - path.stat().st_mtime > NOTED:
             os.utime(path)
-    return content
-
-
-def read_shipped(name):
-    """Content of a file that a wheel has brought; None where there is none."""
-    return _checked(SHIPPED / name)
 
 
 def write(name, content):

@@ -103,3 +103,16 @@ class Budget:
         spent = clock() - began
         if spent > left or (spent > SEEN * left and spent > SURE * left * share):
             raise Spent(f"{100.0 * share:.2g} % of it took {spent:.3g} s")
+
+
+def steps_with_twin(scene):
+    """Steps of a scene's run and its twin over those of the run: of order 2, half the error is √2 times the steps."""
+    return 1.0 + math.sqrt(2.0) if scene.accuracy.error == "twin" else 1.0
+
+
+def look(simulation, share, twin=False):
+    """End a run of which a share is done, or its twin, where both would cost too much; `Spent`."""
+    if not simulation.integrator.beside:  # the twin comes after the run
+        both = steps_with_twin(simulation.scene)
+        share = (1.0 + (both - 1.0) * share if twin else share) / both
+    simulation.budget.watch(share)

@@ -11,8 +11,8 @@ from ..net.rotation import Turns
 from ..net.rotation_bounds import carry_rates
 from ..registry import INTEGRATORS
 from ..results.units import prefixed
+from .budget import steps_with_twin
 from .method_choice import step_price
-from .twin_error import steps_with_twin
 
 TELLING = 0.95
 """Share of a step below which that where all is touched is told as well."""

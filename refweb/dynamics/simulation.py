@@ -12,7 +12,7 @@ from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import Standing, follow
-from .budget import Budget
+from .budget import Budget, look
 from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
 from .integrators.crossings import APART, BESIDE, THROUGH
@@ -184,7 +184,7 @@ class Simulation:
 
         def told(share):
             tell(share)
-            self.look_at_budget(share)
+            look(self, share)
 
         integrator.breathe = lambda t: told(t / times[-1])
         try:
@@ -213,15 +213,6 @@ class Simulation:
         relative = self.standing.knob if integrator.knob == "rtol" else 0.0
         corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
         return Ended(self.watch.results(course, self._tables[-1][-1]), corrections, course)
-
-    def look_at_budget(self, share, twin=False):
-        """End a run of which a share is done, or its twin, where both would cost too much; `Spent`."""
-        if not self.integrator.beside:  # the twin comes after the run
-            from .twin_error import steps_with_twin
-
-            both = steps_with_twin(self.scene)
-            share = (1.0 + (both - 1.0) * share if twin else share) / both
-        self.budget.watch(share)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin, see `refweb.dynamics.history.Watch.compared`."""

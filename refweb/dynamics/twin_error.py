@@ -12,17 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..results.solution import Result
+from .budget import look
 from .history import SPREAD
 from .integrators.integrator import Course
 from .schedule import blocks
 
 THREADS = True
 """Whether twins may have a thread of their own: not in processes that share a machine as it is."""
-
-
-def steps_with_twin(scene):
-    """Steps of a scene's run and its twin over those of the run: of order 2, half the error is √2 times the steps."""
-    return 1.0 + np.sqrt(2.0) if scene.accuracy.error == "twin" else 1.0
 
 
 MOST_CHANCE, TELLING = 10.0, 0.3
@@ -87,7 +83,7 @@ class Twin:
     def _breathe(self, t):
         if self._stop.is_set():
             raise InterruptedError(f"the twin run was ended at t = {t:g} s")
-        self._simulation.look_at_budget(t / self._simulation.schedule.times[-1], twin=True)
+        look(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
 
     def _run(self, made):
         simulation, rows = self._simulation, []

@@ -32,12 +32,25 @@ from ...net.rotation import hand_on, note_turns, turn_on, turns_within
 from .averages import PARTS, look_for_means
 from .contacts import feel
 from .energy_book import book_energies, own_energy
-from .extremes import EDGE, Extremes, correction, look, look_at, look_at_sums, take_over, time_of_top
+from .extremes import (
+    EDGE,
+    Extremes,
+    begin_anew,
+    correct_within,
+    correction,
+    look,
+    look_at,
+    look_at_sums,
+    take_over,
+    time_of_top,
+)
 from .nearby import show_near
 from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
 
 if TYPE_CHECKING:
-    from .records import Model, Observed, Running
+    from .observed import Observed
+    from .records import Model, Running
+    from .room import Room
 
 FourfoldArray = Annotated[np.ndarray, types.Array(types.float64, 4, "C")]
 LOOKS = PARTS
@@ -344,3 +357,44 @@ def look_inside(
         if turned:
             look_at_tops(now, h, not alone, inside, total, extremes, model, observed, running)
     show_again(now, inside, model, observed, running)
+
+
+@kernel(apart=("driven",))
+def look_behind(model: Model, observed: Observed, running: Running, room: Room) -> None:
+    """Look for extremes behind a corner of motion, where velocities have jumped."""
+    now, lines, where, total = running.clock[0].time, model.families.outs[0], room.where, room.total
+    x, v, f, extremes = running.x, running.v, running.f, running.extremes
+    begin_anew(extremes)
+    if observed.followed.size + observed.windows.slots.size:
+        look(now, x, v, f, lines, where, observed, extremes, False)
+    if observed.windows.slots.size:
+        look_for_means(0, now, x, v, f, lines, where, observed, running.averages)
+    if observed.sums.shape[0]:
+        look_at_books(now, x, v, total, extremes, False, model, observed, running)
+    begin_anew(extremes)
+
+
+@kernel(apart=("watched",))
+def look_again(
+    now: float,
+    h: float,
+    fresh: bool,
+    smooth: bool,
+    inside: Inside,
+    total: Vector,
+    model: Model,
+    observed: Observed,
+    running: Running,
+) -> bool:
+    """Look for extremes where values turn back near the end of a step; whether steps that follow are looked at inside.
+
+    What was found inside of a ``fresh`` step of order 2 are corrections.
+    """
+    if smooth:
+        look_at_tops(now, h, True, inside, total, running.extremes, model, observed, running)
+        show_again(now, inside, model, observed, running)
+    elif fresh:
+        correct_within(running.extremes, observed.signs)
+    else:
+        look_back(inside, total, model, observed, running)
+    return smooth

@@ -13,7 +13,7 @@ book of energies is checked at every row: ``|ΔE − work|`` above `DRIFT` of th
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,48 +25,23 @@ from .averages import begin_averages
 from .between_steps import LOOKS
 from .energy_book import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
-from .explicit_loop import BREATH, HELD, Room, advance_rows, begin, step_on
+from .explicit_course import ExplicitCourse
+from .explicit_loop import BREATH, HELD, advance_rows, begin, step_on
 from .extremes import Extremes
+from .features import features
 from .guard import look_anew
-from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator, Variant
+from .integrator import MAX_STEPS_PER_ROW, History, Integrator, Variant
 from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
 from .nearby import forget, look_at_all
-from .records import CLOCK, Model, Observed, Running, Scheme, aligned, features
+from .observed import Observed
+from .records import CLOCK, Model, Running, Scheme
+from .room import Room
 from .step_bound import safe_step
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
 SHARED = tuple(CLOCK.names or ())[: (CLOCK.names or ()).index("least")]
 """Numbers that a course and the loop's clock have in common."""
-
-
-@dataclass(eq=False, kw_only=True)
-class ExplicitCourse(Course):
-    """State of an explicit run; a run that goes on from it is the same run bit for bit.
-
-    The compiled loop works in its arrays.
-
-    Attributes
-    ----------
-    force : ndarray, shape (rows, 3)
-        Force [N], last seen with the velocity at half a step.
-    power : ndarray, shape (families,)
-        Power of each family that is booked by it at the last step [W].
-    way : float
-        By how much two rows may have come nearer to each other in a step, at most [m]; infinite where that is not
-        known.
-    before : ndarray, shape (3, rows, 3)
-        Displacement, velocity and force at the row or the corner of a table before.
-    """
-
-    force: np.ndarray
-    power: np.ndarray
-    way: float = 0.0
-    before: np.ndarray = field(init=False, metadata={"saved": False})
-
-    def __post_init__(self):
-        self.x, self.v, self.force = aligned(self.x), aligned(self.v), aligned(self.force)
-        self.before = np.stack([self.x, self.v, self.force])
 
 
 class CentralDifference(Integrator):

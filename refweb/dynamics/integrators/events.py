@@ -12,7 +12,7 @@ from ...kernels import Integers, Matrix, Vector, inner, kernel
 from .extremes import look_at
 
 if TYPE_CHECKING:
-    from .records import Observed
+    from .observed import Observed
 
 EVENT = np.dtype(
     [

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import Integers, Matrix, Record, Vector, copy_rows, kernel
+from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import hand_on
 from ...net.rotation_bounds import fastest_point, hardest_push
 from ...results.probes import PLACE
-from .averages import average, look_for_means
-from .between_steps import Inside, look_at_books, look_at_tops, look_back, look_inside, show_again
+from .averages import average
+from .between_steps import look_again, look_at_books, look_behind, look_inside
 from .contacts import feel
 from .energy_book import (
     act,
@@ -32,12 +32,14 @@ from .energy_book import (
     note_motion,
 )
 from .events import ended_by, note_events
-from .extremes import begin_anew, correct_within, look, look_at, note_time, plain_value, take_over, turns_back
+from .extremes import look_at, note_time, plain_value, take_over, turns_back
 from .guard import LEAST, SHORTER, TOLD, comes_through, foreseen, look_back_at_drift, passes
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_book import add_half_steps, push_on, set_push
-from .nearby import covered, follow_near, reach_all, show_near, spread_of
+from .nearby import covered, follow_near, reach_all, show_near
+from .room import Room
 from .rows import energies_now, write_row
+from .spread import spread_of
 from .step import (
     add_forces,
     give_impulse,
@@ -57,7 +59,8 @@ from .step_bound import safe_step, step_by_elements
 
 if TYPE_CHECKING:
     from .extremes import Extremes
-    from .records import Model, Observed, Reels, Running, Scheme
+    from .observed import Observed
+    from .records import Model, Reels, Running, Scheme
 
 HELD = -2
 """What the loop returns where lines would pass whatever the step."""
@@ -100,47 +103,6 @@ def inner_stages(
     return True
 
 
-@kernel(apart=("driven",))
-def look_behind(model: Model, observed: Observed, running: Running, room: Room) -> None:
-    """Look for extremes behind a corner of motion, where velocities have jumped."""
-    now, lines, where, total = running.clock[0].time, model.families.outs[0], room.where, room.total
-    x, v, f, extremes = running.x, running.v, running.f, running.extremes
-    begin_anew(extremes)
-    if observed.followed.size + observed.windows.slots.size:
-        look(now, x, v, f, lines, where, observed, extremes, False)
-    if observed.windows.slots.size:
-        look_for_means(0, now, x, v, f, lines, where, observed, running.averages)
-    if observed.sums.shape[0]:
-        look_at_books(now, x, v, total, extremes, False, model, observed, running)
-    begin_anew(extremes)
-
-
-@kernel(apart=("watched",))
-def look_again(
-    now: float,
-    h: float,
-    fresh: bool,
-    smooth: bool,
-    inside: Inside,
-    total: Vector,
-    model: Model,
-    observed: Observed,
-    running: Running,
-) -> bool:
-    """Look for extremes where values turn back near the end of a step; whether steps that follow are looked at inside.
-
-    What was found inside of a ``fresh`` step of order 2 are corrections.
-    """
-    if smooth:
-        look_at_tops(now, h, True, inside, total, running.extremes, model, observed, running)
-        show_again(now, inside, model, observed, running)
-    elif fresh:
-        correct_within(running.extremes, observed.signs)
-    else:
-        look_back(inside, total, model, observed, running)
-    return smooth
-
-
 @kernel(leaf=True, forceinline=True)
 def begin_forces(t, changing, extra, reaction, push, model, running):
     """Write powers, force of supports and push from outside at the time t that steps begin at."""
@@ -169,61 +131,6 @@ def change_lengths(
     note_lengths(reels, was)
     set_lengths(t, reels, lines)
     book_lengths(t, x, reels, was, length_force, work)
-
-
-class Room(Record):
-    """Space for what does not stay from step to step.
-
-    Attributes
-    ----------
-    where : ndarray of int, shape (2,)
-        The place of a value.
-    reaction, known, push : ndarray, shape (3,)
-        Force of the supports [N], what is known of plain probes, and the force that is integrated along the steps [N].
-    before : ndarray, shape (driven, 7)
-        State of rows whose motion is prescribed, ahead of a step.
-    aside, extra, half, momenta : ndarray, shape (rows, 3)
-        Velocities and forces that nobody needs, velocities at half a step [m/s], and momenta [N s].
-    was : ndarray, shape (changing,)
-        Natural lengths ahead of a step [m].
-    total : ndarray, shape (families + 3,)
-        Energies [J], and the size of a step [s].
-    inside : refweb.dynamics.integrators.between_steps.Inside
-        Space for looks inside of a step.
-    """
-
-    where: Integers
-    reaction: Vector
-    known: Vector
-    push: Vector
-    before: Matrix
-    aside: Matrix
-    extra: Matrix
-    half: Matrix
-    momenta: Matrix
-    was: Vector
-    total: Vector
-    inside: Inside
-
-    @classmethod
-    def of(cls, model, running):
-        """Space for the steps of a run."""
-        rows, sums, vectors = len(running.x), len(running.work) + 2, (np.zeros((len(running.x), 3)) for _ in range(4))
-        losses = [np.empty_like(model.families.outs[i]) for i in model.rubbed.families.tolist()]
-        return cls(
-            where=np.zeros(2, dtype=np.int64),
-            reaction=np.zeros(3),
-            known=np.zeros(3),
-            push=np.zeros(3),
-            before=np.empty((len(model.inertia.driven), 7)),
-            aside=next(vectors),
-            extra=next(vectors),
-            half=next(vectors),
-            momenta=next(vectors),
-            was=np.empty(len(model.reels.lengths)),
-            total=np.zeros(sums),
-            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums, losses),
-        )
 
 
 @kernel(leaf=True, apart=())

@@ -24,7 +24,7 @@ from ...kernels import Integers, Matrix, Record, Vector, inner, kernel
 from ...results.probes import NODES, PLACE, farthest, largest_in
 
 if TYPE_CHECKING:
-    from .records import Observed
+    from .observed import Observed
 
 EDGE = 2.0**-16
 """Share of a step at whose distance from an end it is looked at for the rate there."""

@@ -48,7 +48,8 @@ from ...kernels import (
 )
 from ...net.rotation_bounds import beside_places
 from .crossings import APART, BESIDE, THROUGH, note_met
-from .nearby import WAY, goes_freely, near_of, spread_of
+from .nearby import WAY, goes_freely, near_of
+from .spread import spread_of
 
 if TYPE_CHECKING:
     from .nearby import Nearby

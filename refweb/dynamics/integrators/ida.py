@@ -33,7 +33,8 @@ import numpy as np
 
 from ...errors import InputError, SolverError
 from .integrator import Variant
-from .step_observer import ObservedCourse, Stopped
+from .observed_course import ObservedCourse
+from .step_observer import Stopped
 from .sundials import Sundials, Symmetric
 from .tolerances import scales
 

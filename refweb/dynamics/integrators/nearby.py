@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numba import from_dtype, types
 
-from ...compiled.records import ArraysType
+from ...compiled.tables import ArraysType
 from ...kernels import (
     INDICES,
     MATRIX,
@@ -39,6 +39,7 @@ from ...kernels import (
     kernel,
 )
 from ...net.rotation_bounds import fastest_surface
+from .spread import spread_of, spread_since
 
 if TYPE_CHECKING:
     from .records import Families, Model
@@ -319,29 +320,6 @@ def covered(way: float, x: Matrix, nearby: Nearby, families: Families) -> bool:
     for m in range(nearby.families.size):  # how deep the pairs are is not known before the next forces
         families.outs[nearby.families[m]][:, 0] = math.inf
     return True
-
-
-@kernel(leaf=True, fastmath={"contract", "nnan", "nsz"})
-def spread_of(rows):
-    """Root of the sum of the squares of the ranges of three columns: no two rows differ by more."""
-    a0 = a1 = a2 = -math.inf
-    b0 = b1 = b2 = math.inf
-    for r in range(rows.shape[0]):
-        x, y, z = rows[r, 0], rows[r, 1], rows[r, 2]
-        a0, b0 = x if x > a0 else a0, x if x < b0 else b0
-        a1, b1 = y if y > a1 else a1, y if y < b1 else b1
-        a2, b2 = z if z > a2 else a2, z if z < b2 else b2
-    return math.sqrt((a0 - b0) ** 2 + (a1 - b1) ** 2 + (a2 - b2) ** 2)
-
-
-@kernel()
-def spread_since(x, at):
-    """The same of how far rows have come from where they were [m]."""
-    way = np.empty(at.shape)
-    for r in range(at.shape[0]):
-        for k in range(3):
-            way[r, k] = x[r, k] - at[r, k]
-    return spread_of(way)
 
 
 @kernel(leaf=True, forceinline=True)

@@ -2,7 +2,7 @@
 
 Kernels of one signature, and arrays of one type, stand in tables, so that the loop is compiled once for any mixture of
 effects. What a scene does not have is an empty table or array, and the kernels that would be called for it are not
-compiled, see `features`.
+compiled, see `refweb.dynamics.integrators.features`.
 """
 
 from __future__ import annotations
@@ -13,10 +13,8 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
-from ...effects.base import CONTACT
 from ...kernels import (
     INDICES,
-    INTEGERS,
     MATRIX,
     VECTOR,
     Arrays,
@@ -29,7 +27,6 @@ from ...kernels import (
     Indices,
     IntegerMatrix,
     Integers,
-    IntegerTable,
     LinesTable,
     Matrix,
     MatrixTable,
@@ -38,9 +35,7 @@ from ...kernels import (
     VectorTable,
 )
 from ...net.rotation import Turns
-from ...results.probes import PROBE, plain_of
-from ...system.contact_forces import FAMILY
-from .averages import Averages, Windows
+from .averages import Averages
 from .contacts import Contacts
 from .energy_book import no_energy
 from .events import EventArray
@@ -74,7 +69,6 @@ energy that a drift is held against at least, the time from which steps are equa
 none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not pass, 0
 where it is not, and whether it is to be cut."""
 ClockArray = Annotated[np.ndarray, types.Array(from_dtype(CLOCK), 1, "C")]
-ProbeTable = Annotated[Functions, PROBE]
 
 LINE = 64
 """Bytes of a line of the cache."""
@@ -316,65 +310,6 @@ class Model(Record):
         return cls(inertia, families, rubbed, motions, reels, system.corners, outside, *kept)
 
 
-class Observed(Record):
-    """What is looked at.
-
-    Attributes
-    ----------
-    probes, rows, data : table
-        Kernel of each probe and its numbers.
-    sums : ndarray, shape (sums, families + 3)
-        Weights of each sum.
-    signs : ndarray, shape (probes + sums,)
-        1 for the largest value, −1 for the smallest, 0 for neither, as for probes that have a window.
-    followed : ndarray of int
-        Probes whose sign is not 0.
-    windows : refweb.dynamics.integrators.averages.Windows
-        Windows of the probes that are averaged.
-    shown : ndarray of int
-        Families whose values per cell are the data of probes.
-    plain : ndarray of int, shape (probes, 4)
-        What the loop looks at itself, see `refweb.results.probes.plain_of`.
-    scales : ndarray, shape (probes,)
-        Factor on that.
-    """
-
-    probes: ProbeTable
-    rows: IntegerTable
-    data: MatrixTable
-    sums: Matrix
-    signs: Vector
-    followed: Integers
-    windows: Windows
-    shown: Integers
-    plain: IntegerMatrix
-    scales: Vector
-
-    @classmethod
-    def of(cls, probes, sums, outs, contacts):
-        """Probes and sums of a system whose families write ``outs`` per cell, and bodies feel ``contacts``."""
-        shared = {CONTACT: contacts.felt, **dict(enumerate(outs))}
-        numbers = [shared.get(p.family, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
-        shown = [probe.family for probe in probes if probe.family >= 0]
-        if any(probe.family == CONTACT for probe in probes):
-            shown += contacts.families[:, FAMILY].tolist()
-        windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
-        signs[windows.slots] = 0.0
-        plain = [plain_of(probe) for probe in probes]
-        return cls(
-            probes=Functions(PROBE, [probe.kernel for probe in probes]),
-            rows=Arrays(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
-            data=Arrays(MATRIX, numbers),
-            sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(outs) + 3),
-            signs=signs,
-            followed=np.flatnonzero(signs[: len(probes)]),
-            windows=windows,
-            shown=np.unique(shown).astype(np.int64),
-            plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
-            scales=np.array([scale for _, scale in plain], dtype=float),
-        )
-
-
 class Running(Record):
     """What the loop writes; arrays of an explicit course, and numbers that pass from one part of a row to the next.
 
@@ -423,46 +358,3 @@ class Running(Record):
     length_force: Matrix
     crossings: Matrix
     touches: MatrixTable
-
-
-def features(scheme, model, observed, events):
-    """Names of what a run has and not every run has: kernels for what it has not are not compiled.
-
-    Returns
-    -------
-    set of str
-        ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
-        ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
-        that change; ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
-        ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
-        found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either);
-        ``contacts`` of bodies.
-    """
-    inertia, families, outside, windows = model.inertia, model.families, model.outside, observed.windows
-    has = {
-        "stages": len(scheme.drifts) > 1,
-        "kicks": len(scheme.drifts) == 1,
-        "watched": len(observed.followed) + len(observed.sums),
-        "books": len(observed.sums),
-        "averages": len(windows.slots),
-        "looks": len(observed.followed) + len(observed.sums) + len(windows.slots),
-        "events": len(events),
-        "turning": len(inertia.turns.moment),
-        "carried": len(inertia.turns.carried),
-        "driven": len(inertia.driven) + len(model.motions.kernels),
-        "lengths": len(model.reels.lengths),
-        "powers": len(families.powers),
-        "viscous": len(families.viscous),
-        "rubbing": len(model.rubbed.families),
-        "pushing": len(outside.pushing),
-        "damped": len(outside.damped),
-        "booked": len(families.powers) + len(model.reels.lengths) + len(outside.pushing),
-        "angular": len(outside.axes),
-        "near": len(model.nearby.families),
-        "pairs": len(model.nearby.at),
-        "guard": len(model.guard.families),
-        "walls": len(model.walls.families),
-        "guarded": len(model.guard.families) + len(model.walls.families),
-        "contacts": len(model.contacts.families),
-    }
-    return {name for name, count in has.items() if count}

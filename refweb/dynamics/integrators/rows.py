@@ -11,7 +11,8 @@ from .extremes import look_at
 from .momentum_book import note_momentum
 
 if TYPE_CHECKING:
-    from .records import Model, Observed, Running
+    from .observed import Observed
+    from .records import Model, Running
 
 
 @kernel(leaf=True, apart=())

@@ -8,7 +8,6 @@ supports' forces by Simpson's rule. A flag of success is not believed: the book 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,10 +17,11 @@ from .energy_book import DRIFT, refuse_open
 from .event_search import search
 from .events import event_rows, starts_above
 from .extremes import EDGE, begin_anew
-from .integrator import MAX_STEPS_PER_ROW, Course, History, Integrator
+from .integrator import MAX_STEPS_PER_ROW, History, Integrator
 from .measurements import Measurements
 from .momentum_book import allowed, refuse_open_momentum
-from .simpson_book import Rates, SimpsonBook
+from .observed_course import ObservedCourse
+from .simpson_book import SimpsonBook
 from .step_limits import StepLimits
 from .tolerances import scales
 
@@ -34,25 +34,6 @@ HALVINGS = 8
 TWIN_TOLERANCES = 10.0
 """Tolerances of a run over those of its twin: by less, both may take the same steps, which are changed by factors of
 up to 2."""
-
-
-@dataclass(eq=False, kw_only=True)
-class ObservedCourse(Course):
-    """State of a run at the time that has been looked at; the method's last step may end later.
-
-    Attributes
-    ----------
-    reached : float
-        End of the method's last step [s].
-    short : int
-        Number of steps in turn that are too short to come to the next row.
-    rates : refweb.dynamics.integrators.simpson_book.Rates
-        What the books integrate, at ``time``.
-    """
-
-    reached: float = 0.0
-    short: int = 0
-    rates: Rates | None = field(default=None, metadata={"saved": False})
 
 
 class Stopped(Exception):

@@ -1,0 +1,282 @@
+"""Tables that kernels take by one pointer: of arrays of one type, and of kernels of one signature.
+
+A table is two words, the number of its items and where they stand. An item of a table of kernels is an address. One of
+a table of arrays is what counts its references, 0 where Python does, its address and its sizes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import operator
+import sys
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core import cgutils
+from numba.extending import NativeValue, models, register_model, unbox
+from numba.np.numpy_support import as_dtype
+
+from . import numba_internals
+from .numba_internals import AbstractTemplate, infer_global, lower_builtin, make_array, populate_array
+
+_word, _byte = ir.IntType(64), ir.IntType(8).as_pointer()
+WORD = np.dtype(np.int64)
+_global: Any = infer_global
+
+
+def pointer_to(builder, word):
+    """A pointer, of the word that holds it."""
+    return builder.inttoptr(word, _byte)
+
+
+def _words_at(builder, pointer, place):
+    """Pointer to a word behind a pointer."""
+    return builder.gep(builder.bitcast(pointer, _word.as_pointer()), [place])
+
+
+def load(builder, pointer, place, stays=True):
+    """A word behind a pointer, which ``stays`` what it is while kernels run, or may change."""
+    found = builder.load(_words_at(builder, pointer, ir.Constant(_word, place)))
+    if stays:
+        found.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return found
+
+
+def array_at(context, builder, kind, data, sizes, meminfo=None):
+    """An array of numba's at an address, with sizes of its own."""
+    made = make_array(kind)(context, builder)
+    size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    step, strides = ir.Constant(_word, size), []
+    for count in reversed(sizes):
+        strides.insert(0, step)
+        step = builder.mul(step, count)
+    pointer = builder.inttoptr(data, context.get_data_type(kind.dtype).as_pointer())
+    populate_array(made, pointer, sizes, strides, ir.Constant(_word, size), meminfo)
+    return made._getvalue()
+
+
+class Pointer(types.Type):
+    """Type of what is handed over by one pointer."""
+
+    def can_convert_to(self, context, other):
+        """To nothing else."""
+        return None
+
+
+class ArraysType(Pointer):
+    """Type of `Arrays`."""
+
+    def __init__(self, item):
+        self.item = item
+        super().__init__(name=f"Arrays({item})")
+
+
+class FunctionsType(Pointer):
+    """Type of `Functions`."""
+
+    def __init__(self, signature):
+        self.item = numba_internals.Called(signature)
+        super().__init__(name=f"Functions({signature})")
+
+
+for _kind in (ArraysType, FunctionsType):
+    register_model(_kind)(models.OpaqueModel)
+
+
+@_global(operator.getitem)
+class _GetItem(AbstractTemplate):
+    def generic(self, args, kws):
+        if isinstance(args[0], ArraysType | FunctionsType) and isinstance(args[1], types.Integer):
+            return args[0].item(args[0], types.intp)
+        return None
+
+
+@lower_builtin(operator.getitem, FunctionsType, types.intp)
+def _function(context, builder, signature, arguments):
+    table, place = arguments
+    items = builder.inttoptr(load(builder, table, 1), _word.as_pointer())
+    found = builder.load(builder.gep(items, [place]))
+    found.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return pointer_to(builder, found)
+
+
+def _item(builder, table, place, kind):
+    """Pointer to the words of an array in a table: what counts its references, its address, its sizes."""
+    items = builder.inttoptr(load(builder, table, 1), _word.as_pointer())
+    return builder.gep(items, [builder.mul(place, ir.Constant(_word, 2 + kind.ndim))])
+
+
+@lower_builtin(operator.getitem, ArraysType, types.intp)
+def _array_in(context, builder, signature, arguments):
+    kind, (table, place) = signature.return_type, arguments
+    at = _item(builder, table, place, kind)
+    meminfo = pointer_to(builder, load(builder, at, 0, stays=False))
+    sizes = [load(builder, at, 2 + n, stays=False) for n in range(kind.ndim)]
+    found = array_at(context, builder, kind, load(builder, at, 1, stays=False), sizes, meminfo)
+    if context.enable_nrt:  # whoever counts references gives this one back; to others it is lent
+        context.nrt.incref(builder, kind, found)
+    return found
+
+
+@_global(operator.setitem)
+class _SetItem(AbstractTemplate):
+    def generic(self, args, kws):
+        if isinstance(args[0], ArraysType) and isinstance(args[1], types.Integer):
+            return types.void(args[0], types.intp, args[0].item)
+        return None
+
+
+@lower_builtin(operator.setitem, ArraysType, types.intp, types.Array)
+def _put(context, builder, signature, arguments):
+    """Put an array into a table, which then has a reference to it."""
+    kind, (table, place, value) = signature.args[2], arguments
+    at, new = _item(builder, table, place, kind), make_array(kind)(context, builder, value)
+    before = _array_in(context, builder, kind(signature.args[0], types.intp), (table, place))
+    context.nrt.incref(builder, kind, value)
+    sizes = cgutils.unpack_tuple(builder, new.shape)
+    words = [builder.ptrtoint(new.meminfo, _word), builder.ptrtoint(new.data, _word), *sizes]
+    for n, word in enumerate(words):
+        builder.store(word, builder.gep(at, [ir.Constant(_word, n)]))
+    for _ in range(2):  # what reading it has counted, and what the table had
+        context.nrt.decref(builder, kind, before)
+    return context.get_dummy_value()
+
+
+@_global(len)
+class _Len(AbstractTemplate):
+    def generic(self, args, kws):
+        return types.intp(args[0]) if isinstance(args[0], ArraysType | FunctionsType) else None
+
+
+@lower_builtin(len, ArraysType)
+@lower_builtin(len, FunctionsType)
+def _len(context, builder, signature, arguments):
+    return load(builder, arguments[0], 0)
+
+
+def enter(kind, value, c):
+    pointer = cgutils.alloca_once_value(c.builder, ir.Constant(_byte, None))
+    address = c.pyapi.object_getattr_string(value, "address")
+    with cgutils.if_likely(c.builder, cgutils.is_not_null(c.builder, address)):
+        c.builder.store(c.pyapi.long_as_voidptr(address), pointer)
+        c.pyapi.decref(address)
+    failed = cgutils.is_not_null(c.builder, c.pyapi.err_occurred())
+    return NativeValue(c.builder.load(pointer), is_error=failed)
+
+
+for _kind in (ArraysType, FunctionsType):
+    unbox(_kind)(enter)
+
+
+def refuse(value, kind, name):
+    raise TypeError(f"{name} is {getattr(value, 'dtype', type(value).__name__)}, not {kind}")
+
+
+def sizes_of(value, kind, name):
+    """Address and sizes of an array, which is of a type."""
+    fits = isinstance(value, np.ndarray) and value.ndim == kind.ndim and value.flags.c_contiguous
+    if not fits or from_dtype(value.dtype) != kind.dtype or not value.flags.writeable:
+        refuse(value, kind, name)
+    return [value.ctypes.data, *value.shape]
+
+
+class Arrays:
+    """A table of arrays of one type.
+
+    Parameters
+    ----------
+    item : numba type
+        That of the arrays.
+    arrays : sequence of ndarray
+        C-contiguous, with numbers of that type; the table keeps them. Kernels may put others in their places, which
+        are given back with the table.
+    """
+
+    kind_of = ArraysType
+
+    def __init__(self, item, arrays):
+        self.item, self._arrays = item, list(arrays)
+        words = [[0, *sizes_of(one, item, "an array")] for one in self._arrays]
+        self._items = np.array(words, dtype=WORD).reshape(len(words), 2 + item.ndim)
+        self._head = np.array([len(words), self._items.ctypes.data], dtype=WORD)
+        self.address = self._head.ctypes.data
+
+    @functools.cached_property
+    def _numba_type_(self):
+        return ArraysType(self.item)
+
+    def __len__(self):
+        return len(self._arrays)
+
+    def __setitem__(self, place, array):
+        self._give_back(place)
+        self._items[place] = [0, *sizes_of(array, self.item, "an array")]
+        self._arrays[place] = array
+
+    def __getitem__(self, place) -> np.ndarray:
+        """The array that Python has put there, or a view of what a kernel has, while it stands there."""
+        words = self._items[place]
+        if not words[0]:
+            return self._arrays[place]
+        dtype, shape = as_dtype(self.item.dtype), tuple(words[2:].tolist())
+        size = dtype.itemsize * int(np.prod(shape))
+        content: Any = (ctypes.c_char * size).from_address(int(words[1]))
+        return np.frombuffer(content, dtype=dtype).reshape(shape)
+
+    def _give_back(self, place):
+        if self._items[place, 0]:
+            numba_internals.give_back(int(self._items[place, 0]))
+            self._items[place, 0] = 0
+
+    def __del__(self):
+        if sys.is_finalizing():
+            return
+        for place in range(len(self)):
+            self._give_back(place)
+
+
+class Functions:
+    """A table of kernels of one signature.
+
+    Parameters
+    ----------
+    signature : numba signature
+        Theirs.
+    kernels : sequence of refweb.compiled.kernel.Kernel
+        Of it; they are compiled where the address of the table is asked for, or before by
+        `refweb.compiled.kernel.prepare`.
+    """
+
+    kind_of = FunctionsType
+
+    def __init__(self, signature, kernels):
+        self.signature, self.kernels = signature, tuple(kernels)
+        for one in self.kernels:
+            if one.signature != signature:
+                raise TypeError(f"{one.name} has the signature {one.signature}, not {signature}")
+
+    @functools.cached_property
+    def _numba_type_(self):
+        return FunctionsType(self.signature)
+
+    def __len__(self):
+        return len(self.kernels)
+
+    def __getitem__(self, place):
+        return self.kernels[place]
+
+    @functools.cached_property
+    def _items(self):
+        return np.array([one.address() for one in self.kernels], dtype=WORD)
+
+    @functools.cached_property
+    def _head(self):
+        return np.array([len(self), self._items.ctypes.data], dtype=WORD)
+
+    @property
+    def address(self):
+        """Address of the table."""
+        return self._head.ctypes.data

@@ -1,0 +1,46 @@
+"""What a run has and not every run has: kernels for what it has not are neither compiled nor loaded."""
+
+from __future__ import annotations
+
+
+def features(scheme, model, observed, events):
+    """Names of what a run has and not every run has: kernels for what it has not are not compiled.
+
+    Returns
+    -------
+    set of str
+        ``stages`` or ``kicks`` (steps of one drift); ``watched`` (extremes), ``books`` (of energies), ``averages``,
+        ``looks`` (any of these), ``events``; ``turning`` bodies and ``carried`` nodes; ``driven`` rows, ``lengths``
+        that change; ``powers``, ``viscous`` forces, ``rubbing``; ``pushing`` and ``damped`` (integrated impulses),
+        ``booked`` (powers, lengths or pushing), ``angular`` momentum that is kept; ``near`` cells, ``pairs`` that are
+        found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either);
+        ``contacts`` of bodies.
+    """
+    inertia, families, outside, windows = model.inertia, model.families, model.outside, observed.windows
+    has = {
+        "stages": len(scheme.drifts) > 1,
+        "kicks": len(scheme.drifts) == 1,
+        "watched": len(observed.followed) + len(observed.sums),
+        "books": len(observed.sums),
+        "averages": len(windows.slots),
+        "looks": len(observed.followed) + len(observed.sums) + len(windows.slots),
+        "events": len(events),
+        "turning": len(inertia.turns.moment),
+        "carried": len(inertia.turns.carried),
+        "driven": len(inertia.driven) + len(model.motions.kernels),
+        "lengths": len(model.reels.lengths),
+        "powers": len(families.powers),
+        "viscous": len(families.viscous),
+        "rubbing": len(model.rubbed.families),
+        "pushing": len(outside.pushing),
+        "damped": len(outside.damped),
+        "booked": len(families.powers) + len(model.reels.lengths) + len(outside.pushing),
+        "angular": len(outside.axes),
+        "near": len(model.nearby.families),
+        "pairs": len(model.nearby.at),
+        "guard": len(model.guard.families),
+        "walls": len(model.walls.families),
+        "guarded": len(model.guard.families) + len(model.walls.families),
+        "contacts": len(model.contacts.families),
+    }
+    return {name for name, count in has.items() if count}

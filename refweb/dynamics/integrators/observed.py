@@ -1,0 +1,86 @@
+"""What the compiled loop looks at: probes and sums, as a record."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+
+from ...effects.base import CONTACT
+from ...kernels import (
+    INTEGERS,
+    MATRIX,
+    Arrays,
+    Functions,
+    IntegerMatrix,
+    Integers,
+    IntegerTable,
+    Matrix,
+    MatrixTable,
+    Record,
+    Vector,
+)
+from ...results.probes import PROBE, plain_of
+from ...system.contact_forces import FAMILY
+from .averages import Windows
+
+ProbeTable = Annotated[Functions, PROBE]
+
+
+class Observed(Record):
+    """What is looked at.
+
+    Attributes
+    ----------
+    probes, rows, data : table
+        Kernel of each probe and its numbers.
+    sums : ndarray, shape (sums, families + 3)
+        Weights of each sum.
+    signs : ndarray, shape (probes + sums,)
+        1 for the largest value, −1 for the smallest, 0 for neither, as for probes that have a window.
+    followed : ndarray of int
+        Probes whose sign is not 0.
+    windows : refweb.dynamics.integrators.averages.Windows
+        Windows of the probes that are averaged.
+    shown : ndarray of int
+        Families whose values per cell are the data of probes.
+    plain : ndarray of int, shape (probes, 4)
+        What the loop looks at itself, see `refweb.results.probes.plain_of`.
+    scales : ndarray, shape (probes,)
+        Factor on that.
+    """
+
+    probes: ProbeTable
+    rows: IntegerTable
+    data: MatrixTable
+    sums: Matrix
+    signs: Vector
+    followed: Integers
+    windows: Windows
+    shown: Integers
+    plain: IntegerMatrix
+    scales: Vector
+
+    @classmethod
+    def of(cls, probes, sums, outs, contacts):
+        """Probes and sums of a system whose families write ``outs`` per cell, and bodies feel ``contacts``."""
+        shared = {CONTACT: contacts.felt, **dict(enumerate(outs))}
+        numbers = [shared.get(p.family, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
+        shown = [probe.family for probe in probes if probe.family >= 0]
+        if any(probe.family == CONTACT for probe in probes):
+            shown += contacts.families[:, FAMILY].tolist()
+        windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
+        signs[windows.slots] = 0.0
+        plain = [plain_of(probe) for probe in probes]
+        return cls(
+            probes=Functions(PROBE, [probe.kernel for probe in probes]),
+            rows=Arrays(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
+            data=Arrays(MATRIX, numbers),
+            sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(outs) + 3),
+            signs=signs,
+            followed=np.flatnonzero(signs[: len(probes)]),
+            windows=windows,
+            shown=np.unique(shown).astype(np.int64),
+            plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
+            scales=np.array([scale for _, scale in plain], dtype=float),
+        )

@@ -1,0 +1,32 @@
+"""How unlike rows of vectors are: no two differ by more than their spread."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import kernel
+
+
+@kernel(leaf=True, fastmath={"contract", "nnan", "nsz"})
+def spread_of(rows):
+    """Root of the sum of the squares of the ranges of three columns: no two rows differ by more."""
+    a0 = a1 = a2 = -math.inf
+    b0 = b1 = b2 = math.inf
+    for r in range(rows.shape[0]):
+        x, y, z = rows[r, 0], rows[r, 1], rows[r, 2]
+        a0, b0 = x if x > a0 else a0, x if x < b0 else b0
+        a1, b1 = y if y > a1 else a1, y if y < b1 else b1
+        a2, b2 = z if z > a2 else a2, z if z < b2 else b2
+    return math.sqrt((a0 - b0) ** 2 + (a1 - b1) ** 2 + (a2 - b2) ** 2)
+
+
+@kernel()
+def spread_since(x, at):
+    """The same of how far rows have come from where they were [m]."""
+    way = np.empty(at.shape)
+    for r in range(at.shape[0]):
+        for k in range(3):
+            way[r, k] = x[r, k] - at[r, k]
+    return spread_of(way)
