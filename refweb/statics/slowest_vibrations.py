@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
-from .stability import ROUNDING
-
 NUMBER, KEPT = 4, 20
 """Number of μ that are looked for without C, and of vectors that are kept for it; with C twice as many of both."""
 CLOSE = 1e-6
 """Error of these μ, over them."""
+ROUNDING = 64.0 * np.finfo(float).eps
+"""Error of a matrix over its norm."""
 ABOVE = 1.1
 """The bound α over what an iteration finds of it, its square to `NEARLY`."""
 NEARLY = 0.1
