@@ -17,6 +17,7 @@ from .messages import nearest, shown
 from .net import discretisation
 from .net.web import Web
 from .registry import EFFECTS, INTEGRATORS, load, name_of
+from .results.columns import taken
 from .settings import START_STATES
 from .system.system import System
 
@@ -82,6 +83,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     if system.laid is not None and solve.start != "web":
         raise InputError(f'[solve] start = {shown(solve.start)} must be "web" with [fold], which is a start of its own')
     _check_observables(observables, system, solve)
+    _check_names(events, system)
     for i, event in enumerate(events):
         with refused_at(f"[[event]] {i + 1}"):
             _check_event(event, [earlier.name for earlier in events[:i]], observables, system)
@@ -225,8 +227,7 @@ def _check_start(solve, accuracy):
 
 def _check_observables(observables, system, solve):
     """Refuse observables that the system does not have, and columns of one name."""
-    own = ("step", "time", "total_energy", "kinetic_energy", *(family.book for family in system.families))
-    columns = dict.fromkeys(own, "a column of its own")
+    columns = _own_columns(system)
     for i, observable in enumerate(observables):
         with refused_at(f"[[observe]] {i + 1}"):
             observable.on(system)
@@ -235,6 +236,22 @@ def _check_observables(observables, system, solve):
                 name = shown(observable.name)
                 raise InputError(f"name = {name} is {stands} of history.csv: names are unique")
         columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
+
+
+def _own_columns(system):
+    """Where names stand that nothing in a scene may have, by name."""
+    return dict.fromkeys(taken(system), "a column of its own")
+
+
+def _check_names(events, system):
+    """Refuse an event, a body, a group or a named node of the name of a column."""
+    columns, web = _own_columns(system), system.net.web
+    named = [(f"[[event]] {i} name = ", event.name) for i, event in enumerate(events, 1)]
+    named += [("[[body]] name = ", body.name) for body in system.net.bodies]
+    named += [*(("[web] group ", group) for group in web.groups), *(("[web] node ", node) for node in web.names)]
+    for place, name in named:
+        if name in columns:
+            raise InputError(f"{place}{shown(name)} is {columns[name]} of history.csv: names are unique")
 
 
 def _check_average(average, solve):

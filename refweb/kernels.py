@@ -48,7 +48,7 @@ from typing import Annotated
 import numpy as np
 from numba import types
 
-from .compiled.kernel import kernel, ufunc
+from .compiled.kernel import kernel
 from .compiled.records import Arrays, Cube, Functions, IntegerMatrix, Integers, Matrix, Record, Vector
 
 __all__ = [
@@ -61,7 +61,6 @@ __all__ = [
     "Record",
     "Vector",
     "kernel",
-    "ufunc",
 ]
 
 _f, _i = types.float64, types.int32

@@ -167,6 +167,7 @@ COMMANDS = {
     "modes": "refweb.commands.modes",
     "cost": "refweb.commands.cost",
     "sweep": "refweb.commands.sweep",
+    "warm": "refweb.commands.warm",
 }
 """Verbs of the command line, in the order of its help."""
 EXPORTS = (

@@ -298,6 +298,11 @@ class Accuracy(Table):
     digits : int, optional
         Of dynamics: significant digits that the ± of every observable has to leave. Accuracy is raised until that is
         so, or until it shows which observables cannot have them.
+    budget : float, optional
+        With ``digits``: CPU time that all runs may take together [s]; by default 600, or 20 times what the first takes
+        if that is longer. The first run goes to its end. A later one is not begun where it is expected to take more
+        than what is left, and is ended where it is on its way to twice that; then the run before, which is made again
+        where it has been given up, is the result, with a warning that says what the digits would cost.
     refine : bool
         Whether to find the error of the elements, by two more runs with two and four times as many.
     horizon : bool
@@ -309,8 +314,8 @@ class Accuracy(Table):
     Raises
     ------
     InputError
-        For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, and digits without a
-        twin; from `Scene`, for digits and horizon in statics.
+        For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, a budget that is not
+        above 0 or without digits, and digits without a twin; from `Scene`, for digits and horizon in statics.
 
     Examples
     --------
@@ -321,6 +326,7 @@ class Accuracy(Table):
 
     error: str = choice("twin", "none", default="twin")
     digits: int | None = integer(default=None, at_least=1, at_most=12)
+    budget: float | None = real(default=None, above=0.0, unit="s")
     refine: bool = boolean(default=False)
     horizon: bool = boolean(default=False)
     ensemble: int | None = integer(default=None, at_least=2, at_most=10_000)
@@ -329,5 +335,7 @@ class Accuracy(Table):
         """Refuse what needs something else."""
         if self.ensemble is not None and not self.horizon:
             raise InputError(f"ensemble = {self.ensemble} needs horizon = true")
+        if self.budget is not None and self.digits is None:
+            raise InputError(f"budget = {self.budget:g} needs digits = ...")
         if self.digits is not None and self.error == "none":
             raise InputError(f'digits = {self.digits} needs error = "twin"')

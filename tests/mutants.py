@@ -4,7 +4,7 @@
 
 runs, for each bug or for those of some numbers or words in it, the test files that mirror the changed file, and says
 which test noticed it first. Its exit status is 1 where one survives that is not a named equivalent, and where tests
-fail without any. A bug in a file of kernels has all of them compiled anew, which takes a minute or two.
+fail without any. Kernels with a bug, and those that are compiled with them, are compiled anew.
 
 `test_mutants.py` sees to it that the list stays true: every text stands in its file exactly once.
 """
@@ -28,6 +28,7 @@ COPIED = ("refweb", "tests", "validation", "README.md", "pyproject.toml", "LICEN
 LONGEST = 1800.0
 """Time that the tests of a bug may take [s]; one that makes them hang is noticed as well."""
 MIRRORS = {
+    "compiled": "compiled/test_kernel.py compiled/test_pointers.py",
     "net/web": "net/test_webs.py",
     "net/lattices": "net/test_webs.py",
     "net/single_cable": "net/test_webs.py",
@@ -82,6 +83,9 @@ MIRRORS = {
     "statics/floating": "statics/test_floating.py",
     "statics/interval": "statics/test_floating.py",
     "statics/lowest": "statics/test_lowest.py",
+    "statics/stability": "statics/test_stability.py",
+    "statics/slowest_vibrations": "statics/test_stability.py",
+    "statics/other_side": "statics/test_stability.py",
     "statics/simulation": "statics/test_statics.py results/test_frames.py",
     "statics": "statics/test_factor_at_hand.py statics/test_statics.py dynamics/test_accuracy.py",
     "dynamics/accuracy_loop": "test_faults.py dynamics/test_accuracy.py",
@@ -352,7 +356,16 @@ MUTANTS = [
     Mutant("statics/lowest", "starts[1] < starts[0] - none", "starts[1] > starts[0] + none"),
     Mutant("results/observables/observable", "/ SHARE * ROUNDING", "/ SHARE * ROUNDING / 27.0"),
     Mutant("statics/smoothing_error", "/ (1.0 - SHARE) for", "* (1.0 - SHARE) for"),
-    Mutant("statics/newton", "((-tiny, 1), (tiny, 0))", "((-tiny, 1), (tiny, -1))"),
+    Mutant("statics/newton", "((-self._tiny, 1), (self._tiny, 0))", "((-self._tiny, 1), (self._tiny, -1))"),
+    Mutant(
+        "statics/stability", "0 if self.definite >= 0 else int(_negative", "0 if self.definite >= -1 else int(_negative"
+    ),
+    Mutant("statics/stability", "-K / scale**2, -C / scale", "-K / scale**2, C / scale"),
+    Mutant("statics/stability", "complex_ = abs(found.imag) > off", "complex_ = abs(found.imag) > 1e99"),
+    Mutant(
+        "statics/slowest_vibrations", "[-self.omega * self._root * self.soft", "[self.omega * self._root * self.soft"
+    ),
+    Mutant("statics/other_side", "< -SHORTER).any()", "> -SHORTER).any()"),
     Mutant(
         "statics/newton",
         "np.abs(state.tension) + stiffness * moved",
@@ -470,6 +483,13 @@ MUTANTS = [
         'if self.supports is not None:\n            given["supports"]',
         'if self.supports:\n            given["supports"]',
     ),
+    # Machine code
+    Mutant("compiled/keys", "constants = constants[1:]", "pass"),
+    Mutant("compiled/keys", "return value.machine_code_key(seen)", 'return "a kernel"'),
+    Mutant("compiled/store", "if content[:CHECK] == _checksum(content[CHECK:]):", "if content:"),
+    Mutant("compiled/kernel", "if features is None or k.apart <= features", "if features is None or not k.apart"),
+    Mutant("compiled/records", "and value.flags.c_contiguous", "and value.size"),
+    Mutant("compiled/records", "for _ in range(2):  # what", "for _ in range(1):  # what"),
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
     Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),
@@ -492,13 +512,8 @@ MUTANTS = [
 ]
 
 
-def has_kernels(code):
-    """Whether the content of a file decides where machine code is kept, as `refweb.kernels` has it."""
-    return "kernel(" in code or "ufunc(" in code
-
-
 def copied(root):
-    """A copy of the code, with the times of its files, which machine code goes by."""
+    """A copy of the code."""
     for name in COPIED:
         source = ROOT / name
         if source.is_dir():
@@ -509,7 +524,7 @@ def copied(root):
 
 def tested(root, files, cache):
     """How tests end in a copy of the code: status of pytest, None for those that hang, and what fails first."""
-    environment = {**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(root), "REFWEB_CACHE": str(cache), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", *files]
     try:
         done = subprocess.run(
@@ -526,17 +541,15 @@ def tried(mutant, root, cache):
     """The test that notices a bug, None where none does."""
     place = root / mutant.path
     code, times = place.read_text(encoding="utf-8"), place.stat()
-    own = cache / "one" if has_kernels(code) else cache
     try:
         place.write_text(mutant.changed(code), encoding="utf-8")
-        status, first = tested(root, mutant.tests, own)
+        status, first = tested(root, mutant.tests, cache)
         if status not in (0, 1, 2, None):
             raise RuntimeError(f"pytest ended with {status}: {first}")
         return None if status == 0 else first
     finally:
         place.write_text(code, encoding="utf-8")
         os.utime(place, ns=(times.st_atime_ns, times.st_mtime_ns))
-        shutil.rmtree(cache / "one", ignore_errors=True)
 
 
 def chosen(words):

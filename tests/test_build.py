@@ -8,9 +8,11 @@ import pytest
 
 import refweb
 from refweb import memory
+from refweb.__main__ import main
 from refweb.build import build
 from refweb.errors import InputError
 from refweb.registry import INTEGRATORS, Method
+from refweb.results.files import as_toml
 
 WEB = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0])
 CABLE = refweb.Cable(law="linear", modulus=1e3, area=1e-2, density=2.0)
@@ -107,3 +109,39 @@ def test_a_history_that_does_not_fit_is_refused(monkeypatch):
     with pytest.raises(InputError, match=r"interval = 0.001: 9e\+06 rows .* must be ≤ 2 GB"):
         scene.build()
     scene.replace(output=refweb.Output(interval=0.1)).build()
+
+
+def test_names_are_unique(tmp_path, capsys):
+    """Whatever columns a history has, no observable, event, body, group or node may have the name of one."""
+    hub = refweb.Body(name="hub", radius=0.1, mass=1.0, position=(0.0, 0.0, -0.5))
+    contact = refweb.Contact(stiffness=100.0, damping=0.1)
+    effects = (
+        hub,
+        contact,
+        refweb.Gravity(acceleration=(0, 0, -9.81)),
+        refweb.Reel(lines=[0], factor=[(0, 1), (1, 1)]),
+    )
+    scene = refweb.Scene(web=WEB, cable=CABLE, effects=effects, solve=refweb.Dynamic(duration=2e-3))
+    still = scene.replace(solve=refweb.Static(), output=refweb.Output(), effects=effects[2:3])
+    observed = [o.name for o in scene.observables]
+    own = [name for name in (*refweb.run(scene).history, *refweb.run(still).history) if name not in observed]
+    assert {"time", "step", "work", "total_energy", "momentum_x", "outer_impulse_z"} <= set(own)
+    for name in [*own, "all"]:
+        grouped = {**WEB.to_dict(), "groups": {name: [0]}}
+        wrong = [scene.replace(web=refweb.Inline(**grouped))]
+        if name != "all":
+            wrong += [
+                scene.replace(web=refweb.Inline(**{**WEB.to_dict(), "names": {name: [1]}})),
+                scene.replace(observe=[refweb.Observe(name=name, quantity="displacement")]),
+                scene.replace(event=[refweb.Event(name=name, kind="contact")]),
+                scene.replace(effects=(refweb.Body(**{**hub.to_dict(), "name": name}), *effects[1:])),
+            ]
+        for one in wrong:
+            with pytest.raises(InputError, match=f'"{name}" is .*: names are unique'):
+                one.build()
+    file = tmp_path / "named.toml"
+    wrong = scene.replace(observe=[refweb.Observe(name="momentum_x", quantity="displacement")])
+    file.write_text(as_toml(wrong.to_dict()))
+    assert main(["run", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert '"momentum_x" is a column of its own of history.csv' in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -479,6 +479,6 @@ def test_weight_is_the_whole_mass():
 
 
 def test_kernels_of_one_factory_have_names_of_their_own():
-    """Kernels that differ in what they capture: numba takes those in typed lists from the disk by their names."""
+    """Kernels that differ in what they capture: machine code is found on disk by what they capture."""
     forces = [elasticity.kernels(law, ((-1.0, 1.0),), (1.0,))[0] for law in range(3)]
     assert len({(f.py_func.__module__, f.py_func.__qualname__) for f in forces}) == 3

@@ -10,7 +10,7 @@ from refweb.dynamics.integrators.energy_book import DRIFT
 from refweb.errors import OpenBook
 from validation.hard_cases import hard_cases
 from validation.hard_cases.balances import energy_left, momentum_left, turning_left, unbalanced
-from validation.hard_cases.hard_cases import STATIC, STATICS, attempt, matrix
+from validation.hard_cases.hard_cases import STATIC, STATICS, attempt, matrix, words_on_stability
 from validation.hard_cases.overlaps import outcome as hit_of
 from validation.hard_cases.overlaps import random_hit
 from validation.hard_cases.random_scenes import near_the_limit, outcome, random_net
@@ -160,6 +160,11 @@ def check_hits(seeds):
 
 def test_random_hits():
     check_hits(range(12))
+
+
+def test_words_on_stability():
+    row, cells = words_on_stability(20)
+    assert row.passes and int(cells[2]) >= 15
 
 
 @pytest.mark.slow

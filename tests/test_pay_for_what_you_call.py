@@ -58,7 +58,18 @@ EVERY |= {
 }
 EVERY |= {
     f"results.{name}"
-    for name in ("state", "solution", "folder", "files", "vtu", "vtu_file", "provenance", "progress", "run_status")
+    for name in (
+        "columns",
+        "state",
+        "solution",
+        "folder",
+        "files",
+        "vtu",
+        "vtu_file",
+        "provenance",
+        "progress",
+        "run_status",
+    )
 }
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
@@ -72,7 +83,9 @@ NEWTON = (
 )
 NEWTON |= {"system.conjugate_gradients"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
-DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
+DYNAMICS |= {
+    f"dynamics.{name}" for name in ("budget", "simulation", "history", "schedule", "accuracy_loop", "initial_state")
+}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
 LOOP = ("central_difference", "explicit_loop", "between_steps", "rows", "step", "step_bound")
@@ -109,7 +122,7 @@ OBSERVED = {"reaction": {"results.observables.nodal"}}
 """What observables are made of besides their own file."""
 DEFAULT = [{"quantity": quantity} for quantity in ("displacement", "stress", "tension")]
 """What a scene observes that does not say."""
-BASE = ("numpy", "numba", "numba.core.typing.cffi_utils")
+BASE = ("numpy", "numba", "numba.core.typing.cffi_utils", "platformdirs")
 """Libraries of every scene; each brings others along, and numba a part of its own once it types a function."""
 LOADED = "print(json.dumps(sorted(sys.modules)))"
 
@@ -186,6 +199,10 @@ def called(given):
             modules |= TANGENT | {"statics.critical_speed"}
         elif tension_only:
             modules |= TANGENT | {"statics.duality_bound", "statics.floating"}
+        if given["cable"]["law"] == "linear":  # bars, which may snap through
+            modules |= TANGENT | {"statics.other_side"}
+        if not tension_only or given.keys() & {"pressure", "thrust", "frame", "orbit", "contact"}:
+            modules |= TANGENT | {"statics.stability"}  # the energy is not convex
         if given.keys() & {"pressure", "thrust"}:
             modules.add("statics.residual_search")
         elif len(solve.get("load_steps", [1.0])) > 1 and tension_only and not given.keys() & {"body"}:
@@ -425,10 +442,11 @@ def handed(monkeypatch):
     """Numbers of kernels in the lists that the compiled loop is handed for a scene with some effects."""
 
     def count(*effects):
-        seen = []
-        monkeypatch.setattr(central_difference, "advance_rows", lambda *given: seen.append(given) or 1)
-        solver = central_difference.CentralDifference(scene_of(*effects).build())
-        solver.advance(solver.start(), [1e-3])
+        seen, solver = [], central_difference.CentralDifference(scene_of(*effects).build())
+        solver.prepare()
+        with monkeypatch.context() as patched:
+            patched.setattr(central_difference, "advance_rows", lambda *given: seen.append(given) or 1)
+            solver.advance(solver.start(), [1e-3])
         counts = [len(table) for given in seen[0] if isinstance(given, Record) for table in tables(given)]
         return dict(zip(LISTED, counts, strict=True))
 
@@ -462,3 +480,47 @@ def test_kernels_of_friction(handed, monkeypatch):
 def test_kernels_without_an_effect(handed, name):
     rest = [other for other in all_but(name) if other in KERNELS]
     assert handed(*rest) == summed(*rest)
+
+
+# Machine code
+
+FILLED = "from refweb.compiled import numba_internals as n; print(*(s for s, slot in n._slots.items() if slot.filled))"
+MANY = 70
+"""Kernels of a plain impact, at most: some forty of the loop, and those of its effects and observables."""
+ABSENT = (
+    "inner_stages", "turn_on", "carry_nodes", "move_supports", "set_lengths", "viscous_kick", "rubbing_kick",
+    "take_pairs", "passes_lines", "set_push", "average", "note_events", "look_at_books", "book_powers",
+    "add_half_steps", "turning",
+)  # fmt: skip
+"""Kernels of the loop that a plain impact has no use for: stages, bodies that turn or carry, motion, reels, damping,
+friction, lines on lines, integrated impulses, averages, events, energies as observables, angular momentum."""
+
+
+def machine_code(*changes):
+    """Names of the kernels whose machine code a process has that runs an impact for two rows."""
+    lines = [
+        "import refweb",
+        "scene = refweb.Scene.load('square-impact', {'solve.duration': 2e-3, 'output.interval': 1e-3})",
+        *changes,
+        "refweb.run(scene)",
+        FILLED,
+    ]
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True)
+    return [name.removeprefix("refweb.").rpartition(".")[0] for name in done.stdout.split()]
+
+
+def test_a_plain_impact_has_machine_code_of_nothing_else():
+    plain = "scene = scene.replace(observe=(refweb.Observe(name='d', quantity='displacement', reduce='max'),))"
+    names = machine_code(plain)
+    assert 30 < len(names) <= MANY, len(names)
+    assert not set(ABSENT) & {name.rpartition(".")[2] for name in names}
+
+
+def test_an_effect_brings_its_own_machine_code_alone():
+    """Damping by mass: its force, bounds and impulse, the kick that is iterated, and the book of its power."""
+    plain = "scene = scene.replace(observe=(refweb.Observe(name='d', quantity='displacement', reduce='max'),))"
+    damped = "scene = scene.replace(effects=(*scene.effects, refweb.Damping(rate=1.0)))"
+    without, more = set(machine_code(plain)), set(machine_code(plain, damped))
+    added = {name for name in more - without}
+    assert without <= more and any("viscous_kick" in name for name in added)
+    assert len(added) <= 9, added

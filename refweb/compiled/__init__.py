@@ -8,3 +8,21 @@
 `numba_internals`    all that relies on private parts of numba, each with its reason and a way without it
 ===================  ==========================================================================================
 """
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+
+watchers: list[Callable[[int, int], None]] = []
+"""Called with the number of kernels that have been compiled and of those that are to be, before each of them."""
+
+
+@contextlib.contextmanager
+def watched(tell):
+    """Call ``tell`` before each kernel that is compiled in the block, see `watchers`."""
+    watchers.append(tell)
+    try:
+        yield
+    finally:
+        watchers.remove(tell)

@@ -9,13 +9,15 @@ a kernel through an entry of its own, which is compiled when it is first asked f
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import gc
 import typing
 from typing import Annotated, Any
 
 from numba import types
 
-from . import keys, numba_internals
+from . import keys, numba_internals, watchers
 
 COMMON = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 """Options of all kernels: products and sums may contract, nothing else departs from IEEE arithmetic."""
@@ -93,19 +95,21 @@ class Kernel:
         given = {**numba_internals.options(self._options, self._counted), **numba_internals.BARE}
         linked = self.apart is None
         cache = numba_internals.Cache(self.py_func.__qualname__.rpartition(".")[2], lambda: self._key, linked)
-        made = numba_internals.dispatcher(self.py_func, given, cache)
-        made.own_kernel = self
-        return made
+        return numba_internals.dispatcher(self.py_func, given, cache)
+
+    def _compiled(self):
+        """The same, with its one signature compiled where it has one."""
+        body = self._body
+        if self.signature is not None and not body.overloads:
+            body.compile(self.signature)
+            body.disable_compile()
+        return body
 
     @property
     def _numba_type_(self):
         with numba_internals.lock:
             if self.apart is None or numba_internals.PLAIN:
-                body = self._body
-                if self.signature is not None and not body.overloads:
-                    body.compile(self.signature)
-                    body.disable_compile()
-                return body._numba_type_
+                return self._compiled()._numba_type_
             return numba_internals.Called(self.signature, self._slot.symbol)
 
     def known(self):
@@ -120,8 +124,7 @@ class Kernel:
             if not self._slot.filled:
                 for one in self.callees:
                     _ = one._slot  # symbols that its machine code names
-                self._body.compile(self.signature)
-                self._slot.fill(numba_internals.address_of(self._body, self.signature))
+                self._slot.fill(numba_internals.address_of(self._compiled(), self.signature))
         return self._slot.address
 
     @functools.cached_property
@@ -177,7 +180,7 @@ def _collect(function, found, seen):
         return
     seen.add(function)
     for _, value in keys.captured(function):
-        for one in value if type(value) is tuple else (value,):
+        for one in value if isinstance(value, tuple) else (value,):
             if isinstance(one, Kernel):
                 if one.apart is None:
                     _collect(one.py_func, found, seen)
@@ -209,24 +212,35 @@ def needed(kernels, features=None):
     return list(found.values())
 
 
-def prepare(kernels, features=None, progress=None):
-    """Compile or load all that is `needed` before a run.
+def prepare(kernels, features=None):
+    """Compile or load all that is `needed` before a run, and tell `refweb.compiled.watchers` what is to be compiled.
 
     Parameters
     ----------
     kernels, features
         See `needed`.
-    progress : callable, optional
-        Called with the number of kernels that have been compiled and of those that are to be, where any are.
     """
     wanted = [one for one in needed(kernels, features) if one.signature is not None]
-    new = [one for one in wanted if not one.known()] if progress is not None else []
-    for one in wanted:
-        if progress is not None and one in new:
-            progress(new.index(one), len(new))
-        one.address()
+    new = {one.name: n for n, one in enumerate([one for one in wanted if watchers and not one.known()])}
+    with _no_collection():
+        for one in wanted:
+            for tell in watchers if one.name in new else ():
+                tell(new[one.name], len(new))
+            one.address()
     for one in kernels:
         one.prepared = True
+
+
+@contextlib.contextmanager
+def _no_collection():
+    """Do not look for unreachable objects: compiling makes many that stay, which takes a tenth of its time."""
+    looks = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if looks:
+            gc.enable()
 
 
 def kernel(signature=None, *, leaf=False, apart=None, **options) -> Any:
@@ -245,8 +259,3 @@ def kernel(signature=None, *, leaf=False, apart=None, **options) -> Any:
         Of `numba.njit`.
     """
     return lambda function: Kernel(function, signature, apart, not leaf, options)
-
-
-def ufunc(signatures) -> Any:
-    """Compile a scalar function into a numpy ufunc and keep its machine code on disk."""
-    return lambda function: numba_internals.ufunc(function, signatures, keys.digest(keys.of_function(function)))

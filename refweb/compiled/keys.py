@@ -32,7 +32,7 @@ def platform_key(processor):
 
     content = [path.read_bytes() for path in sorted(pathlib.Path(__file__).parent.glob("*.py"))]
     own = hashlib.sha256(b"".join(content)).hexdigest()[:16]
-    versions = numba.__version__, llvmlite.__version__, np.__version__
+    versions = numba.__version__, llvmlite.__version__
     return " ".join([sys.implementation.cache_tag, platform.system(), platform.machine(), *versions, *processor, own])
 
 
@@ -85,8 +85,8 @@ def described(value, seen):
     """
     if hasattr(value, "machine_code_key"):
         return value.machine_code_key(seen)
-    if isinstance(value, tuple) and type(value) is tuple:
-        return f"({', '.join(described(one, seen) for one in value)})"
+    if isinstance(value, tuple):
+        return f"{type(value).__qualname__} {[described(one, seen) for one in value]}"
     if isinstance(value, bool | int | float | str | bytes | type(None) | np.generic | np.dtype):
         return repr(value)
     if isinstance(value, np.ndarray):

@@ -46,13 +46,6 @@ BARE = {} if PLAIN else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """Options of a kernel without an entry from Python."""
 ENTRY = {} if PLAIN else {"no_cfunc_wrapper": True}
 """Options of a kernel that is entered from Python alone."""
-SHIPPED_TARGETS = {
-    **dict.fromkeys(("x86_64", "amd64"), ("x86-64-v3", "")),
-    **dict.fromkeys(("aarch64", "arm64"), ("generic", "")),
-}
-"""(processor, features) that machine code in wheels is made for, by machine."""
-V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
-"""Features of a processor that runs code for x86-64-v3."""
 _byte = ir.IntType(8).as_pointer()
 _config: Any = config  # numba makes its entries at run time, from variables of the environment
 lock = global_compiler_lock
@@ -70,16 +63,8 @@ def host():
 
 def shipped():
     """(processor, features) whose machine code this processor runs and a wheel may bring; None where none does."""
-    import platform
-
-    found = SHIPPED_TARGETS.get(platform.machine().lower())
-    own = llvm.get_host_cpu_features()
-    return found if found and (found[0] == "generic" or all(own.get(name) for name in V3)) else None
-
-
-def target(processor):
-    """Compile for a (processor, features) from now on, before anything is compiled."""
-    _config.CPU_NAME, _config.CPU_FEATURES = processor
+    found, own = store.portable(), llvm.get_host_cpu_features()
+    return found if found and (found[0] != "x86-64-v3" or all(own.get(name) for name in store.V3)) else None
 
 
 def options(given, counted):
@@ -160,16 +145,6 @@ def dispatcher(function, given, cache) -> Any:
 
     made.compile = compile_alone
     return made
-
-
-def ufunc(function, signatures, key):
-    """A numpy ufunc, whose machine code numba keeps in a folder named by a key."""
-    default = _config.CACHE_DIR
-    _config.CACHE_DIR = str(store.folder() / keys.digest(keys.platform_key(host()), key))
-    try:
-        return numba.vectorize(signatures, cache=True)(function)
-    finally:
-        _config.CACHE_DIR = default
 
 
 def address_of(made, signature):

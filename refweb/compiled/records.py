@@ -277,7 +277,7 @@ class Arrays:
         self._items[place] = [0, *_sizes(array, self.item, "an array")]
         self._arrays[place] = array
 
-    def __getitem__(self, place):
+    def __getitem__(self, place) -> np.ndarray:
         """The array that Python has put there, or a view of what a kernel has, while it stands there."""
         words = self._items[place]
         if not words[0]:
@@ -348,6 +348,9 @@ class Record:
     """A frozen dataclass that kernels take by one pointer; annotations of a subclass are its fields, see the module."""
 
     def __init_subclass__(cls):
+        known = kernel.RECORDS.get(cls.__name__)
+        if known is not None and known.__module__ != cls.__module__:
+            raise TypeError(f"a record {cls.__name__} stands in {known.__module__}: give this one another name")
         kernel.RECORDS[cls.__name__] = dataclasses.dataclass(frozen=True, eq=False)(cls)
 
     @classmethod

@@ -12,6 +12,7 @@ import functools
 import hashlib
 import os
 import pathlib
+import platform
 import tempfile
 import time
 
@@ -19,6 +20,8 @@ UNUSED = 90 * 24 * 3600.0
 """Time after which a file that nobody has read is removed [s]."""
 NOTED = 24 * 3600.0
 """Age of a file from which on its use is noted [s]."""
+V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+"""Features of a processor that runs code for x86-64-v3."""
 CHECK = 16
 """Bytes of the checksum that a file begins with."""
 SHIPPED = pathlib.Path(__file__).parent / "machine_code"
@@ -33,6 +36,14 @@ def folder():
     import platformdirs
 
     return pathlib.Path(platformdirs.user_cache_dir("refweb", appauthor=False)) / "kernels"
+
+
+def portable():
+    """(processor, features) that machine code in a wheel is made for on machines like this one; None where for none."""
+    machine = platform.machine().lower()
+    if machine in ("x86_64", "amd64"):
+        return "x86-64-v3", ""
+    return ("generic", "") if machine in ("aarch64", "arm64") else None
 
 
 def _checked(path):

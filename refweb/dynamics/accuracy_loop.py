@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import OpenBook
+from .budget import Spent
 
 ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
 """Number of runs in which the book of energies has to close; a larger one where it pays; and that is where the drift of
@@ -85,6 +86,9 @@ def run_within_drift(simulation, folder, tell):
     while True:
         name = simulation.integrator.knob
         text = "running" if standing.knob == standing.first else f"running with {name} = {standing.knob:g}"
+        if (prepare := getattr(simulation.integrator, "prepare", None)) is not None:
+            prepare()  # before a twin asks for the same
+        simulation.budget.begin()
         with _twin_of(simulation) as twin:
             try:
                 run = simulation.run(folder, functools.partial(tell, text))
@@ -100,12 +104,18 @@ def run_within_drift(simulation, folder, tell):
             tell("finding errors by a twin run", 1.0)
             ended = twin.ended() if twin else None
         break
+    if twin and isinstance(twin.failure, Spent):
+        raise twin.failure
+    simulation.budget.end(standing.knob, solution.solver["nsteps"])
     solution.reduced, standing.repeated, standing.drift, known = run.results, 0, np.inf, np.inf
     rows = simulation.compared(folder) if ended is not None or scene.throw is not None else None
     if ended is not None:
         from .twin_error import add_errors
 
         known = add_errors(simulation, run, ended, rows)
+        named = {o.name: o for o in scene.observables}
+        bounded = {name: named[name].bounded(one, simulation.system) for name, one in solution.reduced.items()}
+        solution.reduced = bounded
         if folder is not None:
             folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
     elif twin:
@@ -143,19 +153,35 @@ def missing_digits(results, digits):
 
 
 def reach_digits(simulation, digits, folder, tell):
-    """Raise accuracy until every result has its digits, or has shown that it cannot have them; say which have not."""
-    solution, standing = simulation.solution, simulation.standing
+    """Raise accuracy until every result has its digits, or has shown that it cannot have them; say which have not.
+
+    That ends where the budget does, see `refweb.dynamics.budget`; then the last run that came to its end stays.
+    """
+    solution, standing, budget = simulation.solution, simulation.standing, simulation.budget
     before = standing.missing
-    for _ in range(CLIMBS):
+    for climb in range(CLIMBS):
         missing = missing_digits(solution.reduced, digits)
         falling = [share for name, share in missing.items() if before.get(name, np.inf) > STUCK * share]
         if not falling:
             break
-        before, steps = missing, solution.solver["nsteps"]
-        standing.missing = before
-        standing.knob *= simulation.integrator.next_knob(max(falling))
+        reached, price = standing.knob, budget.price_of(simulation.integrator, max(falling), CLIMBS - climb)
+        knob = reached * simulation.integrator.next_knob(max(falling))
+        if (expected := budget.expected(simulation.integrator, knob)) > budget.whole - budget.spent:
+            why = f"the next run would take some {expected:.2g} s"
+            solution.warnings.append(_over(simulation, digits, knob, why, price))
+            break
+        earlier, before, steps = before, missing, solution.solver["nsteps"]
+        standing.missing, standing.knob = before, knob
         simulation.again(folder)
-        run_within_drift(simulation, folder, tell)
+        try:
+            run_within_drift(simulation, folder, tell)
+        except Spent as spent:
+            solution.warnings.append(_over(simulation, digits, standing.knob, f"a run was ended: {spent}", price))
+            before = standing.missing = earlier
+            standing.knob, standing.repeated, standing.drift, budget.kept = reached, 0, np.inf, False
+            simulation.again(folder)
+            run_within_drift(simulation, folder, tell)
+            break
         if solution.solver["nsteps"] < 1.1 * steps:  # something else limits them: nothing was changed
             before = standing.missing = {}
     setting = f"{simulation.integrator.knob} = {standing.knob:g}"
@@ -165,3 +191,12 @@ def reach_digits(simulation, digits, folder, tell):
         known = f"its ± is {share:.3g} times what they allow with {setting}; {why}"
         known = known if np.isfinite(share) else "its ± is not known"
         solution.warnings.append(f"{name} does not have the {digits} digits asked for: {known}")
+
+
+def _over(simulation, digits, knob, why, price):
+    """That accuracy is raised no further, and what it would take."""
+    budget, name = simulation.budget, simulation.integrator.knob
+    return (
+        f"with {name} = {knob:.3g} {why}, more than what was left of the budget of {budget.whole:.3g} s of CPU time: "
+        f"digits = {digits} would take some {price:.2g} s more; raise [accuracy] budget, or ask for fewer digits"
+    )

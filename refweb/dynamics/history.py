@@ -12,13 +12,14 @@ from ..effects.base import pairs_of
 from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
 from ..results import probes
+from ..results.columns import FIRST, components, dynamic_energies, vectors
 from ..results.observables.book import weights
 from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
 from ..results.state import State
 from .integrators.crossings import PAIRS
 from .integrators.events import Event
-from .integrators.integrator import AXES, VECTORS, History, Sum
+from .integrators.integrator import History, Sum
 
 SPREAD = 3.0
 """± of a result over its error if the method has its order."""
@@ -127,17 +128,14 @@ class Watch:
         used = self._of_warning("utilisation")
         if system.weakness is not None and used is not None:
             self.events.append(Event(used, 1.0, True, stop=True))
-        own = dict.fromkeys(f.book for f in system.families if f.book != "work")
-        work = ["work"] if "work" in [f.book for f in system.families] or system.drives or system.line_drives else []
-        energies = ["kinetic_energy", *own, *work, "total_energy"]
-        self.columns = ["time [s]", *(f"{o.name} [{o.unit}]" for o in self._observables)]
+        energies, of_momentum = dynamic_energies(system), vectors(system)
+        self.columns = [FIRST["dynamic"], *(f"{o.name} [{o.unit}]" for o in self._observables)]
         self.columns += [f"{name} [J]" for name in energies]
-        self._vectors = len(VECTORS) - all(family.internal for family in system.families)
-        self.columns += [f"{name}_{axis} [N s]" for name in VECTORS[: self._vectors] for axis in AXES]
+        self.columns += [f"{name} [N s]" for name in components(of_momentum)]
+        self._vectors = len(of_momentum)
         self._weights = self._weights_of_columns(energies)
         balance = {"total_energy [J]": 1.0, "dissipated_energy [J]": 1.0, "work [J]": -1.0}
-        first = 1 + len(self._observables)  # an observable may have the name of a column
-        self._booked = [i for i in range(first, len(self.columns)) if self.columns[i] in balance]
+        self._booked = [i for i, column in enumerate(self.columns) if column in balance]
         self._signs = np.array([balance[self.columns[i]] for i in self._booked])
 
     def _add_events(self, events):

@@ -86,9 +86,8 @@ def equilibrium(system, progress=None):
         Where there is no equilibrium, or none is found.
     """
     from ..statics.load_steps import solve
-    from ..system.at_rest import at_rest
 
-    (found,) = solve(at_rest(system), [0.0], progress)
+    (found,) = solve(system, [0.0], progress)
     return found
 
 

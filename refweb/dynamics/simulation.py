@@ -12,6 +12,7 @@ from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import Standing, follow
+from .budget import Budget
 from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
 from .integrators.crossings import APART, BESIDE, THROUGH
@@ -60,6 +61,8 @@ class Simulation:
         Where its twin begins, if that is elsewhere: where the twin of the run ended that this one starts from.
     standing : refweb.dynamics.accuracy_loop.Standing
         How accurate runs are, and how often they were repeated.
+    budget : refweb.dynamics.budget.Budget
+        What they may cost.
 
     Raises
     ------
@@ -146,6 +149,7 @@ class Simulation:
         """Stand at the beginning of a method, or where a checkpoint has it."""
         solve = self.scene.solve
         self.standing = Standing.of(getattr(solve, INTEGRATORS[solve.method].knob), kept)
+        self.budget = Budget(self.scene.accuracy.budget)
 
     def _fall_back(self, ways, error, folder):
         """Forget what was computed, and begin with another method; `SolverError` where there is none."""
@@ -156,17 +160,13 @@ class Simulation:
 
     def _settle(self, tell):
         """Begin at the equilibrium."""
-        from ..statics.remarks import remark_on_open
+        from ..statics.remarks import on_stability, remark_on_open
 
         found = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
-        self.begin = Start(found.x)
-        if text := remark_on_open(State(self.system, 0.0, found.x), found):
+        self.begin, there = Start(found.x), State(self.system, 0.0, found.x)
+        if text := remark_on_open(there, found):
             self.solution.warnings.append(f"of the equilibrium it starts from: {text}")
-        if found.stats.get("smallest_pivot") == -1:
-            self.solution.warnings.append(
-                "the equilibrium it starts from is a saddle (a pivot of its tangent is negative): the motion "
-                'leaves it by itself; without a [frame] law = "tension-only" has no such states'
-            )
+        self.solution.warnings += [text for _, text in on_stability(there, found, "the equilibrium it starts from")]
         self.solution.warnings += remarks_on(self.begin, self.system)
         if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
             from ..statics.passage import Passage
@@ -181,7 +181,12 @@ class Simulation:
         course, ahead = self._set_off(folder)
         self._refuse_overlap(course)
         tell(ahead / len(times))
-        integrator.breathe = lambda t: tell(t / times[-1])
+
+        def told(share):
+            tell(share)
+            self.look_at_budget(share)
+
+        integrator.breathe = lambda t: told(t / times[-1])
         try:
             for first, history, compared in blocks(integrator, course, self.schedule, ahead):
                 table = self.watch.table(history)
@@ -199,7 +204,7 @@ class Simulation:
                         folder.row(row)
                 if last in self.schedule.frames or course.stopped:
                     self._frame(last, folder, course)
-                tell((last + 1) / len(times))
+                told((last + 1) / len(times))
         except SolverError:
             self._refuse_overlap(course)  # whatever stopped it: what comes of a line within a body is nonsense
             raise
@@ -208,6 +213,15 @@ class Simulation:
         relative = self.standing.knob if integrator.knob == "rtol" else 0.0
         corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
         return Ended(self.watch.results(course, self._tables[-1][-1]), corrections, course)
+
+    def look_at_budget(self, share, twin=False):
+        """End a run of which a share is done, or its twin, where both would cost too much; `Spent`."""
+        if not self.integrator.beside:  # the twin comes after the run
+            from .twin_error import steps_with_twin
+
+            both = steps_with_twin(self.scene)
+            share = (1.0 + (both - 1.0) * share if twin else share) / both
+        self.budget.watch(share)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin, see `refweb.dynamics.history.Watch.compared`."""

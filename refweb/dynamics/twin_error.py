@@ -75,7 +75,6 @@ class Twin:
         integrator = self._simulation.integrator
         if integrator.beside and THREADS:  # the twin is made here: a system is used by one thread at a time
             twin = integrator.refined()
-            twin.breathe = self._breathe
             self._thread = threading.Thread(target=self._run, args=(lambda: twin,), daemon=True)
             self._thread.start()
         return self
@@ -88,11 +87,13 @@ class Twin:
     def _breathe(self, t):
         if self._stop.is_set():
             raise InterruptedError(f"the twin run was ended at t = {t:g} s")
+        self._simulation.look_at_budget(t / self._simulation.schedule.times[-1], twin=True)
 
     def _run(self, made):
         simulation, rows = self._simulation, []
         try:
             integrator = made()
+            integrator.breathe = self._breathe
             begin = simulation.begin if simulation.begin_of_twin is None else simulation.begin_of_twin
             course = integrator.start(*begin.motion)
             for block in blocks(integrator, course, simulation.schedule):

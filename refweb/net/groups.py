@@ -34,6 +34,8 @@ def members(given, count):
     """
     if given is None:
         return {}
+    if "all" in list(given):
+        raise InputError('groups: "all" is the name of all lines: names are unique')
     if isinstance(given, dict):
         return {str(name): _numbers(name, lines, count) for name, lines in given.items() if len(lines)}
     names = list(map(str, given))

@@ -8,17 +8,18 @@ g = (s + r)/2 (for s < 0: 2η²/(r − s)) and g0, r0 its values at ε = 0 the s
 
 which has a relative error of a few units of round-off everywhere. Under compression the stress tends to the floor −αE.
 
-Scalar functions, one formula for the compiled kernels and for `Law`, whose methods are ufuncs.
+Scalar functions, one formula for the compiled kernels and for `Law`.
 """
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..errors import InputError
-from ..kernels import kernel, ufunc
+from ..kernels import Vector, kernel
 from ..messages import nearest
 
 SMOOTH, TENSION_ONLY, LINEAR = 0, 1, 2
@@ -106,24 +107,22 @@ def energy_density(law, strain, modulus, slackness, smoothing):
     return modulus * energy
 
 
-@functools.cache
-def _ufuncs():
-    """Stress, tangent and energy density as ufuncs; a run of kernels alone never builds them."""
-    signature = ["float64(int64, float64, float64, float64, float64)"]
+STRESS, TANGENT, ENERGY = range(3)
 
-    @ufunc(signature)
-    def stresses(law, strain, modulus, slackness, smoothing):
-        return stress(law, strain, modulus, slackness, smoothing)
 
-    @ufunc(signature)
-    def tangents(law, strain, modulus, slackness, smoothing):
-        return tangent(law, strain, modulus, slackness, smoothing)
-
-    @ufunc(signature)
-    def energies(law, strain, modulus, slackness, smoothing):
-        return energy_density(law, strain, modulus, slackness, smoothing)
-
-    return stresses, tangents, energies
+@kernel(leaf=True, apart=())
+def evaluate(
+    which: int, law: int, strain: Vector, modulus: Vector, slackness: Vector, smoothing: Vector, out: Vector
+) -> None:
+    """Write stress, tangent or energy density of each strain."""
+    for i in range(out.size):
+        e, m, s, w = strain[i], modulus[i], slackness[i], smoothing[i]
+        if which == STRESS:
+            out[i] = stress(law, e, m, s, w)
+        elif which == TANGENT:
+            out[i] = tangent(law, e, m, s, w)
+        else:
+            out[i] = energy_density(law, e, m, s, w)
 
 
 @dataclass(frozen=True)
@@ -157,9 +156,15 @@ class Law:
         """The law's number in compiled kernels."""
         return NAMES[self.name]
 
+    def _evaluate(self, which, *numbers):
+        numbers = np.broadcast_arrays(*numbers)
+        out = np.empty(numbers[0].shape)
+        evaluate(which, self.number, *(np.array(one, dtype=float).reshape(-1) for one in numbers), out.reshape(-1))
+        return out[()]
+
     def stress(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Stress σ = T/A [Pa]."""
-        return _ufuncs()[0](self.number, strain, modulus, slackness, smoothing)
+        return self._evaluate(STRESS, strain, modulus, slackness, smoothing)
 
     def strain(self, stress, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Strain of a tension, stress σ > 0 [Pa]: ε = ε0 + g − η²/g with g = σ/E + α."""
@@ -168,11 +173,11 @@ class Law:
 
     def tangent(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Tangent modulus dσ/dε [Pa]."""
-        return _ufuncs()[1](self.number, strain, modulus, slackness, smoothing)
+        return self._evaluate(TANGENT, strain, modulus, slackness, smoothing)
 
     def energy_density(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Energy per natural volume ∫σ dε, zero at ε = 0 [J/m³]."""
-        return _ufuncs()[2](self.number, strain, modulus, slackness, smoothing)
+        return self._evaluate(ENERGY, strain, modulus, slackness, smoothing)
 
     def floor(self, modulus=1.0, slackness=0.0, smoothing=0.0):
         """Largest stress under compression, αE [Pa]; 0 for tension-only, infinite for linear."""

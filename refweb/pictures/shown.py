@@ -126,15 +126,15 @@ def unit_of(unit, *values):
 
 def bar(result: Result, factor=1.0):
     """± of a result as lengths below and above it, shape (2, 1); None where it is not known."""
-    if result.interval is not None:
-        ends = [result.value - result.interval[0], result.interval[1] - result.value]
+    if (between := result.interval or result.within) is not None:
+        ends = [result.value - between[0], between[1] - result.value]
         return np.array([[end if np.isfinite(end) else 0.0] for end in ends]) / factor
     return None if result.error is None else np.full((2, 1), result.error / factor)
 
 
 def told(result: Result):
     """A result in words, with its ±."""
-    words = readable(result.value, result.error, result.unit)
+    words = readable(result.value, result.error, result.unit, result.within)
     if result.interval is not None:
         least, most = (readable(end, None, result.unit) if np.isfinite(end) else "any" for end in result.interval)
         return f"{words}, may be from {least} to {most}"

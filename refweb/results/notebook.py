@@ -14,7 +14,7 @@ def of_solution(solution):
     rows = []
     for name, one in solution.results.items():
         time = [f"{one.time:.6g} s"] if dynamic else []
-        rows.append([name, readable(one.value, one.error, one.unit), *time, place(one.where, one.at)])
+        rows.append([name, readable(one.value, one.error, one.unit, one.within), *time, place(one.where, one.at)])
     remarks = other_errors(solution.summary()["results"])
     said = [*remarks, solution.message, *(f"warning: {text}" for text in solution.warnings)]
     cost = f"{solution.solver.get('method')}, {solution.cost['cpu_s']:.2f} s CPU"

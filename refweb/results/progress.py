@@ -7,11 +7,13 @@ import sys
 import threading
 import time
 
+from ..compiled import watched
+
 DELAY = 2.0
 """Time after which it is shown [s]."""
 APART = 0.5
 """Least time between two texts in a notebook [s]."""
-LOADING = "loading and, the first time, compiling kernels"
+LOADING = "loading"
 
 
 @contextlib.contextmanager
@@ -31,15 +33,21 @@ def followed(progress, text=LOADING):
     callable
     """
     if callable(progress):
-        yield progress
+        with _compiling(progress):
+            yield progress
     elif progress and sys.stderr.isatty():
-        with _bar(text) as tell:
+        with _bar(text) as tell, _compiling(tell):
             yield tell
     elif progress and _in_notebook():
-        with _line() as tell:
+        with _line() as tell, _compiling(tell):
             yield tell
     else:
         yield lambda text, share: None
+
+
+def _compiling(tell):
+    """Tell of kernels that are compiled."""
+    return watched(lambda done, count: tell(f"compiling {done + 1} of {count}, the first time", done / count))
 
 
 def _in_notebook():

@@ -37,7 +37,9 @@ class Result(NamedTuple):
     moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
     elements; in an orbit ``neglected`` is what its equations leave out, see `refweb.Orbit`; None where there is
     none. ``interval`` are the least and the largest value in all equilibria, where parts of the web float; an end that
-    nothing holds is infinite. ``at`` says what ``where`` is the number of, "node" or "line".
+    nothing holds is infinite. ``within`` are the least and the largest value that ± leaves of those which are possible,
+    where it goes beyond them: a length is not negative, and a share is 0 to 1. ``at`` says what ``where`` is the number
+    of, "node" or "line".
     """
 
     value: float
@@ -50,12 +52,24 @@ class Result(NamedTuple):
     neglected: float | None = None
     interval: tuple[float, float] | None = None
     at: str | None = None
+    within: tuple[float, float] | None = None
+
+    def bounded(self, least, most):
+        """The result where only what lies from ``least`` to ``most`` is possible."""
+        if self.error is None or not np.isfinite(self.error):
+            return self
+        error = min(self.error, max(self.value - least, most - self.value, 0.0))
+        low, high = self.value - self.error, self.value + self.error
+        cut = (low < least or high > most) and least <= self.value <= most
+        return self._replace(error=error, within=(max(low, least), min(high, most)) if cut else None)
 
     def plain(self):
         """As a dict, without the errors that were not looked for; an end of an interval that is infinite is None."""
         extra = {key: value for key in OTHER_ERRORS if (value := getattr(self, key)) is not None}
         if self.where is not None:
             extra["at"] = self.at
+        if self.within is not None:
+            extra["within"] = list(self.within)
         if self.interval is not None:
             extra["interval"] = [end if np.isfinite(end) else None for end in self.interval]
         return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
@@ -69,6 +83,8 @@ def read_results(given):
             isinstance(one.value, float | int) and isinstance(one.error, float | None) and isinstance(one.unit, str)
         ):
             raise TypeError(f"{name} is not a number")
+        if one.within is not None:
+            found[name] = one = one._replace(within=tuple(one.within))
         if one.interval is not None:
             least, most = one.interval
             ends = -np.inf if least is None else least, np.inf if most is None else most

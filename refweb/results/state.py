@@ -8,6 +8,7 @@ import numpy as np
 
 from ..effects.base import OWN
 from ..net.tension_laws import LINEAR, SMOOTH, Law
+from .columns import static_energies
 
 
 class State:
@@ -129,11 +130,9 @@ class State:
         for family in (f for f in self.system.families if f.energy is not None):
             energy = float(self.system.energy_of(family, self.time, self.x).sum())
             book[family.book] = book.get(family.book, 0.0) + energy
-        work = -book.pop("work") if "work" in book else None
-        book["total_energy"] = sum(book.values())
-        if work is None or any(f.book == "work" and f.energy is None for f in self.system.families):
-            return book
-        return {**book, "work": work}
+        work = -book.pop("work", 0.0)
+        book |= {"total_energy": sum(book.values()), "work": work}
+        return {name: book[name] for name in static_energies(self.system)}
 
 
 def strength_remark(utilisation):

@@ -80,6 +80,9 @@ class Throw(Table):
             name = getattr(self, key)
             if name is not None and name not in names:
                 raise InputError(f"{key} = {shown(name)} is not an observable, {nearest(name, names)}")
+        for name in names:
+            if name in self.numbers:
+                raise InputError(f"[[observe]] name = {shown(name)} is a result of [throw]: names are unique")
         mouth = observables[names.index(self.area)]
         if mouth.quantity != "mouth_area" or mouth.component is not None or mouth.average is not None:
             raise InputError(

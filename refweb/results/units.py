@@ -1,5 +1,7 @@
 """Numbers that people read: values with their ± in readable units, in one notation."""
 
+import math
+
 from .solution import OTHER_ERRORS
 
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -23,25 +25,38 @@ def scale_of(size, unit):
 
 
 def with_error(value, error):
-    """A number with its ±: ``100.66 ± 0.55``, ``2.9972910 ± 1.7e-06``; without one ``31.4848``.
+    """A number with its ±: ``100.66 ± 0.55``, ``2.9972910 ± 1.7e-06``, ``0 ± 90``; without one ``31.4848``.
 
-    ± has two digits, and the value as many as that leaves.
+    ± has two digits, and the value as many as that leaves: none of a value far below it.
     """
-    if not error:
-        return f"{value:.6g}"
+    if not error or not math.isfinite(error) or not math.isfinite(value):
+        return f"{value:.6g} ± {error}" if error else f"{value:.6g}"
+    left = 1 - _exponent(error)
+    value, error = round(value, left) + 0.0, round(error, left)  # + 0.0 makes 0 of −0
     if error >= 1e4 or abs(value) >= 1e7:
         return f"{value:.{MOST_DIGITS}g} ± {error:.1e}"
-    left = max(0, 1 - _exponent(error))
+    left = max(0, left)
     whole = max(1, _exponent(value) + 1) if value else 1
     text = f"{error:.{left}f}" if error >= FIXED else f"{error:.1e}"
     return f"{value:.{min(left, MOST_DIGITS - whole)}f} ± {text}"
 
 
-def readable(value, error, unit):
-    """A value with its error in a readable unit: ``31.4848 mm``, ``100.66 ± 0.55 mm``."""
-    factor, name = scale_of(value, unit)
-    text = with_error(value / factor, error and error / factor)
-    return f"{text} {name}".rstrip()
+def readable(value, error, unit, within=None):
+    """A value with its error in the unit of the larger of both: ``31.4848 mm``, ``100.66 ± 0.55 mm``, ``0 ± 90 mm``.
+
+    ``within`` are the least and the largest value of those that are possible, where ± goes beyond them.
+    """
+    factor, name = scale_of(larger(value, error), unit)
+    text = f"{with_error(value / factor, error and error / factor)} {name}".rstrip()
+    if within is None:
+        return text
+    least, most = (f"{end / factor:.3g}" for end in within)
+    return f"{text}, from {least} to {most}"
+
+
+def larger(value, error):
+    """The larger of a value and its ±, which is None where it is not known: it decides on the unit."""
+    return max(abs(value), error or 0.0)
 
 
 def other_errors(results):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .units import other_errors, place, readable, scale_of, with_error
+from .units import larger, other_errors, place, readable, scale_of, with_error
 
 FEW_BREAKS = 5
 """Number of breaks that are told one by one."""
@@ -25,7 +25,7 @@ def rows_of_results(results, dynamic):
     """Results with their ±, where and, in dynamics, when they are."""
     rows = []
     for name, result in results.items():
-        value = readable(result["value"], result["error"], result["unit"])
+        value = readable(result["value"], result["error"], result["unit"], result.get("within"))
         time = [f"t = {result['time']:.6g} s"] if dynamic else []
         rows.append([name, value, *time, f"at {where}" if (where := _place(result)) else ""])
     return Rows(["result", "value", *(["time"] if dynamic else []), "place"], rows, [])
@@ -38,7 +38,8 @@ def rows_of_steps(steps):
     columns = {name: [step["results"][name] for step in steps] for name in steps[-1]["results"]}
     factors = {}
     for name, column in columns.items():
-        factors[name], unit = scale_of(max(abs(result["value"]) for result in column), column[-1]["unit"])
+        size = max(larger(result["value"], result["error"]) for result in column)
+        factors[name], unit = scale_of(size, column[-1]["unit"])
         names.append(f"{name} [{unit}]" if unit else name)
     rows = []
     for n, step in enumerate(steps):

@@ -8,6 +8,7 @@ solved.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,28 @@ class NotFound(SolverError):
         self.stats = stats
 
 
+class Stability(NamedTuple):
+    """What is known of the stability of an equilibrium.
+
+    Attributes
+    ----------
+    sign : {-1, 0, 1, None}
+        −1 where the tangent drives the web away or a disturbance grows, 0 where some direction has no stiffness to
+        rounding, 1 where the equilibrium is stable, None where that is not decided.
+    why : str
+        Of −1 what drives it away, of None what is missing, in words.
+    held : bool
+        Whether Coriolis forces hold what the tangent does not, as long as nothing damps motion in the frame.
+    loose : bool
+        Whether some direction may have no stiffness.
+    """
+
+    sign: int | None
+    why: str = ""
+    held: bool = False
+    loose: bool = False
+
+
 @dataclass(eq=False)
 class Equilibrium:
     """One state of statics.
@@ -45,7 +68,11 @@ class Equilibrium:
         Resultant force on every row [N]; at a support the negative of the reaction.
     stats : dict
         ``nsteps`` iterations, ``nfev`` force and energy evaluations, ``njev`` tangents, ``nlu`` factorizations,
-        ``residual`` [1], ``smallest_pivot`` (its sign, None where not asked for).
+        ``residual`` [1], ``smallest_pivot``, the sign of `stability`.
+    stability : Stability, optional
+        Whether it is stable; None where its energy is convex, and so it is.
+    may_turn_over : bool
+        Whether there may be other equilibria as lines can push, see `refweb.statics.other_side`.
     duality_bound : refweb.statics.duality_bound.DualityBound, optional
         Of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional
@@ -63,6 +90,8 @@ class Equilibrium:
     duality_bound: object = None
     deviations: object = None
     floating: object = None
+    stability: Stability | None = None
+    may_turn_over: bool = False
 
 
 def add_spent(stats, other):

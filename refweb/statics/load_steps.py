@@ -44,7 +44,7 @@ def solve(system, load_steps, progress=None):
     SolverError
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
-    system = at_rest(system)
+    whole, system = system, at_rest(system)
     newton, states = Newton(system, progress, load_steps[0]), []
     for t in load_steps:
         try:
@@ -57,6 +57,12 @@ def solve(system, load_steps, progress=None):
 
             state.duality_bound = duality_bound(system, state, newton.factor)
             state.floating = between_slack_lines(system, state)
+        if newton.follows:
+            newton.factorize_at(state)
+        if not system.convex:
+            from .stability import ask
+
+            ask(whole, system, state, newton.factor if newton.follows else None)
         state.deviations = newton.deviations(state)
         states = [*states[-1:], state]
         yield state
@@ -99,7 +105,7 @@ def _equilibrium(newton, t, x, warm):
         from .lowest import lowest
 
         state = lowest(newton, state)
-    if not (convex or newton.follows):
+    if not (newton.system.convex or newton.follows):
         state.stats["smallest_pivot"] = newton.smallest_pivot(t, state.x, state.stats)
     add_spent(state.stats, spent)
     return state

@@ -289,10 +289,19 @@ class Newton:
             stats,
         )
 
+    @property
+    def _tiny(self):
+        """Tension of all lines that counts as none [N]."""
+        return 1e-12 * self.axial
+
+    def factorize_at(self, state):
+        """Factorize K at an equilibrium, but for what stiffness counts as none."""
+        self._factorize(self._matrix(state.step, state.x, self._tiny, False), self._tiny)
+        state.stats["nlu"] += 1
+
     def smallest_pivot(self, t, x, stats):
         """Sign of the smallest pivot of K: −1 for a saddle, 0 where K is singular to rounding, 1 for a minimum."""
-        tiny = 1e-12 * self.axial
-        for shift, sign in ((-tiny, 1), (tiny, 0)):
+        for shift, sign in ((-self._tiny, 1), (self._tiny, 0)):
             self._factorize(self._matrix(t, x, shift, False), shift)
             stats["nlu"] += 1
             if self.factor.negative_pivots() <= self.drifting:
@@ -305,16 +314,14 @@ class Newton:
         Rounding of a line's ends and of its tension leaves a force of machine precision times T + k |x| at its nodes.
         Moves at no cost are left out; where no duality bound tells what floats, the null space of the tangent does.
         """
-        system, sign = self.system, state.stats.get("smallest_pivot")
-        tiny = 1e-12 * self.axial
-        if sign is None and (found := self._deviations_by_factor_at_hand(state, tiny)) is not None:
+        system, asked = self.system, self.follows or state.stats.get("smallest_pivot") is not None
+        if not asked and (found := self._deviations_by_factor_at_hand(state)) is not None:
             return found
-        if sign is None:
-            self._factorize(self._matrix(state.step, state.x, tiny, False), tiny)
-            state.stats["nlu"] += 1
+        if not asked:
+            self.factorize_at(state)
         solve = self.factor.solve
-        if sign != 1 and len(system.free):
-            null = NullSpace(self.factor, tiny * system.pattern.matrix(self.geometric))
+        if (state.stability is None or state.stability.loose) and len(system.free):
+            null = NullSpace(self.factor, self._tiny * system.pattern.matrix(self.geometric))
             if state.duality_bound is None:
                 state.floating = null.floating(system)
             if state.floating is not None:
@@ -327,12 +334,12 @@ class Newton:
             deviation.ravel()[system.free] = p
         return found
 
-    def _deviations_by_factor_at_hand(self, state, tiny):
+    def _deviations_by_factor_at_hand(self, state):
         """The same where nothing floats, as its duality bound proves; None where that does not say or takes long."""
         if state.duality_bound is None or state.floating is not None or not self._can_use_again(state.tension):
             return None
         forces = np.column_stack(self._disturbing(state))
-        found = self._by_factor_at_hand(self._matrix(state.step, state.x, tiny, False), forces, ROUGH)
+        found = self._by_factor_at_hand(self._matrix(state.step, state.x, self._tiny, False), forces, ROUGH)
         if not found.enough:
             return None
         deviations = np.zeros((forces.shape[1], self.system.rows, 3))

@@ -46,18 +46,51 @@ def remark_on_open(state, equilibrium):
     return f"{len(open_)} nodes {how}, their positions are not unique: {some}"
 
 
+def on_stability(state, equilibrium, subject="the equilibrium"):
+    """Whether an equilibrium is stable, and whether there may be others: pairs of a kind and a text."""
+    found = equilibrium.stability
+    if found is None:
+        return
+    if found.sign == -1:
+        yield "saddle", f"{subject} is a saddle ({found.why}): {_way_out(state, found)}"
+        return
+    if found.sign is None:
+        yield "stability", f"whether {subject} is stable is not decided: {found.why}"
+    pushing = "bars" if _bars_push(state) else "slack lines"
+    if equilibrium.may_turn_over:
+        pull = (state.element_tension[state.system.net.laws == LINEAR] >= 0.0).all()
+        lowest = equilibrium.stats.get("above_lowest") == 0.0
+        which = "none of them lower" if lowest else "and lower ones, which ± does not know"
+        yield "others", f"{'bars can' if pull else 'bars'} push: there may be other equilibria, {which}"
+    elif equilibrium.stats.get("above_lowest", 0.0) is None:
+        yield "others", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
+    elif equilibrium.stats.get("unsure"):
+        lower = f"{equilibrium.stats['above_lowest']:.3g} J"
+        yield "others", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
+
+
+def _way_out(state, found):
+    """What comes of a saddle, and what to do about it."""
+    system = state.system
+    deflect = "start from a web that is deflected"
+    if found.held:
+        return (
+            "the web would leave this state by itself as soon as anything damps its motion in these axes; until then "
+            f"Coriolis forces hold it; {deflect}"
+        )
+    if system.rotating or not (state.element_tension < 0.0).any():
+        return f"the web would leave this state by itself; {deflect}"
+    law = "bars" if _bars_push(state) else "slack lines under the law's floor"
+    reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
+    return reason + ('law = "tension-only" has no such states' if system.dead else deflect)
+
+
 def remarks_on(state, stats, utilisation, equilibrium):
     """Of an equilibrium: pairs of a kind and a text."""
     net = state.system.net
     for text in floor_remark(net, float(state.stress.max())):
         yield "floor", text
-    if stats["smallest_pivot"] == -1:
-        law = "bars" if _bars_push(state) else "slack lines under the law's floor"
-        reason = f"{law} push, and the web would wrinkle or buckle out of this state; "
-        reason += 'law = "tension-only" has no such states'
-        if state.system.rotating:
-            reason = "the web would leave this state by itself; start from a web that is deflected"
-        yield "saddle", f"the equilibrium is a saddle (a pivot of its tangent is negative): {reason}"
+    yield from on_stability(state, equilibrium)
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
     if state.system.dead and (others := np.flatnonzero(net.laws != TENSION_ONLY)).size < len(net.laws) and others.size:
@@ -67,13 +100,6 @@ def remarks_on(state, stats, utilisation, equilibrium):
             f'line {net.line[others[0]]} can push (law = "{law}"): ± are estimates, as the proven '
             'bound asks for law = "tension-only" on all lines',
         )
-    if state.system.dead and (net.laws != TENSION_ONLY).any() and stats["smallest_pivot"] != -1:
-        pushing = "bars" if _bars_push(state) else "slack lines"
-        if equilibrium.stats.get("above_lowest", 0.0) is None:
-            yield "others", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
-        elif equilibrium.stats.get("unsure"):
-            lower = f"{equilibrium.stats['above_lowest']:.3g} J"
-            yield "others", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
     if starts := equilibrium.stats.get("starts"):
         apart = max(starts) - min(starts)
         if apart > 1e-9 * max(map(abs, starts)):

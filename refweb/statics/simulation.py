@@ -10,8 +10,10 @@ import numpy as np
 from ..errors import SolverError
 from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
+from ..results.columns import FIRST, static_energies
 from ..results.solution import SOLVER, Result
 from ..results.state import State
+from ..system.at_rest import at_rest
 from .remarks import Remarks, open_rows, remarks_on
 
 
@@ -41,8 +43,8 @@ class Simulation:
         self.rows, self._remarks, self._framed = [], Remarks(), -1
         self._passage, self._lines = _passage_of(scene, system), _lines_of(scene, system)
         self._totals = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-        self.columns = ["step [1]", *(f"{o.name} [{o.unit}]" for o in scene.observables)]
-        self.columns += [f"{name} [J]" for name in State(system, 0.0, np.zeros((system.rows, 3))).energies]
+        self.columns = [FIRST["static"], *(f"{o.name} [{o.unit}]" for o in scene.observables)]
+        self.columns += [f"{name} [J]" for name in static_energies(system)]
 
     @property
     def done(self):
@@ -88,6 +90,11 @@ class Simulation:
     def _take(self, found, smoothing):
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        rest = at_rest(self.system)
+        if found.stability is None and not rest.convex:  # of a method that knows no tangents
+            from .stability import ask
+
+            ask(self.system, rest, found)
         if self.system.weakness is not None:
             self._refuse_break(found)
         if self._passage is not None:
@@ -139,11 +146,14 @@ class Simulation:
         if smoothing is not None:
             smoothed = smoothing.errors(found, [value.value for value in values])
         return {
-            o.name: Result(
-                *(value.value, error, o.unit, found.step, value.where, moved),
-                interval=o.interval(state, found),
-                neglected=None if share is None else abs(value.value) * share,
-                at=None if value.where is None else o.observable.at,
+            o.name: o.bounded(
+                Result(
+                    *(value.value, error, o.unit, found.step, value.where, moved),
+                    interval=o.interval(state, found),
+                    neglected=None if share is None else abs(value.value) * share,
+                    at=None if value.where is None else o.observable.at,
+                ),
+                self.system,
             )
             for o, value, error, moved in zip(observables, values, errors, smoothed, strict=True)
         }

@@ -327,7 +327,7 @@ class Lu:
 
     def __init__(self, pattern):
         self.pattern = pattern
-        self._solver = None
+        self._solver: Any = None
 
     def update(self, values, held=None):
         """Factorize the matrix of these values."""
@@ -338,12 +338,22 @@ class Lu:
         except RuntimeError:  # exactly singular
             self._solver = None
 
-    def solve(self, b):
-        """Solution of A y = b, shape (n,); None where there is none."""
-        if self._solver is None:
+    def solve(self, b, transposed=False):
+        """Solution of A y = b, shape (n,), or of Aᵀ y = b; None where there is none."""
+        if self.singular:
             return None
-        y = self._solver.solve(b)
+        y = self._solver.solve(b, "T" if transposed else "N")
         return y if np.isfinite(y).all() else None
+
+    @property
+    def singular(self):
+        """Whether a pivot is exactly 0."""
+        return self._solver is None
+
+    def sign_of_determinant(self):
+        """Sign of det A, of a matrix that is not singular."""
+        odd = _is_odd(self._solver.perm_r) != _is_odd(self._solver.perm_c)
+        return int(np.prod(np.sign(self._solver.U.diagonal()))) * (-1 if odd else 1)
 
     def negative_pivots(self) -> int:
         """No signs of pivots tell of what is not symmetric."""
@@ -352,6 +362,16 @@ class Lu:
     def precondition(self, b) -> np.ndarray:
         """Conjugate gradients are for what is symmetric."""
         raise NotImplementedError
+
+
+def _is_odd(turned):
+    """Whether an odd number of exchanges makes a permutation."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(turned)
+    cycles, _ = connected_components(coo_array((np.ones(count), (np.arange(count), turned)), shape=(count, count)))
+    return (count - cycles) % 2 == 1
 
 
 def weak_pivot(solver):

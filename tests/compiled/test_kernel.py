@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from refweb.compiled import kernel as kernels
+from refweb.compiled import watched
 from refweb.kernels import Matrix, Vector, kernel
 
 FACTORY = '''
@@ -154,9 +155,9 @@ def test_progress_counts_what_is_to_be_compiled():
     def new(value: float) -> float:
         return value + 0.123456789012345
 
-    kernel_files, seen = new, []
-    known = kernel_files.known()
-    kernels.prepare([new], progress=lambda done, count: seen.append((done, count)))
+    seen, known = [], new.known()
+    with watched(lambda done, count: seen.append((done, count))):
+        kernels.prepare([new])
     assert seen == ([] if known else [(0, 1)])
     assert new(1.0) == 1.123456789012345
 

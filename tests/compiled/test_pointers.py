@@ -2,6 +2,7 @@
 
 import copy
 import gc
+import importlib
 import weakref
 from typing import Annotated
 
@@ -16,14 +17,14 @@ from refweb.kernels import MATRIX, Arrays, Functions, Integers, Matrix, MatrixTa
 ONE = types.float64(types.float64)
 
 
-class Inside(Record):
+class Inner(Record):
     numbers: Vector
     count: int
 
 
-class Outside(Record):
+class Outer(Record):
     share: float
-    inside: Inside
+    inside: Inner
     matrix: Matrix
     places: Integers
     functions: Annotated[Functions, ONE]
@@ -41,9 +42,9 @@ def square(value):
 
 
 def record():
-    return Outside(
+    return Outer(
         share=0.5,
-        inside=Inside(np.array([1.0, 2.0, 3.0]), 7),
+        inside=Inner(np.array([1.0, 2.0, 3.0]), 7),
         matrix=np.arange(6.0).reshape(2, 3),
         places=np.array([4, 5]),
         functions=Functions(ONE, [double, square]),
@@ -52,7 +53,7 @@ def record():
 
 
 @kernel(leaf=True, apart=())
-def read(given: Outside, out: Vector) -> None:
+def read(given: Outer, out: Vector) -> None:
     out[0], out[1], out[2] = given.share, given.inside.count, given.inside.numbers[2]
     out[3], out[4] = given.matrix[1, 2], given.places[1]
     out[5], out[6] = given.functions[0](3.0), given.functions[1](3.0)
@@ -60,12 +61,12 @@ def read(given: Outside, out: Vector) -> None:
 
 
 @kernel(leaf=True, apart=())
-def write(given: Outside) -> None:
+def write(given: Outer) -> None:
     given.inside.numbers[0], given.table[1][0, 0] = -1.0, -2.0
 
 
 @kernel(apart=())
-def replace(given: Outside, rows: int) -> float:
+def replace(given: Outer, rows: int) -> float:
     given.table[0] = np.ones((rows, 2))
     total = 0.0
     for value in given.table[0].reshape(-1):
@@ -100,6 +101,7 @@ def test_what_kernels_put_into_a_table_is_given_back_with_it():
         found = rtsys.get_allocation_stats()
         return found.mi_alloc - found.mi_free
 
+    gc.collect()  # of what other tests have left
     given, before = record(), made()
     first = weakref.ref(given.table[0])
     for rows in (3, 5, 4):
@@ -132,7 +134,14 @@ def test_a_copy_has_a_block_of_its_own():
 )
 def test_a_field_of_another_type_is_refused(values, message):
     with pytest.raises(TypeError, match=message):
-        _ = Inside(values, 1).address
+        _ = Inner(values, 1).address
+
+
+def test_two_records_of_one_name_are_refused():
+    """Annotations name them."""
+    with pytest.raises(TypeError, match="a record Model stands in refweb"):
+        importlib.import_module("refweb.dynamics.integrators.records")
+        type("Model", (Record,), {"__annotations__": {"count": int}})
 
 
 def test_a_kernel_of_another_signature_is_refused():

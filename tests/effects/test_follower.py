@@ -78,7 +78,8 @@ def test_polygon_under_pressure(count, turned):
         np.testing.assert_allclose(found.tension, p * radius * np.cos(half), rtol=1e-10)
         position = system.net.points + found.x
         np.testing.assert_allclose(np.linalg.norm(position, axis=1), radius, rtol=1e-10)
-    assert "smallest_pivot" not in found.stats and found.duality_bound is None
+        assert found.stats["smallest_pivot"] == 1  # a closed loop has the potential −p × area
+    assert found.duality_bound is None
 
 
 def arc(natural, count, order, push, law="tension-only"):

@@ -52,11 +52,12 @@ def hit(
 
 
 def pressed(force, stiffness, steps=(1.0,), modulus=1e5, gap=-1e-4):
-    """A node between two lines, pressed on a fixed ball just below it."""
+    """A node between two lines, pressed on a fixed ball just below it, whose top it cannot slip from to a side."""
     under = ball(speed=0.0, gap=gap, fixed=True, mass=None)
     return refweb.Scene(
         web=TWO,
         cable=refweb.Cable(law="tension-only", modulus=modulus, area=1e-4, density=0.0),
+        support=[refweb.Supports(nodes=[1], components=["x", "y"])],
         effects=[under, refweb.Contact(stiffness=stiffness), refweb.Load(node=1, force=(0.0, 0.0, -force))],
         solve=refweb.Static(load_steps=steps),
         observe=[DEEP],

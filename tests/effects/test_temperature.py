@@ -109,7 +109,7 @@ def moving(effect, web=None, **solve):
     observe = [
         refweb.Observe(name="tension", quantity="tension", reduce="max"),
         refweb.Observe(name="speed", quantity="velocity"),
-        refweb.Observe(name="work", quantity="work"),
+        refweb.Observe(name="done", quantity="work"),
     ]
     found = scene(web or nets.skew_web(), effect, law="linear", solve=refweb.Dynamic(duration=0.015, **solve))
     return found.replace(observe=observe, output=refweb.Output(interval=1e-3))
@@ -152,7 +152,7 @@ def test_a_constant_change_costs_no_work():
     heat = refweb.Temperature(expansion=1e-5, change=-500.0)
     web = refweb.Window(mesh="hexagon", rows=5, columns=4, side=0.2)
     solution = refweb.run(moving(heat, web, start="equilibrium"))
-    assert solution.results["work"].value == 0.0
+    assert solution.results["done"].value == 0.0
     # ε = 1/(1 − 0.005) − 1 in every line of a regular net whose ends are fixed.
     np.testing.assert_allclose(solution.results["tension"].value, AXIAL * (1.0 / 0.995 - 1.0), rtol=1e-9)
     assert solution.results["speed"].value < 1e-6

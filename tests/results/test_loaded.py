@@ -141,11 +141,30 @@ def test_load_steps_in_columns_of_one_unit(tmp_path, capsys):
         (31.48481312345, 2.4e-13, "31.48481312 ± 2.4e-13"),
         (0.0, 1e-3, "0.0000 ± 0.0010"),
         (1.5e8, 2e6, "150000000 ± 2.0e+06"),
+        (1.50123456e8, 2e6, "150100000 ± 2.0e+06"),
+        (130.0866297, 9e4, "0 ± 9.0e+04"),
+        (-3.0, 1871.0, "0 ± 1900"),
+        (126.3, 326.0, "130 ± 330"),
     ],
 )
 def test_one_notation(value, error, text):
     """± has two digits, and the value no more than it leaves."""
     assert with_error(value, error) == text
+
+
+@pytest.mark.parametrize(
+    "value, error, unit, text",
+    [
+        (130.0866297e-6, 0.09, "m/s", "0 ± 90 mm/s"),
+        (0.5, 1.871, "Pa", "0.5 ± 1.9 Pa"),
+        (0.0, 3e-7, "m", "0 ± 300 nm"),
+        (0.1234, 1e-7, "m", "123.40000 ± 0.00010 mm"),
+        (0.1234, None, "m", "123.4 mm"),
+    ],
+)
+def test_the_unit_is_that_of_the_larger(value, error, unit, text):
+    """A velocity of 0.13 mm/s ± 90 mm/s has no digit: neither in its own unit nor in that of its error."""
+    assert readable(value, error, unit) == text
 
 
 def test_names_of_blocks(both):

@@ -60,6 +60,19 @@ def test_a_load_that_comes_later():
     assert not told(refweb.run(scene), "acts only on supports")
 
 
+@pytest.mark.parametrize("fixed", [False, True])
+@pytest.mark.parametrize("pushed", [pull((-5.0, 0.0, 0.0), node=0), refweb.Thrust(node=0, line=0, force=-5.0)])
+def test_a_push_on_a_node_of_a_body(pushed, fixed):
+    """A free body of 10 kg goes F t²/2m with a push on its node, which is no support; on a fixed one it is."""
+    hub = refweb.Body(name="hub", radius=0.1, mass=10.0, position=(0.0, 0.0, 0.0), fixed=fixed)
+    moved = refweb.Observe(name="moved", quantity="displacement", body="hub", component="x")
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[])
+    effects, solve = (hub, refweb.Attach(body="hub", node=0), pushed), refweb.Dynamic(duration=0.5)
+    found = solved(*effects, web=web, solve=solve, observe=[moved], density=1e-2)
+    assert found.results["moved"].value == pytest.approx(0.0 if fixed else -0.0625, rel=1e-5)
+    assert len(told(found, "acts only on supports")) == fixed
+
+
 # Strains
 
 

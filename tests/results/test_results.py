@@ -15,6 +15,7 @@ from vtkmodules.vtkCommonCore import reference
 
 import refweb
 from refweb.net import elements
+from refweb.results.solution import Result, read_results
 
 STEPS = (0.5, 1.0, 2.0, 3.0)
 MODULUS, AREA, DENSITY, WEIGHT = 1e5, 1e-4, 300.0, np.array([0.3, 0.0, -2.0])
@@ -467,3 +468,45 @@ def test_frames_of_a_body(tmp_path):
     assert not frame.point_data["reaction"].any()
     assert after[2] < before[2] and abs(after[0] - before[0]) < 0.1 * (before[2] - after[2])
     np.testing.assert_allclose(frame.point_data["displacement"][0], 1e-3 * before, rtol=0.2, atol=1e-4)
+
+
+def test_errors_stay_within_what_is_possible():
+    """Two slack lines shrink until both are taut: a share is 0 to 1, and the largest tension of ropes at least 0."""
+    web = refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2])
+    cable = refweb.Cable(law="tension-only", modulus=1e7, area=1e-4, density=100.0, prestrain=-0.05)
+    asked = {"share": "slack_fraction", "most": "tension", "speed": "velocity", "strain": "strain"}
+    found = refweb.run(
+        refweb.Scene(
+            web=web,
+            cable=cable,
+            effects=[refweb.Temperature(expansion=1e-3, change=[(0.0, 0.0), (0.1, -100.0)])],
+            observe=[refweb.Observe(name=name, quantity=quantity) for name, quantity in asked.items()],
+            event=[refweb.Event(name="taut", kind="taut", line=[1], stop=True)],
+            solve=refweb.Dynamic(duration=0.1),
+        )
+    ).results
+    assert found["share"].error == pytest.approx(1.0) and found["share"].within == (0.0, 1.0)
+    value, error, *_ = found["most"]
+    assert error > value and found["most"].within == (0.0, value + error)
+    assert found["strain"].within is None
+
+
+@pytest.mark.parametrize(
+    "value, error, bounds, left, within",
+    [
+        (0.0, 3.0, (0.0, 1.0), 1.0, (0.0, 1.0)),
+        (0.25, 0.5, (0.0, 1.0), 0.5, (0.0, 0.75)),
+        (0.25, 5.0, (0.0, 1.0), 0.75, (0.0, 1.0)),
+        (3.0, 1.0, (0.0, np.pi), 1.0, (2.0, np.pi)),
+        (1.1, 5.3, (0.0, np.inf), 5.3, (0.0, 6.4)),
+        (1.1, 0.2, (0.0, np.inf), 0.2, None),
+        (-1.1, 5.3, (-np.inf, np.inf), 5.3, None),
+        (1.1, None, (0.0, 1.0), None, None),
+    ],
+)
+def test_value_and_error_cut_to_bounds(value, error, bounds, left, within):
+    """Where ± goes beyond the bounds what it leaves is told, and ± is the farther of these ends at most."""
+    found = Result(value, error, "1", 0.0, None).bounded(*bounds)
+    assert (found.value, found.error) == (value, left)
+    assert found.within == (within and pytest.approx(within))
+    assert read_results({"a": json.loads(json.dumps(found.plain()))})["a"] == found

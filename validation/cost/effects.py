@@ -243,7 +243,7 @@ def measure(scenes, repeats=7):
 
 def ran(package, cache, *toggle):
     """(files loaded, [steps, last row], standard error) of the plain scene with a copy of the package."""
-    environment = os.environ | {"PYTHONPATH": str(package), "NUMBA_CACHE_DIR": str(cache), "PYTHONHASHSEED": "0"}
+    environment = os.environ | {"PYTHONPATH": str(package), "REFWEB_CACHE": str(cache), "PYTHONHASHSEED": "0"}
     environment |= {"NUMBA_CPU_NAME": "generic"}  # valgrind knows not every instruction that this machine has
     tool = ["valgrind", "--tool=callgrind", "--instr-atstart=no", "--callgrind-out-file=/dev/null"] if toggle else []
     command = [*tool, sys.executable, "-c", COUNTED, json.dumps(PLAIN), *map(str, toggle)]

@@ -20,8 +20,9 @@ What is no result is a refusal, and its reason is listed. Which method refuses w
 table of cases: a method that refuses another, or takes one that it should refuse, fails the row of its group. What
 resolves how a line comes to stick at 1e-9 m/s, as CVODE and IDA do, does not end within minutes, and is left out.
 
-The table of random trials counts nets of random lines, slack, supports and loads, and runs of slack nets that are
-thrown about and hit in steps just below the bound of stability. ``python -m pytest -m slow tests/test_hard_cases.py
+The table of random trials counts nets of random lines, slack, supports and loads, runs of slack nets that are thrown
+about and hit in steps just below the bound of stability, and nets under pressure, thrust, wind and turning frames, of
+whose equilibria it is said whether they are stable. ``python -m pytest -m slow tests/test_hard_cases.py
 tests/test_fuzz.py tests/test_faults.py`` tries more of them, and worse: 2000 nets, 10 000 runs, 20 000 scene files,
 valid, changed and garbled, and 200 kills of a running process, each of which leaves a folder that opens and goes on to
 the same bytes. What such trials find has a test of its own, among them:
@@ -48,6 +49,7 @@ from .balances import energy_left, momentum_left, turning_left, unbalanced
 from .overlaps import outcome as hit_of
 from .overlaps import random_hit
 from .random_scenes import near_the_limit, outcome, random_net
+from .stability import RandomNet, word_on
 from .touching import BODIES, LINES
 from .tumbling_hits import HITS, at_rest, bad_surface
 
@@ -555,6 +557,14 @@ def random_hits(count):
     return rows, cells
 
 
+def words_on_stability(count):
+    """A row and cells of random nets whose equilibria are stable or not: the word on that is right."""
+    found = Counter(word_on(RandomNet(seed)).partition(":")[0] for seed in range(count))
+    row = Row("words on stability: wrong", found["wrong"], 0.0, "own eigenvalues", 0.0, "none", scale=1.0)
+    solved = count - found["refused"] - found["wrong"]
+    return row, ["words on stability", str(count), str(solved), str(found["refused"]), str(found["wrong"])]
+
+
 def matrix(groups, methods, prove, tolerance, reason, quick):
     """Rows, cells and reasons of a matrix of cases and methods; a group's row fails where a refusal is not foreseen."""
     rows, cells, refusals = [], [], {}
@@ -686,7 +696,8 @@ def case(quick):
             rows.append(Row(f"{what} of a free web, {name}", value, 0.0, "conserved", *within, scale=1.0))
     more, table = random_trials(*((30, 30) if quick else (300, 1000)))
     hits, cells = random_hits(20 if quick else 200)
-    more, table = more + hits, Table(table.title, table.columns, table.rows + cells)
+    row, words = words_on_stability(20 if quick else 200)
+    more, table = [*more, *hits, row], Table(table.title, table.columns, [*table.rows, *cells, words])
     columns = ["law", "steps", "momentum lost", "angular momentum lost", "energy lost", "reason of refusal"]
     tables.append(Table("A free web, thrown, in many steps", columns, long))
     return Case(rows=rows + more, tables=[*tables, table])

@@ -149,8 +149,7 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     hand_on(x, f, model.inertia.turns)
     if model.nearby.families.size:
         show_near(model.nearby, families)
-    if model.contacts.families.shape[0]:
-        feel(model.contacts, families)
+    feel(model.contacts, families)
 
 
 @kernel(apart=("watched", "kicks"))
@@ -222,8 +221,7 @@ def show_again(now: float, inside: Inside, model: Model, observed: Observed, run
         exchange_losses(False, inside, model)
     if model.nearby.families.size:
         show_near(model.nearby, families)
-    if model.contacts.families.shape[0]:
-        feel(model.contacts, families)
+    feel(model.contacts, families)
 
 
 @kernel(apart=("watched",))

@@ -2,7 +2,7 @@
 
     v ← v + ½h f/m,   x ← x + h v,   f ← f(t + h, x),   v ← v + ½h f/m
 
-The loop calls the kernels of all effects through typed lists and tracks peaks, in every step and between steps; Python
+The loop calls the kernels of all effects through tables and tracks peaks, in every step and between steps; Python
 sees history rows only. The step comes from Gershgorin's bound on the largest frequency, 2/√(max row sum of M⁻¹K), with
 K's lines at their taut stiffness and the lines that a body can reach within the row at their contact stiffness.
 
@@ -97,7 +97,7 @@ class CentralDifference(Integrator):
 
     method, order, stretch = "central-difference", 2, 1.0
     knob, retry, beside, follows_lines = "safety", 0.5, True, True
-    breathe, compiling = staticmethod(lambda t: None), staticmethod(lambda done, count: None)
+    breathe = staticmethod(lambda t: None)
     variants = {"central-difference": Variant(kind="splitting")}
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
@@ -136,18 +136,18 @@ class CentralDifference(Integrator):
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
-    def _prepare(self):
-        """Compile what the run calls, once."""
+    def prepare(self):
+        """Compile what the run calls, see `refweb.dynamics.integrators.integrator.Integrator`."""
         if not self._prepared:
             model, observed = self._model, self._observed
             called = [advance_rows, begin, open_ledger, safe_step, look_anew]
             called += [*model.all_kernels(), *observed.all_kernels()]
-            prepare(called, features(self._scheme, model, observed, self._events), self.compiling)
+            prepare(called, features(self._scheme, model, observed, self._events))
             self._prepared = True
 
     def bound(self, x=None, reach=np.inf):
         """Largest stable step [s] at displacement x, with what bodies can touch within ``reach`` [m], at any time."""
-        self._prepare()
+        self.prepare()
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
         return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
@@ -176,7 +176,7 @@ class CentralDifference(Integrator):
 
     def start(self, x=None, v=None):
         """The `ExplicitCourse` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
-        self._prepare()
+        self.prepare()
         system, self._taken = self.system, None
         force = np.zeros((system.rows, 3))
         x = np.zeros_like(force) if x is None else np.array(x, dtype=float, order="C")
@@ -221,7 +221,7 @@ class CentralDifference(Integrator):
 
     def load(self, arrays):
         """The `ExplicitCourse` of a checkpoint; families show what they do there."""
-        self._prepare()
+        self.prepare()
         course, self._taken = ExplicitCourse.of_arrays(arrays), None
         self.system.force_to(self._outs, course.time, course.x, course.v)
         return course

@@ -46,8 +46,15 @@ class Contacts(Record):
         return cls(families, np.zeros((forces.rows, FELT_COLUMNS)), forces.first, np.empty((0, 1), dtype=np.int32))
 
 
+@kernel(leaf=True)
+def feel(contacts, families):
+    """Write what bodies feel where families show what they do, where there is contact with any."""
+    if contacts.families.shape[0]:
+        sum_contacts(contacts, families)
+
+
 @kernel(leaf=True, apart=("contacts",))
-def feel(contacts: Contacts, families: Families) -> None:
+def sum_contacts(contacts: Contacts, families: Families) -> None:
     """Write what bodies feel where families show what they do."""
     forget(contacts.felt)
     for m in range(contacts.families.shape[0]):

@@ -208,13 +208,22 @@ class Room(Record):
     @classmethod
     def of(cls, model, running):
         """Space for the steps of a run."""
-        (rows, _), sums = running.x.shape, len(running.work) + 2
-        numbers = np.zeros(2, dtype=np.int64), np.zeros(3), np.zeros(3), np.zeros(3)
-        vectors = [np.zeros((rows, 3)) for _ in range(4)]
+        rows, sums, vectors = len(running.x), len(running.work) + 2, (np.zeros((len(running.x), 3)) for _ in range(4))
         losses = [np.empty_like(model.families.outs[i]) for i in model.rubbed.families.tolist()]
-        inside = Inside.of(rows, model.families.outs[0], running.extremes, sums, losses)
-        driven, changing = np.empty((len(model.inertia.driven), 7)), np.empty(len(model.reels.lengths))
-        return cls(*numbers, driven, *vectors, changing, np.zeros(sums), inside)
+        return cls(
+            where=np.zeros(2, dtype=np.int64),
+            reaction=np.zeros(3),
+            known=np.zeros(3),
+            push=np.zeros(3),
+            before=np.empty((len(model.inertia.driven), 7)),
+            aside=next(vectors),
+            extra=next(vectors),
+            half=next(vectors),
+            momenta=next(vectors),
+            was=np.empty(len(model.reels.lengths)),
+            total=np.zeros(sums),
+            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums, losses),
+        )
 
 
 @kernel(leaf=True, apart=())
@@ -222,10 +231,8 @@ def step_on(
     count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running, room: Room
 ) -> int:
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
-    where, reaction, known, push, before, aside = (
-        room.where, room.reaction, room.known, room.push, room.before, room.aside
-    )  # fmt: skip
-    extra, half, was, inside, total = room.extra, room.half, room.was, room.inside, room.total
+    where, reaction, known, push, before = room.where, room.reaction, room.known, room.push, room.before
+    aside, extra, half, was, inside, total = room.aside, room.extra, room.half, room.was, room.inside, room.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
@@ -233,8 +240,7 @@ def step_on(
     still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    lines, first = families.outs[0], families.forces[0]
-    cells_of_lines, data_of_lines = families.cells[0], families.data[0]
+    lines, first, data_of_lines = families.outs[0], families.forces[0], families.data[0]
     near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
     pushing, pushed, length_force = model.outside.pushing.size > 0, running.ledger.pushed, running.length_force
     stages, looked = scheme.drifts.size - 1, extremes.looked
@@ -263,7 +269,7 @@ def step_on(
         if near:
             follow_near(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
-        first(now, x, v, f, cells_of_lines, data_of_lines, lines)
+        first(now, x, v, f, families.cells[0], data_of_lines, lines)
         for i in still:
             act(i, now, x, v, f, families)
         if near:
@@ -275,8 +281,7 @@ def step_on(
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
-        if model.contacts.families.shape[0]:
-            feel(model.contacts, families)
+        feel(model.contacts, families)
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, families)
         book_motion(driven, mass, x, v, f, before, work)
@@ -452,8 +457,7 @@ def begin(
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
     hand_on(x, f, model.inertia.turns)
-    if model.contacts.families.shape[0]:
-        feel(model.contacts, families)
+    feel(model.contacts, families)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE
         extremes.values[i] = observed.probes[i](

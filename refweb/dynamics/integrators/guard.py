@@ -51,7 +51,8 @@ from .crossings import APART, BESIDE, THROUGH, note_met
 from .nearby import WAY, goes_freely, near_of, spread_of
 
 if TYPE_CHECKING:
-    from .records import Model, Running
+    from .nearby import Nearby
+    from .records import Families, Model, Running
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
@@ -201,8 +202,8 @@ def way_among(drift, kick, v, f, inverse):
     return abs(drift) * (spread_of(v.reshape(-1, 3)) + WAY * largest_of(kick, v, f, inverse, 0.0))
 
 
-@kernel(leaf=True, forceinline=True)
-def open_ahead(kick, drift, model, running):
+@kernel(leaf=True, apart=("guard",))
+def open_ahead(kick: float, drift: float, model: Model, running: Running) -> bool:
     """Whether a drift behind a kick leads no further than the last look found open; rows are seen as going it then.
 
     The largest component of a velocity is written to the skin of what is near.
@@ -239,8 +240,8 @@ def deepest_of(shown):
     return deep
 
 
-@kernel(leaf=True, forceinline=True)
-def calm(walls, nearby, families):
+@kernel(leaf=True, apart=("walls",))
+def calm(walls: Walls, nearby: Nearby, families: Families) -> bool:
     """Whether a drift behind another need not be looked at before, for bodies alone that do not turn."""
     skin, left = nearby.skin[0], math.inf
     for m in range(walls.families.size):

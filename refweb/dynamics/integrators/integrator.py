@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from ...results.columns import VECTORS, components
 from .averages import Averages
 from .crossings import none_met
 from .events import ended_by
@@ -32,9 +33,6 @@ SAME = 1e-12
 """Share of a time within which another is the same: corners of tables, rows and ends of steps are sums."""
 MAX_STEPS_PER_ROW = 1e8
 """Largest number of steps that a history row may take."""
-AXES = "xyz"
-VECTORS = ("momentum", "support_impulse", "outer_impulse")
-"""Last columns of a `History`, each with its axes."""
 GROUPS = {"extremes": Extremes, "ledger": Ledger, "averages": Averages}
 """Fields of a `Course` that are records of arrays."""
 
@@ -170,7 +168,7 @@ class History:
         """Rows of zeros for a number of probes and the families of a system."""
         names = ["time", *(f"probe {i}" for i in range(probed)), *(family.name for family in families)]
         names += ["kinetic_energy", "work", "step_size"]
-        names += [f"{vector}_{axis}" for vector in VECTORS for axis in AXES]
+        names += components(VECTORS)
         return cls(tuple(names), np.zeros((rows, len(names))), probed)
 
     def __len__(self):
@@ -193,7 +191,7 @@ class History:
     @property
     def sums(self):
         """What a `Sum` weighs: energy of each family, kinetic energy [J], work [J], step size [s]."""
-        return self.values[:, 1 + self.probed : -len(VECTORS) * len(AXES)]
+        return self.values[:, 1 + self.probed : -3 * len(VECTORS)]
 
     @property
     def energies(self):
@@ -213,17 +211,17 @@ class History:
     @property
     def momentum(self):
         """Momentum of all that is free [N s], shape (rows, 3)."""
-        return self.values[:, -3 * len(AXES) : -2 * len(AXES)]
+        return self.values[:, -9:-6]
 
     @property
     def impulse(self):
         """Impulse of the supports on the net [N s], shape (rows, 3)."""
-        return self.values[:, -2 * len(AXES) : -len(AXES)]
+        return self.values[:, -6:-3]
 
     @property
     def outer_impulse(self):
         """Impulse of all else that acts from outside [N s], shape (rows, 3)."""
-        return self.values[:, -len(AXES) :]
+        return self.values[:, -3:]
 
 
 class Variant(NamedTuple):
@@ -266,8 +264,8 @@ class Integrator(Protocol):
     beside : bool
         Whether ``advance`` runs compiled and releases the interpreter, so that a twin may run in a thread beside it.
     breathe : callable
-        Called with the time [s] some times a second of ``advance``; it may raise, and then the run is as it was at the
-        row before.
+        Called with the time [s] some times a second of ``advance``, or once in some steps; it may raise, which ends the
+        run: one of a compiled loop is then as it was at the row before.
 
     Notes
     -----
@@ -275,7 +273,8 @@ class Integrator(Protocol):
     ``follows_lines = True`` where it notes in the course which lines may have passed through each other; ``variants``,
     a dict of `Variant` s by name, where ``refweb cost`` is to compare several of them or in other settings;
     ``tolerances``, a dict of absolute ones by unit, "m" and "m/s", of which ± is no less than a multiple; and where
-    that is known before a run, a method ``evaluations(duration)``, how many evaluations of forces a time [s] takes, and
+    kernels are to be compiled before a run, a method ``prepare()``; and where that is known before a run, a method
+    ``evaluations(duration)``, how many evaluations of forces a time [s] takes, and
     a method ``steps_in(spans)``, how many steps each of some spans of time [s] takes, shape (spans,).
     """
 

@@ -257,8 +257,7 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
         for i in range(len(forces)):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
         hand_on(x, f, model.inertia.turns)
-        if model.contacts.families.shape[0]:
-            feel(model.contacts, families)
+        feel(model.contacts, families)
         for i in model.rubbed.families:
             running.power[i] = sum_of(families.outs[i][:, 0])
     return turned

@@ -27,6 +27,8 @@ from .tolerances import scales
 
 PATIENCE = 1000
 """Number of steps in turn of which a row would take more than `MAX_STEPS_PER_ROW`; at a start they are short."""
+BREATH = 100
+"""Number of steps after each of which it is told how far a run is, and it may be ended."""
 HALVINGS = 8
 """Number of times that a piece of a step is halved where powers change too much in it."""
 TWIN_TOLERANCES = 10.0
@@ -273,6 +275,8 @@ class StepObserver(Integrator):
             while course.time < end and not course.stopped:
                 if course.reached <= course.time:
                     self._take_step(course, end)
+                    if course.nsteps % BREATH == 0:
+                        self.breathe(course.time)
                 self._cover(course, min(course.reached, end))
             self._fill(history.values[n], course, before)
             if course.stopped:

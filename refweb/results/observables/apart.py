@@ -10,7 +10,7 @@ from ...errors import InputError
 from ...kernels import kernel
 from ...messages import nearest
 from ..probes import MAGNITUDE, PROBE, Probe
-from .observable import Observable, Value
+from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 
 class Between(Observable):
@@ -33,6 +33,10 @@ class Between(Observable):
             hint = nearest(name, names) if names else "the scene has no [[body]]"
             raise InputError(f'body = "{name}" is not a body, {hint}')
         return system.net.bodies[names.index(name)].row
+
+    def bounds(self, system):
+        """A length or an area is not negative, its component may be."""
+        return NOT_NEGATIVE if self.observe.component is None else ANY
 
     def of(self, state):
         """By the kernel of its probe."""

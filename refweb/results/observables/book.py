@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from .observable import Observable, Value
+from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 
 def weights(system, column):
@@ -24,11 +24,18 @@ class Booked(Observable):
     ----------
     needs : str
         Table without which no effect writes to the column, empty where there always is one.
+    signed : bool
+        Whether it may be negative.
     """
 
     unit = "J"
     booked = True
     needs = ""
+    signed = True
+
+    def bounds(self, system):
+        """Energy of what is stretched, pressed, bent or moved, or lost, is not negative."""
+        return ANY if self.signed else NOT_NEGATIVE
 
     def on(self, system):
         """Refuse a column that no effect writes to."""
@@ -47,11 +54,14 @@ class Booked(Observable):
 class KineticEnergy(Booked):
     """Of all that moves."""
 
+    signed = False
     dynamic = True
 
 
 class StrainEnergy(Booked):
     """Of the lines."""
+
+    signed = False
 
     def error(self, state, equilibrium):
         """The proven bound of duality, where there is one."""
@@ -69,24 +79,28 @@ class PotentialEnergy(Booked):
 class ContactEnergy(Booked):
     """Of touching bodies."""
 
+    signed = False
     needs = "[contact]"
 
 
 class BodyContactEnergy(Booked):
     """Of contact between bodies."""
 
+    signed = False
     needs = "[contact] with between_bodies = true"
 
 
 class SelfContactEnergy(Booked):
     """Of touching lines."""
 
+    signed = False
     needs = "[self_contact]"
 
 
 class BendingEnergy(Booked):
     """Of bent lines."""
 
+    signed = False
     needs = "[bending]"
 
 
@@ -105,6 +119,7 @@ class OrbitEnergy(Booked):
 class RuptureEnergy(Booked):
     """What lines held when they broke."""
 
+    signed = False
     dynamic = True
     needs = "[rupture]"
 
@@ -112,6 +127,7 @@ class RuptureEnergy(Booked):
 class DissipatedEnergy(Booked):
     """What damping and friction have taken."""
 
+    signed = False
     dynamic = True
     needs = "[damping], [drag] in a fluid at rest, or damping or friction in [contact] or [self_contact],"
 
@@ -139,5 +155,6 @@ class Work(Booked):
 class StepSize(Booked):
     """Length of the step that led to an instant."""
 
+    signed = False
     unit = "s"
     dynamic = True

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...net.net import AXIAL_STIFFNESS
-from .observable import Observable, Value
+from ...net.tension_laws import TENSION_ONLY
+from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 
 class Line(Observable):
@@ -59,6 +60,12 @@ class Line(Observable):
     def place(self, system, at):
         """The line of an element."""
         return int(system.net.line[at])
+
+    def bounds(self, system):
+        """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
+        pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
+        alone = sum(family.lines for family in system.families) == 1
+        return NOT_NEGATIVE if self.column == 0 and pulls and alone else ANY
 
     def scale(self, net):
         """1, shape (cells,)."""

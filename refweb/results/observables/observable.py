@@ -10,6 +10,8 @@ from ...errors import InputError
 from ...messages import nearest
 from ...net.net import LENGTH
 
+ANY, NOT_NEGATIVE = (-np.inf, np.inf), (0.0, np.inf)
+"""Least and largest value that are possible."""
 ROUNDING, SHARE = 4.0 * np.finfo(float).eps, 1e-7
 """Rounding of a strain by that of positions and lengths, and the change of a length by which its effect is found."""
 
@@ -72,6 +74,10 @@ class Observable:
         if name is not None and name not in names:
             raise InputError(f'body = "{name}" is not a body, {nearest(name, names)}')
         return next(body for body in net.bodies if name in (None, body.name))
+
+    def bounds(self, system):
+        """Least and largest value that are possible, whatever the state: a magnitude is not negative."""
+        return NOT_NEGATIVE if "component" in self.keys and self.observe.component is None else ANY
 
     def place(self, system, at):
         """Node or line of the scene, where the probe says it stands at row or element ``at``; None for the whole."""

@@ -138,6 +138,10 @@ class Observe(Table):
         """Least and largest value in all equilibria, where the value is open and these are known."""
         return self.observable.interval(state, equilibrium)
 
+    def bounded(self, result, system):
+        """A `refweb.results.solution.Result` whose ± says nothing beyond what is possible."""
+        return result.bounded(*self.observable.bounds(system))
+
     def probe(self, system):
         """The `refweb.results.probes.Probe` that follows it, with the sign of its peaks and its window."""
         return self.observable.probe(system)._replace(sign=SIGN[self.reduce], average=self.average or 0.0)

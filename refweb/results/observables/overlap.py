@@ -6,7 +6,7 @@ import numpy as np
 
 from ...effects.base import CONTACT, pairs_of
 from ...errors import InputError
-from .observable import Observable, Value
+from .observable import NOT_NEGATIVE, Observable, Value
 
 
 class Overlap(Observable):
@@ -30,6 +30,10 @@ class Overlap(Observable):
         deep = state.overlap(self.body(state.system.net))
         at = int(np.argmax(deep))
         return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
+
+    def bounds(self, system):
+        """A depth."""
+        return NOT_NEGATIVE
 
     def probe(self, system):
         """Of what its body feels."""

@@ -12,6 +12,10 @@ class SlackFraction(Observable):
         """Of elements that are slack all along."""
         return Value(float(state.element_slack.mean()), None)
 
+    def bounds(self, system):
+        """A share."""
+        return 0.0, 1.0
+
     def probe(self, system):
         """Counts strains up to the slackness."""
         from ..probes import Probe, slack_fraction

@@ -53,6 +53,10 @@ class Orientation(Turning):
         super().__init__(observe)
         self.unit = "rad" if observe.component is None else "1"
 
+    def bounds(self, system):
+        """An angle, or a component of a unit quaternion."""
+        return (0.0, math.pi) if self.observe.component is None else (-1.0, 1.0)
+
     def on(self, system):
         """Refuse a ball, which looks the same however it turns."""
         super().on(system)

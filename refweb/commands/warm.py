@@ -1,0 +1,71 @@
+"""Compile what the shipped scenes need, for images of machines and for clusters.
+
+With ``--ship`` machine code that all usual processors of this kind run is written into the package itself, for a wheel.
+"""
+
+import contextlib
+import os
+
+METHODS = ("cvode", "ida", "explicit")
+"""Methods that no shipped scene has by default."""
+ROWS = 2
+"""Rows of history that each scene is run for."""
+
+
+def add_arguments(parser):
+    """One."""
+    parser.add_argument("--ship", action="store_true", help="write into the package, for a wheel")
+
+
+def run(arguments):
+    """Run each scene for some rows; what is on disk already is not compiled again."""
+    if arguments.ship:
+        _ship()
+    import refweb
+
+    from ..scene import shipped
+
+    scenes = {name: refweb.Scene.load(name) for name in shipped()}
+    scenes |= {f"square-impact, {method}": scenes["square-impact"].replace(solve=_by(method)) for method in METHODS}
+    for name, scene in scenes.items():
+        if scene.solve.kind == "dynamic":
+            longest = max([ROWS * (scene.output.interval or 1e-3), *(one.average or 0.0 for one in scene.observe)])
+            scene = scene.replace(solve=_for(scene.solve, longest))
+            _foresee(scene)
+        cost = refweb.run(scene).cost
+        print(f"{name}: {cost['compile_s']:.1f} s of compiling")
+
+
+def _foresee(scene):
+    """What the box before a run says of its steps, where it says it."""
+    from ..dynamics.expected_cost import expected_cost
+    from ..errors import InputError
+    from ..registry import INTEGRATORS
+
+    if INTEGRATORS[scene.solve.method].knob == "safety":
+        with contextlib.suppress(InputError):
+            expected_cost(scene, scene.build())
+
+
+def _by(method):
+    from ..settings import Dynamic
+
+    return Dynamic(duration=1.0, method=method)
+
+
+def _for(solve, duration):
+    from dataclasses import replace
+
+    return replace(solve, duration=duration)
+
+
+def _ship():
+    """Keep machine code in the package, made for the processors that wheels are for; before numba is imported."""
+    from ..compiled.store import SHIPPED, portable
+    from ..errors import InputError
+
+    processor = portable()
+    if processor is None:
+        raise InputError("--ship: no processor is known that machine code in a wheel would be made for here")
+    os.environ["REFWEB_CACHE"] = str(SHIPPED)
+    os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = processor

@@ -1,0 +1,33 @@
+"""Build a wheel that brings machine code, ``python -m refweb.compiled.wheel FOLDER``, behind ``refweb warm --ship``.
+
+It is run in a clone, with `build` and `wheel` installed. Machine code is that of one minor version of Python and one
+platform, so the wheel is named after these; where another numba is installed, refweb compiles as without it.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import subprocess
+import sys
+import sysconfig
+
+from .store import SHIPPED
+
+
+def main(folder):
+    """Build into a folder; the exit status."""
+    if not any(SHIPPED.glob("*")):
+        print(f"no machine code in {SHIPPED}: run `python -m refweb warm --ship` first", file=sys.stderr)
+        return 2
+    version = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    tag = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+    tag = tag.replace("linux_", "manylinux_2_17_") if tag.startswith("linux_") else tag
+    subprocess.run([sys.executable, "-m", "build", "--wheel", "--outdir", folder], check=True)
+    built = sorted(pathlib.Path(folder).glob("refweb-*-py3-none-any.whl"))[-1]
+    named = "--remove", "--python-tag", version, "--abi-tag", version, "--platform-tag", tag
+    subprocess.run([sys.executable, "-m", "wheel", "tags", *named, str(built)], check=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else "dist"))

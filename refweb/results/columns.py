@@ -1,0 +1,43 @@
+"""Columns of ``history.csv`` beside the observables: which there are, by what acts on a system.
+
+Statics and dynamics write these, and no observable, event, body or group may have the name of one.
+"""
+
+from __future__ import annotations
+
+AXES = "xyz"
+VECTORS = ("momentum", "support_impulse", "outer_impulse")
+"""Vectors in the book of momentum of a dynamic run, the last where something acts from outside."""
+FIRST = {"static": "step [1]", "dynamic": "time [s]"}
+"""First column, by what is solved."""
+
+
+def static_energies(system):
+    """Names of the energies of an equilibrium: work is left out where other loads than dead ones act."""
+    stored = dict.fromkeys(family.book for family in system.families if family.energy is not None)
+    works = [family for family in system.families if family.book == "work"]
+    known = works and all(family.energy is not None for family in works)
+    return [*(book for book in stored if book != "work"), "total_energy", *(["work"] if known else [])]
+
+
+def dynamic_energies(system):
+    """Names of the energies of a motion."""
+    books = dict.fromkeys(family.book for family in system.families)
+    works = "work" in books or system.drives or system.line_drives
+    return ["kinetic_energy", *(book for book in books if book != "work"), *(["work"] if works else []), "total_energy"]
+
+
+def vectors(system):
+    """Names of the vectors in the book of momentum."""
+    return VECTORS[: len(VECTORS) - all(family.internal for family in system.families)]
+
+
+def components(names):
+    """Names of the components of vectors."""
+    return [f"{name}_{axis}" for name in names for axis in AXES]
+
+
+def taken(system):
+    """Names that columns of a static or a dynamic run of a system have."""
+    first = [column.rsplit(" [", 1)[0] for column in FIRST.values()]
+    return [*first, *static_energies(system), *dynamic_energies(system), *components(VECTORS)]

@@ -1,0 +1,340 @@
+"""Whether an equilibrium is stable: whether a small disturbance of it grows by itself.
+
+With K = −∂f/∂x, C = −∂f/∂v and the mass M, disturbances are those of
+
+    M u'' + C u' + K u = 0,        u = φ exp(s t),        (s² M + s C + K) φ = 0,
+
+and the equilibrium is left by itself where some s has a positive real part.
+
+Where K is symmetric and no frame turns, that is where K has a negative eigenvalue, whatever M and losses are: the signs
+of the pivots of LDLᵀ say so. Follower loads and wind have no potential, and their K is not symmetric:
+
+- divergence: a real negative eigenvalue of K φ = λ M φ. There is one wherever the determinant of K is negative, and
+  none where the symmetric part S = (K + Kᵀ)/2 is positive definite (Bendixson).
+- flutter: a pair of complex λ, of which one square root has a positive real part. C may hold it [1]_.
+
+In a frame that turns Coriolis forces may hold what K does not, as long as nothing damps motion in the frame.
+
+Of up to `DENSE` unknowns all s are found. Of more, the slowest are, by Arnoldi iteration on K⁻¹, whose start
+has a fixed seed; of the others it is said that they are not asked. But with S positive definite and A = (K − Kᵀ)/2
+nothing grows where C is symmetric and
+
+    C > α M,        α = ‖S^(−1/2) A M^(−1/2)‖,
+
+as both roots of s² + c s + k + i a lie to the left where c > 0 and c² k > a². Wind does that where it is slower than
+waves across the lines.
+
+Unknowns without mass follow the others; forces that depend on their velocity are left out. Where nothing has mass, all
+have the same and flutter is not asked: whether the number of ways in which a web diverges is odd depends on no mass.
+Eigenvalues have errors from rounding, by their condition numbers: what is within these counts as none. Lines between
+slack and taut count as taut; where slack ones would not hold the web, nothing is decided.
+
+References
+----------
+.. [1] V. V. Bolotin, "Nonconservative Problems of the Theory of Elastic Stability", Pergamon 1963, chapter 1.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from functools import cached_property
+
+import numpy as np
+
+from ..net.net import AXIAL_STIFFNESS, LENGTH
+from ..net.tension_laws import LINEAR, TENSION_ONLY
+from ..system.factorization import Factor, Lu, negative_pivots
+from .equilibrium import Stability
+
+TINY = 1e-12
+"""Tension of all lines over EA by which the smallest pivot is moved, that of a direction without stiffness."""
+HELD = 1e-10
+"""Stiffness over the largest EA/L that holds what nothing supports."""
+DENSE = 100
+"""Unknowns up to which all s are found."""
+KINK = 1e-12
+"""Strain within which a line that only pulls is between slack and taut."""
+ROUNDING = 64.0 * np.finfo(float).eps
+"""Error of a matrix over its norm."""
+PIVOT, EIGENVALUE = "a pivot of its tangent is negative", "an eigenvalue of its tangent is negative"
+"""Why."""
+NO_RATE = 1e-9
+"""Rate of growth over that of the slowest vibration that counts as none."""
+OPEN = 1e3
+"""λ of the slowest vibration over `TINY` of the fastest, up to which it may have no stiffness."""
+
+
+def ask(system, rest, state, solver=None):
+    """Write to an equilibrium whether it is stable, and whether there may be others.
+
+    Parameters
+    ----------
+    system, rest : refweb.system.system.System
+        With all that acts, and as statics sees it, see `refweb.system.at_rest`.
+    state : Equilibrium
+        Where it is; the sign of its smallest pivot, where that is in its stats, is not asked for again.
+    solver : refweb.system.factorization.Lu, optional
+        Of a tangent that is not symmetric.
+    """
+    sign = state.stats.get("smallest_pivot")
+    if sign is None or (sign == -1 and rest.rotating):
+        state.stability = Question(system, rest, state).answer(solver)
+    else:
+        state.stability = by_pivot(sign)
+    _ask_of_kinks(system, rest, state)
+    state.stats["smallest_pivot"] = state.stability.sign
+    if (rest.net.laws == LINEAR).any():
+        from .other_side import may_turn_over
+
+        state.may_turn_over = may_turn_over(rest, state)
+
+
+def _ask_of_kinks(system, rest, state):
+    """Leave open what lines between slack and taut hold: the tangent takes them as taut, and slack ones may not."""
+    rest = rest.at(state.step)
+    net, numbers = rest.net, rest.net.line_data.copy()
+    strain = np.linalg.norm(net.bar_vectors(state.x), axis=1) / net.bar_lengths - 1.0
+    kinked = (net.laws == TENSION_ONLY) & (abs(strain).reshape(len(net.laws), -1).min(axis=1) <= KINK)
+    if state.stability.sign not in (0, 1) or not kinked.any():
+        return
+    numbers[kinked, LENGTH] *= 1.0 + 4.0 * KINK
+    if Question(system, rest.with_line_data(numbers), state).answer().sign == -1:
+        why = f"{np.count_nonzero(kinked)} elements are between slack and taut, and slack they would not hold it"
+        state.stability = Stability(None, why, loose=True)
+
+
+def by_pivot(sign):
+    """The `Stability` that the sign of the smallest pivot of a symmetric tangent says."""
+    return Stability(sign, PIVOT if sign == -1 else "", loose=sign < 1)
+
+
+class Question:
+    """Whether an equilibrium is stable; K is assembled where nothing else says it.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With all that acts, also what depends on velocity alone.
+    rest : refweb.system.system.System
+        As statics sees it, see `refweb.system.at_rest`.
+    state : refweb.statics.equilibrium.Equilibrium
+        Where it is.
+    """
+
+    def __init__(self, system, rest, state):
+        self.system, self.rest, self.state, self.t, self.x = system, rest, state, state.step, state.x
+        self._drifting, self._factor = 0, Factor(rest.pattern)
+        if rest.rotating:
+            from .critical_speed import drifting
+
+            self._drifting = drifting(rest)
+
+    def answer(self, solver=None):
+        """The `refweb.statics.equilibrium.Stability`.
+
+        ``solver`` is the `refweb.system.factorization.Lu` of K, where there is one.
+        """
+        if not len(self.rest.free):
+            return Stability(1)
+        if not (self.rest.symmetric or self._symmetric):
+            return self._unsymmetric(solver)
+        if self.definite == -1 and self.rest.rotating:
+            return self._in_frame(PIVOT)._replace(loose=True)
+        return by_pivot(self.definite)
+
+    @cached_property
+    def _parts(self):
+        """Values of K, of S and of A in the pattern."""
+        values = self.rest.stiffness(self.t, self.x)
+        across = self.rest.pattern.matrix(values).T.tocsc().data  # of a pattern that is symmetric
+        return values, 0.5 * (values + across), 0.5 * (values - across)
+
+    @property
+    def _symmetric(self):
+        """Whether K is symmetric but for rounding."""
+        values, _, skew = self._parts
+        return abs(skew).max(initial=0.0) <= ROUNDING * abs(values).max(initial=0.0)
+
+    @cached_property
+    def _ridge(self):
+        """Values of what stiffness counts as none."""
+        rest, net = self.rest, self.rest.at(self.t).net
+        axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+        ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
+        for part in rest.unsupported_parts:  # which no pivot is to be 0 for
+            ridge[rest.pattern.diagonal[part.unknowns]] += HELD * axial.max()
+        return ridge
+
+    @cached_property
+    def definite(self):
+        """Sign of the smallest pivot of S: −1, 0 where it is 0 to rounding, 1."""
+        for shift, sign in ((-1.0, 1), (1.0, 0)):
+            self._factor.update(self._parts[1] + shift * self._ridge)
+            if self._factor.negative_pivots() <= self._drifting:
+                return sign
+        return -1
+
+    # Matrices of the unknowns with mass
+
+    def _massive(self):
+        """Which unknowns have mass, shape (n,)."""
+        return self.rest.mass.values[self.rest.pattern.diagonal] > 0.0
+
+    def _velocity(self):
+        """C of the unknowns, a sparse matrix; None where no force depends on velocity."""
+        values = self.system.damping(self.t, self.x, np.zeros_like(self.x))
+        if values is None or not values.any():
+            return None
+        of = np.searchsorted(self.system.free, self.rest.free)
+        return self.system.pattern.matrix(values)[of][:, of].tocsc()
+
+    def _reduced(self):
+        """K and C of the unknowns with mass, over the roots of that, dense; and whether those without are held."""
+        import scipy.linalg
+
+        heavy, K, C = self._massive(), self.rest.pattern.matrix(self._parts[0]).toarray(), self._velocity()
+        if not heavy.any():
+            return K, None, False
+        inner = K[~heavy][:, ~heavy]
+        own, stands = K[heavy][:, heavy], True
+        if inner.size:
+            try:
+                own = own - K[heavy][:, ~heavy] @ np.linalg.solve(inner, K[~heavy][:, heavy])
+                stands = not _negative(*_eigenvalues(inner)).any()
+            except np.linalg.LinAlgError:
+                stands = False
+        M = self.rest.pattern.matrix(self.rest.mass.values)[heavy][:, heavy].toarray()
+        root = scipy.linalg.cholesky(M, lower=True)
+
+        def scaled(matrix):
+            half = scipy.linalg.solve_triangular(root, matrix, lower=True)
+            return scipy.linalg.solve_triangular(root, half.T, lower=True).T
+
+        return scaled(own), None if C is None else scaled(C.toarray()[heavy][:, heavy]), stands
+
+    # Answers
+
+    def _in_frame(self, what):
+        """Of a K that does not hold the web in a frame that turns."""
+        if len(self.rest.free) > DENSE:
+            slow = self._slowest(self._lu, self._velocity())
+            grows = slow is not None and slow.grows.any()
+            return Stability(-1, what if grows else f"{what}; whether Coriolis forces hold the web is not decided")
+        K, C, _ = self._reduced()
+        growth = _growth(K, C)
+        return Stability(-1, what) if growth > 0.0 else Stability(-1, what, held=True)
+
+    def _unsymmetric(self, solver):
+        """Of a K that is not symmetric."""
+        if len(self.rest.free) > DENSE:
+            return self._of_many(solver)
+        K, C, stands = self._reduced()
+        found, off = _eigenvalues(K)
+        loose = not (stands and (abs(found) > off).all())
+        negative = 0 if self.definite >= 0 else int(_negative(found, off).sum())
+        if negative > self._drifting:
+            turned = bool(self.rest.rotating) and C is not None and not negative % 2
+            return (self._in_frame(EIGENVALUE) if turned else Stability(-1, EIGENVALUE))._replace(loose=loose)
+        if self.definite < 0 and not stands:
+            return Stability(None, "nodes without mass may not be held by their lines", loose=True)
+        if self._massive().any() and (growth := _growth(K, C)) > 0.0:
+            return Stability(-1, _flutter(growth), loose=loose)
+        return Stability(0 if loose else 1, loose=loose)
+
+    def _of_many(self, solver):
+        """The same of more unknowns than have all their s found."""
+        M, C = self.rest.pattern.matrix(self.rest.mass.values), self._velocity()
+        if not self._massive().any() and self.definite >= 0:
+            return by_pivot(self.definite)
+        if C is not None and self.definite == 1 and self._damps(C, M):
+            return Stability(1)
+        solver = solver or self._lu
+        slow = self._slowest(solver, C)
+        if slow is None:
+            return Stability(None, "its slowest vibrations are not found", loose=True)
+        loose = not self._massive().all() or abs(slow.s).min() ** 2 <= OPEN * TINY * self._fastest(M)
+        turns = abs(slow.s.imag) > NO_RATE * abs(slow.s)
+        if (slow.grows & ~turns).any():
+            return Stability(-1, EIGENVALUE, loose=loose)
+        if slow.grows.any() and self._massive().any():
+            return Stability(-1, _flutter(slow.s.real[slow.grows].max()), loose=loose)
+        if solver.sign_of_determinant() < 0 and self.definite < 0:
+            return Stability(-1, EIGENVALUE, loose=loose)
+        if not slow.more and self.definite == 1:
+            return Stability(1)
+        text = f"the {len(slow.s)} slowest of its vibrations do not grow, the others are too many to be asked"
+        return Stability(None, text, loose=loose)
+
+    @property
+    def _lu(self):
+        """LU of K, but for what stiffness counts as none."""
+        solver = Lu(self.rest.pattern)
+        solver.update(self._parts[0] + self._ridge)
+        return solver
+
+    def _slowest(self, solver, C):
+        """The `refweb.statics.slowest_vibrations.Slowest`; None where they are not found."""
+        from scipy.sparse import eye_array
+        from scipy.sparse.linalg import ArpackError
+
+        from .slowest_vibrations import slowest
+
+        if solver.singular:
+            return None
+        with contextlib.suppress(ArpackError):
+            if self._massive().any():
+                return slowest(solver, self.rest.pattern.matrix(self.rest.mass.values), C)
+            return slowest(solver, eye_array(len(self.rest.free), format="csr"))
+        return None
+
+    def _fastest(self, M):
+        """A bound on all |λ|, where everything has mass [1/s²]."""
+        return (abs(self.rest.pattern.matrix(self._parts[0])).sum(axis=1) / M.diagonal()).max()
+
+    def _damps(self, C, M):
+        """Whether C is symmetric and above α M, so that nothing grows; of lumped mass, which nothing lacks."""
+        if C is None or abs(C - C.T).max() > ROUNDING * abs(C).max():
+            return False
+        if not self._massive().all() or self.rest.net.consistent_minus_lumped is not None:
+            return False
+        from scipy.sparse import triu
+
+        from .slowest_vibrations import coupling
+
+        alpha = coupling(self._factor.precondition, self.rest.pattern.matrix(self._parts[2]), M)
+        return negative_pivots(triu(C - alpha * M, format="csc"), self.rest.library) == 0
+
+
+def _flutter(growth):
+    """What a vibration that grows is called."""
+    return f"flutter: a vibration grows, by {growth:.2g} 1/s"
+
+
+def _eigenvalues(A):
+    """Eigenvalues of a matrix, and what rounding may make of each, to first order."""
+    import scipy.linalg
+
+    found, before, behind = scipy.linalg.eig(A, left=True, right=True)
+    overlap = abs((before.conj() * behind).sum(axis=0))  # of unit vectors: 1 over the condition number
+    least = np.finfo(float).eps
+    return found, ROUNDING * np.linalg.norm(A) / np.maximum(overlap, least)
+
+
+def _negative(found, off):
+    """Which eigenvalues are real and negative."""
+    return (found.real < -off) & (abs(found.imag) <= off)
+
+
+def _growth(K, C):
+    """Largest real part of s [1/s], of unit masses; 0 where none is positive beyond rounding."""
+    found, off = _eigenvalues(K)
+    if C is None:
+        complex_ = abs(found.imag) > off
+        grows = complex_ | (found.real < -off)
+        return float(abs(np.sqrt(-found[grows] + 0j).real).max(initial=0.0))
+    scale = np.sqrt(np.linalg.norm(K)) + np.linalg.norm(C)
+    if scale == 0.0:
+        return 0.0
+    size = len(K)
+    found, off = _eigenvalues(np.block([[np.zeros_like(K), np.eye(size)], [-K / scale**2, -C / scale]]))
+    return scale * float(found.real[found.real > off].max(initial=0.0))
