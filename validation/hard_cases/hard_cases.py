@@ -28,6 +28,7 @@ valid, changed and garbled, and 200 kills of a running process, each of which le
 the same bytes. What such trials find has a test of its own, among them:
 
 - chains that hang slack under 1e-10 of EA, which no damped Newton step leads out of: softer nets do;
+- forces of contact that are what is left of all forces: drag, frames and lines that a body holds are none;
 - dynamic relaxation that comes to rest after every other step and hardly moves, where its steps are near the bound;
 - web files with entities, that refer to other files, or whose numbers are none; names of bodies that lead out of the
   folder; checkpoints with pickles in them; scenes that need more memory than there is.
@@ -482,6 +483,34 @@ def struck():
     return Row("momentum that a ball of 7 km/s loses", given[0], given[1], "CVODE", 1e-2, why, "N s")
 
 
+def untouched():
+    """Contact on a ball that nothing touches, while all else acts on it: its largest force, and touches that are told.
+
+    With it the time at which two balls meet far from the web, which is no touch of that.
+    """
+    far, force, told = ball((0.0, 0.0, 5.0), (0.0, 1.0, -1.0)), 0.0, 0
+    fluid = refweb.Drag(density=10.0, bodies={"ball": {"coefficient": 0.5, "area": 0.03}})
+    gravity, turning = refweb.Gravity(acceleration=(0.0, 0.0, -9.81)), refweb.Frame(angular_velocity=(0.3, 0.0, 1.0))
+    observe = [refweb.Observe(name="force", quantity="reaction", body="ball", reduce="max")]
+    for effects in ((fluid, gravity), (turning,), (refweb.Orbit(mean_motion=1.0),)):
+        for method in ("central-difference", "cvode", "ida"):
+            event = [refweb.Event(name="touch", kind="contact")]
+            scene = scene_of(hit(far, *effects, duration=0.1), method).replace(observe=observe, event=event)
+            solution = refweb.run(scene)
+            force, told = max(force, solution.results["force"].value), told + (solution.events[0]["time"] is not None)
+    pair = ball((0.0, 0.0, 5.0), (0.0, 0.0, 0.0)), ball((0.0, 0.0, 5.3), (0.0, 0.0, -2.0), name="other")
+    scene = scene_of(hit(*pair, duration=0.1, contact={"between_bodies": True}), "cvode")
+    events = [refweb.Event(name="web", kind="contact", body="ball")]
+    events.append(refweb.Event(name="meet", kind="contact", body="ball", with_="other"))
+    web, meet = (event["time"] for event in refweb.run(scene.replace(event=events)).events)
+    told += web is not None
+    return [
+        Row("contact force where nothing touches", force, 0.0, "nothing touches", 0.0, "none", "N", scale=1.0),
+        Row("touches that are none", float(told), 0.0, "distances", 0.0, "none", scale=1.0),
+        Row("time at which two balls meet", meet, 0.05, "(0.3 − 0.2) m / 2 m/s", 1e-9, "straight ways", "s"),
+    ]
+
+
 def ends():
     """How far two nodes go that are pulled apart between slack tethers: until one of these is straight."""
     observe = [refweb.Observe(name="x", quantity="position", node=1, component="x")]
@@ -648,7 +677,7 @@ def case(quick):
     rows += more
     tables.append(Table("Dynamics: energy, momentum or angular momentum left", ["case", *DYNAMIC], cells))
     tables.append(Table("Dynamics: reasons of refusals", ["number", "reason"], reasons))
-    rows += [struck(), peaks(), overlaps(), bad_surface(), *at_rest(1e4 if quick else 1e5)]
+    rows += [struck(), peaks(), overlaps(), *untouched(), bad_surface(), *at_rest(1e4 if quick else 1e5)]
     for method in ("central-difference",) if quick else ("central-difference", "cvode", "ida"):
         exact = method == "central-difference"
         within = (0.0, "bit for bit") if exact else (1e-3, "rtol 1e-6, and what slackness adds")
