@@ -267,6 +267,8 @@ class Solution(SolutionData):
             out.row(row)
         for number, state in self.frames:
             out.frame(number, state)
+        if self.twin_end is not None:
+            out.keep_twin(self.twin_end)
         out.close()
         out.summary(self.summary())
 

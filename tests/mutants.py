@@ -133,6 +133,7 @@ MIRRORS = {
     "commands": "commands/test_cli.py commands/test_values.py",
     "__main__": "commands/test_cli.py",
     "scene": "test_scene.py",
+    "solution": "dynamics/test_starts.py",
 }
 """Test files of a file or a folder, that with the longest name that fits; ``{}`` is the name of the file."""
 
@@ -473,6 +474,7 @@ MUTANTS = [
     Mutant("pages/page", "if not len(next(iter(history.values()), [])):", "if history is None:"),
     Mutant("pages/markup", "zip(columns, cells, strict=True)", "zip(columns[::-1], cells, strict=True)"),
     Mutant("pictures/paraview", '"vector": points.get(look.field, 1) > 1', '"vector": look.field in points'),
+    Mutant("solution", "out.keep_twin(self.twin_end)", "pass"),
     Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
     Mutant("reference/schema", "without=every - set(own)", "without=()"),
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),

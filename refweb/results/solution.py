@@ -129,6 +129,9 @@ class SolutionData:
     breaks : list of dict, optional
         Of each element that has broken, in the order in which they did, its ``line``, ``element``, ``time`` [s] and the
         ``error`` of that, the ``place`` of its middle [m] and the ``energy`` [J] that it held; None where nothing may.
+    twin_end : (ndarray, ndarray), optional
+        Displacement [m] and velocity [m/s] at which the twin run ended, each of shape (rows, 3); None where there was
+        none.
     frames : list of (int, refweb.results.state.State)
         Row numbers and states of a run that writes no folder. One that does keeps none: its frames are files, which
         are read when they are looked at.
@@ -150,6 +153,7 @@ class SolutionData:
     events: list = field(default_factory=list)
     throw: dict = field(default_factory=dict)
     breaks: list | None = None
+    twin_end: tuple | None = None
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
     horizon: dict = field(default_factory=dict)
