@@ -300,6 +300,7 @@ def load(folder) -> Solution:
             setattr(found, key, summary[key])
         found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
         found.pairs, found.lines, found.passage = (summary.get(key, {}) for key in ("pairs", "lines", "passage"))
+        found.broken_before = summary.get("broken_before", [])
         found.breaks, found.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             found.utilisation = used["value"], used["line"]

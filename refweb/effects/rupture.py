@@ -24,8 +24,8 @@ HELD = "rupture_energy"
 
 
 @functools.cache
-def kernels(held):
-    """Force and energy kernels; what elements held is in the column ``held`` of the numbers of the lines."""
+def kernels(column):
+    """Force and energy kernels; what elements held is in a ``column`` of the numbers of the lines."""
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -37,7 +37,7 @@ def kernels(held):
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
         for c in range(cells.shape[0]):
-            out[c] = data[c, held]
+            out[c] = data[c, column]
 
     return force, energy
 
@@ -75,8 +75,8 @@ class Rupture(Table):
         Nominal stress T/A at which a line breaks [Pa], damping included; by default the strength of ``[cable]`` and its
         groups. Lines without either do not break by stress.
     at : sequence of (line, t), optional
-        Lines that break at a time [s] whatever their stress, in the middle, or in the element behind it; in statics t
-        is the load step.
+        Lines that break at a time [s] whatever their stress, in the middle, or in the element behind it; those that
+        are broken by then stay as they are. In statics t is the load step.
     groups : dict of str to GroupRupture
         Strengths that differ by group of lines; groups that share lines give it once.
 
@@ -135,26 +135,37 @@ class Rupture(Table):
             raise InputError(
                 "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"
             )
-        middles = [(time, int(line) * net.subdivide + net.subdivide // 2) for line, time in self._due]
+        elements = net.middle_of([line for line, _ in self._due])
+        middles = [(time, int(element)) for (_, time), element in zip(self._due, elements, strict=True)]
         weakness = Weakness(limits, tuple(sorted(middles)))
         if net.quasi_static:
             return weakness
-        if net.consistent_minus_lumped is not None:
-            raise InputError(
-                'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
-                '"lumped"'
-            )
-        force, energy = kernels(net.column(HELD))
-        family = Family(
-            name="rupture",
-            cells=net.cells,
-            data=net.line_data,
-            force=force,
-            energy=energy,
-            book="rupture_energy",
-            observed=2,
-            lines=True,
-            internal=True,
-            at_rest=False,
+        return [held(net), weakness]
+
+
+def held(net):
+    """The `Family` of what broken elements held, and of their tension and strain, which are 0.
+
+    Raises
+    ------
+    InputError
+        For a consistent mass.
+    """
+    if net.consistent_minus_lumped is not None:
+        raise InputError(
+            'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
+            '"lumped"'
         )
-        return [family, weakness]
+    force, energy = kernels(net.column(HELD))
+    return Family(
+        name="rupture",
+        cells=net.cells,
+        data=net.line_data,
+        force=force,
+        energy=energy,
+        book="rupture_energy",
+        observed=2,
+        lines=True,
+        internal=True,
+        at_rest=False,
+    )

@@ -129,6 +129,8 @@ class SolutionData:
     breaks : list of dict, optional
         Of each element that has broken, in the order in which they did, its ``line``, ``element``, ``time`` [s] and the
         ``error`` of that, the ``place`` of its middle [m] and the ``energy`` [J] that it held; None where nothing may.
+    broken_before : list of int
+        Lines that were broken before the run began.
     twin_end : (ndarray, ndarray), optional
         Displacement [m] and velocity [m/s] at which the twin run ended, each of shape (rows, 3); None where there was
         none.
@@ -153,6 +155,7 @@ class SolutionData:
     events: list = field(default_factory=list)
     throw: dict = field(default_factory=dict)
     breaks: list | None = None
+    broken_before: list = field(default_factory=list)
     twin_end: tuple | None = None
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
@@ -196,6 +199,7 @@ class SolutionData:
             "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
             "events": self.events,
             **({} if self.breaks is None else {"breaks": self.breaks}),
+            **({"broken_before": self.broken_before} if self.broken_before else {}),
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,

@@ -72,8 +72,7 @@ class State:
         from ..effects.elasticity import strains
 
         strain = strains(self.system.at(self.time).net, self.x).max(axis=1)
-        if self.system.weakness is not None:
-            strain[self.system.net.broken] = 0.0
+        strain[self.system.net.broken] = 0.0
         return strain
 
     @cached_property
