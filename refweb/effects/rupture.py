@@ -7,39 +7,15 @@ every break. `refweb.dynamics.integrators.rupture` finds the moments.
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InputError
-from ..kernels import ENERGY, FORCE, kernel
 from ..net.groups import givers
-from ..net.net import AXIAL_STIFFNESS
 from ..tables import Several, Table, by_group, real, rows, table
-from .base import STRAIN, TENSION, Family, Weakness
-
-HELD = "rupture_energy"
-"""Column of the numbers of the lines with what a broken element held [J]."""
-
-
-@functools.cache
-def kernels(column):
-    """Force and energy kernels; what elements held is in a ``column`` of the numbers of the lines."""
-
-    @kernel(FORCE)
-    def force(t, x, v, f, cells, data, out):
-        for c in range(cells.shape[0]):
-            if data[c, AXIAL_STIFFNESS] == 0.0:
-                out[c, TENSION] = 0.0
-                out[c, STRAIN] = 0.0
-
-    @kernel(ENERGY)
-    def energy(t, x, cells, data, out):
-        for c in range(cells.shape[0]):
-            out[c] = data[c, column]
-
-    return force, energy
+from .base import Weakness
+from .broken import HELD, held
 
 
 @table
@@ -141,31 +117,3 @@ class Rupture(Table):
         if net.quasi_static:
             return weakness
         return [held(net), weakness]
-
-
-def held(net):
-    """The `Family` of what broken elements held, and of their tension and strain, which are 0.
-
-    Raises
-    ------
-    InputError
-        For a consistent mass.
-    """
-    if net.consistent_minus_lumped is not None:
-        raise InputError(
-            'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
-            '"lumped"'
-        )
-    force, energy = kernels(net.column(HELD))
-    return Family(
-        name="rupture",
-        cells=net.cells,
-        data=net.line_data,
-        force=force,
-        energy=energy,
-        book="rupture_energy",
-        observed=2,
-        lines=True,
-        internal=True,
-        at_rest=False,
-    )

@@ -77,7 +77,7 @@ def _breakable(system):
     if system.weakness is not None:
         return system
     from ..effects.base import Weakness
-    from ..effects.rupture import HELD, held
+    from ..effects.broken import HELD, held
 
     other = copy.copy(system)
     other.net = net = system.net.with_column(HELD, 0.0)
