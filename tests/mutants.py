@@ -478,6 +478,11 @@ MUTANTS = [
     Mutant("pages/markup", "zip(columns, cells, strict=True)", "zip(columns[::-1], cells, strict=True)"),
     Mutant("pictures/paraview", '"vector": points.get(look.field, 1) > 1', '"vector": look.field in points'),
     Mutant("net/mesh_file", "np.flatnonzero(broken[of])", "np.zeros(0, dtype=np.int64)"),
+    Mutant(
+        "system/system",
+        "per_cell = self.per_cell() if",
+        "per_cell = self.__dict__.setdefault('one', self.per_cell()) if",
+    ),
     Mutant("system/torn", "other.families.append(held(net))", "pass"),
     Mutant("dynamics/integrators/rupture", "line[element] not in gone", "True"),
     Mutant("solution", "out.keep_twin(self.twin_end)", "pass"),

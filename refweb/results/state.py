@@ -31,8 +31,8 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, 0].copy() for i, f in enumerate(self.system.families) if f.contact}
-        return force, per_cell.tension.copy(), contact
+        contact = {i: per_cell[i][:, 0] for i, f in enumerate(self.system.families) if f.contact}
+        return force, per_cell.tension, contact
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""

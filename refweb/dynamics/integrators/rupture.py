@@ -152,12 +152,8 @@ class Rupturing:
         return watched and course.events[-1]["time"] < np.inf and not ended_by(course.events[:-1])
 
     def _shares(self, course):
-        """Tension of each element over its limit.
-
-        In arrays of its own: those of the system may be written by another thread, where a twin runs beside.
-        """
-        system, shown = self.inner.system, self.inner.system.per_cell()
-        system.force_to(shown, course.time, course.x, course.v)
+        """Tension of each element over its limit."""
+        shown = self.inner.system.forces(course.time, course.x, course.v).per_cell
         return shown.tension / self._weakness.limits
 
     def _kept(self, course):
