@@ -18,9 +18,7 @@ from .net import discretisation
 from .net.web import Web
 from .registry import EFFECTS, INTEGRATORS, load, name_of
 from .settings import START_STATES
-from .system.at_rest import refuse_broken
 from .system.system import System
-from .system.torn import with_broken_lines
 
 MAX_WINDOWS = 1e4
 """Largest number of windows, of observables that are averaged, that a run is long."""
@@ -71,6 +69,9 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
     if len(net.web.broken):
+        from .system.at_rest import refuse_broken
+        from .system.torn import with_broken_lines
+
         with refused_at("[web]"):
             system = with_broken_lines(system)
             if net.quasi_static or solve.start == "equilibrium":

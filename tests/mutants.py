@@ -484,7 +484,9 @@ MUTANTS = [
         "per_cell = self.__dict__.setdefault('one', self.per_cell()) if",
     ),
     Mutant("system/torn", "other.families.append(held(net))", "pass"),
-    Mutant("dynamics/integrators/rupture", "line[element] not in gone", "True"),
+    Mutant(
+        "dynamics/integrators/rupture", "_holding(self.inner.system.net.broken)", "_holding(course.breaks.elements)"
+    ),
     Mutant("solution", "out.keep_twin(self.twin_end)", "pass"),
     Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
     Mutant("reference/schema", "without=every - set(own)", "without=()"),
