@@ -69,6 +69,14 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     net = replace(net, end=float(max(solve.load_steps) if net.quasi_static else solve.duration))
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
+    if len(net.web.broken):
+        from .system.at_rest import refuse_broken
+        from .system.torn import with_broken_lines
+
+        with refused_at("[web]"):
+            system = with_broken_lines(system)
+            if net.quasi_static or solve.start == "equilibrium":
+                refuse_broken(system.net)
     _check_bare(system)
     _check_carried(system, supported, solve)
     _check_motions(system)

@@ -267,6 +267,8 @@ class Solution(SolutionData):
             out.row(row)
         for number, state in self.frames:
             out.frame(number, state)
+        if self.twin_end is not None:
+            out.keep_twin(self.twin_end)
         out.close()
         out.summary(self.summary())
 
@@ -298,6 +300,7 @@ def load(folder) -> Solution:
             setattr(found, key, summary[key])
         found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
         found.pairs, found.lines, found.passage = (summary.get(key, {}) for key in ("pairs", "lines", "passage"))
+        found.broken_before = summary.get("broken_before", [])
         found.breaks, found.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             found.utilisation = used["value"], used["line"]

@@ -65,6 +65,9 @@ MIRRORS = {
     "effects/contact/pair": "effects/test_tumbling.py test_contract.py",
     "effects/contact/penalty": "results/test_contact_force.py test_contract.py",
     "effects/contact": "test_contract.py effects/test_contact.py effects/test_overlap.py effects/test_deep_contact.py",
+    "dynamics/integrators/rupture": "effects/test_rupture.py",
+    "net/mesh_file": "effects/test_rupture.py",
+    "system/torn": "effects/test_rupture.py",
     "effects/base": "test_contract.py dynamics/integrators/test_ida.py",
     "effects/elasticity": "net/test_elements.py test_contract.py",
     "effects/temperature": "effects/test_temperature.py",
@@ -141,6 +144,7 @@ MIRRORS = {
     "commands": "commands/test_cli.py commands/test_values.py",
     "__main__": "commands/test_cli.py",
     "scene": "test_scene.py",
+    "solution": "dynamics/test_starts.py",
 }
 """Test files of a file or a folder, that with the longest name that fits; ``{}`` is the name of the file."""
 
@@ -504,6 +508,17 @@ MUTANTS = [
     Mutant("pages/page", "if not len(next(iter(history.values()), [])):", "if history is None:"),
     Mutant("pages/markup", "zip(columns, cells, strict=True)", "zip(columns[::-1], cells, strict=True)"),
     Mutant("pictures/paraview", '"vector": points.get(look.field, 1) > 1', '"vector": look.field in points'),
+    Mutant("net/mesh_file", "np.flatnonzero(broken[of])", "np.zeros(0, dtype=np.int64)"),
+    Mutant(
+        "system/system",
+        "per_cell = self.per_cell() if",
+        "per_cell = self.__dict__.setdefault('one', self.per_cell()) if",
+    ),
+    Mutant("system/torn", "other.families.append(held(net))", "pass"),
+    Mutant(
+        "dynamics/integrators/rupture", "_holding(self.inner.system.net.broken)", "_holding(course.breaks.elements)"
+    ),
+    Mutant("solution", "out.keep_twin(self.twin_end)", "pass"),
     Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
     Mutant("reference/schema", "without=every - set(own)", "without=()"),
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),

@@ -116,8 +116,9 @@ def run_within_drift(simulation, folder, tell):
         named = {o.name: o for o in scene.observables}
         bounded = {name: named[name].bounded(one, simulation.system) for name, one in solution.reduced.items()}
         solution.reduced = bounded
+        solution.twin_end = ended.course.x, ended.course.v
         if folder is not None:
-            folder.keep(twin_displacements=ended.course.x, twin_velocities=ended.course.v)
+            folder.keep_twin(solution.twin_end)
     elif twin:
         solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
     if scene.throw is not None:

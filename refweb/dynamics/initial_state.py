@@ -152,8 +152,6 @@ def stored(system, folder):
     if "lines" in given and not np.array_equal(given["lines"], net.web.lines):
         raise InputError(f"{name} holds other lines between its nodes than this scene: it must be the same web")
     broken = given.get("broken", np.zeros(0, dtype=np.int64))
-    if len(broken) and system.weakness is None:
-        raise InputError(f"{name} line {net.line[broken[0]]} is broken there: this scene needs a [rupture]")
     bearings = _bearings(system, given, bodies, name)
     start = _start_at(system, positions, displacements, velocities, bodies, bearings)
     start = start._replace(broken=broken if len(broken) else None)

@@ -87,6 +87,7 @@ class Simulation:
             if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
                 solution.warnings.append(NO_TWIN)
         system = self.begin.torn(system)
+        solution.broken_before = np.unique(system.net.line[system.net.broken]).tolist()
         self.scene, self.system, self.solution = scene, system, solution
         self.watch, self.schedule = Watch(scene, system), Schedule.of(scene)
         self.overlaps, self._silent = _overlaps_of(scene, system), _silent_of(system)
@@ -226,6 +227,7 @@ class Simulation:
         self.overlaps, self._lines = _overlaps_of(self.scene, self.system), None
         self._through, self._silent = _through_of(self.system), _silent_of(self.system)
         self.solution.frames.clear()
+        self.solution.twin_end = None
         if folder is not None:
             folder.restart(self.solution.summary())
 

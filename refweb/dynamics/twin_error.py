@@ -69,7 +69,7 @@ class Twin:
 
     def __enter__(self):
         integrator = self._simulation.integrator
-        if integrator.beside and THREADS:  # the twin is made here: a system is used by one thread at a time
+        if integrator.beside and THREADS:  # made here, so that one thread finds what the system finds once
             twin = integrator.refined()
             self._thread = threading.Thread(target=self._run, args=(lambda: twin,), daemon=True)
             self._thread.start()

@@ -7,39 +7,15 @@ every break. `refweb.dynamics.integrators.rupture` finds the moments.
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InputError
-from ..kernels import ENERGY, FORCE, kernel
 from ..net.groups import givers
-from ..net.net import AXIAL_STIFFNESS
 from ..tables import Several, Table, by_group, real, rows, table
-from .base import STRAIN, TENSION, Family, Weakness
-
-HELD = "rupture_energy"
-"""Column of the numbers of the lines with what a broken element held [J]."""
-
-
-@functools.cache
-def kernels(held):
-    """Force and energy kernels; what elements held is in the column ``held`` of the numbers of the lines."""
-
-    @kernel(FORCE)
-    def force(t, x, v, f, cells, data, out):
-        for c in range(cells.shape[0]):
-            if data[c, AXIAL_STIFFNESS] == 0.0:
-                out[c, TENSION] = 0.0
-                out[c, STRAIN] = 0.0
-
-    @kernel(ENERGY)
-    def energy(t, x, cells, data, out):
-        for c in range(cells.shape[0]):
-            out[c] = data[c, held]
-
-    return force, energy
+from .base import Weakness
+from .broken import HELD, held
 
 
 @table
@@ -75,8 +51,8 @@ class Rupture(Table):
         Nominal stress T/A at which a line breaks [Pa], damping included; by default the strength of ``[cable]`` and its
         groups. Lines without either do not break by stress.
     at : sequence of (line, t), optional
-        Lines that break at a time [s] whatever their stress, in the middle, or in the element behind it; in statics t
-        is the load step.
+        Lines that break at a time [s] whatever their stress, in the middle, or in the element behind it; those that
+        are broken by then stay as they are. In statics t is the load step.
     groups : dict of str to GroupRupture
         Strengths that differ by group of lines; groups that share lines give it once.
 
@@ -135,26 +111,9 @@ class Rupture(Table):
             raise InputError(
                 "strength is missing: give it here, in [cable] or in their groups, or give at = [[line, t]]"
             )
-        middles = [(time, int(line) * net.subdivide + net.subdivide // 2) for line, time in self._due]
+        elements = net.middle_of([line for line, _ in self._due])
+        middles = [(time, int(element)) for (_, time), element in zip(self._due, elements, strict=True)]
         weakness = Weakness(limits, tuple(sorted(middles)))
         if net.quasi_static:
             return weakness
-        if net.consistent_minus_lumped is not None:
-            raise InputError(
-                'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
-                '"lumped"'
-            )
-        force, energy = kernels(net.column(HELD))
-        family = Family(
-            name="rupture",
-            cells=net.cells,
-            data=net.line_data,
-            force=force,
-            energy=energy,
-            book="rupture_energy",
-            observed=2,
-            lines=True,
-            internal=True,
-            at_rest=False,
-        )
-        return [family, weakness]
+        return [held(net), weakness]

@@ -23,9 +23,11 @@ class File(Table):
     """A web from a VTK file (.vtu, .vtp, .vtk of any version), a Gmsh file (.msh 2.2 or 4.1) or two CSV files.
 
     VTK: cells are lines or polylines; of curved lines the ends count, and vertices do no harm. Taken where present:
-    cell data ``natural_length`` [m], which a polyline shares out by distance, and ``group`` (numbers or texts), and
-    point data ``support`` (not 0: held in all components). A frame of a result folder is the web that it shows, as it
-    was before any displacement, with its natural lengths of that time; what is held in all components is a support.
+    cell data ``natural_length`` [m], which a polyline shares out by distance, ``group`` (numbers or texts) and
+    ``broken`` (not 0: the line carries nothing, half of its mass stays with either end, and only dynamics takes it),
+    and point data ``support`` (not 0: held in all components). A frame of a result folder is the web that it shows, as
+    it was before any displacement, with its natural lengths of that time and its broken lines; what is held in all
+    components is a support.
 
     Gmsh: physical curves are groups of lines, physical points names of nodes, by their tag where they have no name;
     points named ``support`` are supports. An element in several curves is one line of several groups. Nodes that no
@@ -122,6 +124,7 @@ def _web_of(mesh):
     moved = mesh.point_data.get("displacement")
     if moved is not None and length is not None and support is not None and np.shape(moved) == points.shape:
         points = points - moved  # a frame, whose points are current positions
+    broken = _numbers("broken", _joined("broken", mesh.lines), count)
     lines, of, share = _segments(mesh.lines, points)
     if length is not None:
         length = length[of] * share
@@ -131,8 +134,9 @@ def _web_of(mesh):
         once, place = _merged(lines, mesh)
         lines, length = lines[once], None if length is None else length[once]
         groups = {name: np.unique(place[list(cells)]) for name, cells in {**own, **mesh.groups}.items()}
+    broken = np.zeros(0, dtype=np.int64) if broken is None or mesh.groups is not None else np.flatnonzero(broken[of])
     rim = mesh.supports if support is None else np.flatnonzero(support)
-    own: dict = dict(kind="file", groups=groups)
+    own: dict = dict(kind="file", groups=groups, broken=broken)
     keep = _kept(mesh, lines, rim, len(points))
     if keep is None:
         return Web(points, lines, length, rim=rim, names=mesh.names, **own)

@@ -33,7 +33,7 @@ mesh = mesh.combine() if isinstance(mesh, pyvista.MultiBlock) else mesh
 mesh = mesh.cast_to_unstructured_grid()
 found = {"points": mesh.points, "types": mesh.celltypes, "cells": mesh.cell_connectivity, "offsets": mesh.offset}
 for kind, data in (("cell", mesh.cell_data), ("point", mesh.point_data)):
-    for name in {"natural_length", "group", "support", "displacement"} & set(data):
+    for name in {"natural_length", "group", "broken", "support", "displacement"} & set(data):
         found[f"{kind} {name}"] = np.asarray(data[name])
 np.savez(sys.argv[2], **found)
 """

@@ -147,6 +147,10 @@ class Net:
         """Elements that are broken, which have no stiffness, shape (k,)."""
         return np.flatnonzero(self.line_data[:, AXIAL_STIFFNESS] == 0.0)
 
+    def middle_of(self, lines):
+        """Element at the middle of each of some lines, or the one behind it, shape (lines,)."""
+        return np.asarray(lines, dtype=np.int64) * self.subdivide + self.subdivide // 2
+
     @property
     def natural_length(self):
         """Natural length of each element [m], shape (cells,)."""

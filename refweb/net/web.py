@@ -42,6 +42,8 @@ class Web:
         make.
     length_given : bool, optional
         Whether natural lengths are data of their own and not distances; by default whether ``natural_length`` is given.
+    broken : sequence of int
+        Lines that are broken and carry nothing, as an attribute increasing int64.
 
     Raises
     ------
@@ -62,6 +64,7 @@ class Web:
     names: dict[str, tuple[int, ...]] = field(default_factory=dict)
     groups: Several = None
     length_given: bool | None = None
+    broken: Several = ()
 
     def __post_init__(self):
         points = np.array(self.points, dtype=np.float64, order="C")
@@ -85,8 +88,15 @@ class Web:
         names = {name: _named(name, numbers, len(points)) for name, numbers in self.names.items()}
         rim = np.unique(in_range("rim", self.rim, len(points))).astype(np.int32)
         groups |= {name: own for name, own in by_place(lines, rim, len(points)).items() if name not in groups}
+        broken = np.unique(in_range("broken", self.broken, len(lines)))
         given = self.natural_length is not None if self.length_given is None else bool(self.length_given)
-        for name, value in (("points", points), ("lines", lines), ("natural_length", length), ("rim", rim)):
+        for name, value in (
+            ("points", points),
+            ("lines", lines),
+            ("natural_length", length),
+            ("rim", rim),
+            ("broken", broken),
+        ):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         for name, value in (("groups", groups), ("names", names), ("length_given", given)):
@@ -248,7 +258,7 @@ def _first(bad):
 
 
 def in_range(name, numbers, count):
-    """Node numbers as int64; refuse those that are not 0 … count − 1."""
+    """Numbers as int64; refuse those that are not 0 … count − 1."""
     numbers = np.asarray(numbers)
     if numbers.size and numbers.dtype.kind not in "iu":
         raise InputError(f"{name} = {shown(numbers.tolist())} must be node numbers")

@@ -305,11 +305,12 @@ class Folder:
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
         self.listed([(number, state.time if shape is None else number)], net.bodies)
 
-    def keep(self, **arrays):
-        """Add arrays to the last checkpoint."""
+    def keep_twin(self, end):
+        """Add to the last checkpoint where the twin run ended: displacement [m] and velocity [m/s]."""
         with self._written():
             with np.load(self.path / "checkpoint.npz") as archive:
-                arrays = {key: archive[key] for key in archive} | arrays
+                arrays = {key: archive[key] for key in archive}
+            arrays |= dict(zip(("twin_displacements", "twin_velocities"), end, strict=True))
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))
 
     def listed(self, frames, bodies):

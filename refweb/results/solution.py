@@ -145,6 +145,11 @@ class SolutionData:
     breaks : list of dict, optional
         Of each element that has broken, in the order in which they did, its ``line``, ``element``, ``time`` [s] and the
         ``error`` of that, the ``place`` of its middle [m] and the ``energy`` [J] that it held; None where nothing may.
+    broken_before : list of int
+        Lines that were broken before the run began.
+    twin_end : (ndarray, ndarray), optional
+        Displacement [m] and velocity [m/s] at which the twin run ended, each of shape (rows, 3); None where there was
+        none.
     frames : list of (int, refweb.results.state.State)
         Row numbers and states of a run that writes no folder. One that does keeps none: its frames are files, which
         are read when they are looked at.
@@ -166,6 +171,8 @@ class SolutionData:
     events: list = field(default_factory=list)
     throw: dict = field(default_factory=dict)
     breaks: list | None = None
+    broken_before: list = field(default_factory=list)
+    twin_end: tuple | None = None
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
     horizon: dict = field(default_factory=dict)
@@ -208,6 +215,7 @@ class SolutionData:
             "steps": [{**step, "results": plain(step["results"])} for step in self.steps],
             "events": self.events,
             **({} if self.breaks is None else {"breaks": self.breaks}),
+            **({"broken_before": self.broken_before} if self.broken_before else {}),
             "solver": self.solver,
             "cost": self.cost,
             "versions": self.versions,

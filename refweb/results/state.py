@@ -33,9 +33,9 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, OWN].copy() for i, f in enumerate(self.system.families) if f.contact}
+        contact = {i: per_cell[i][:, OWN] for i, f in enumerate(self.system.families) if f.contact}
         felt = self.system.contact_forces.of(per_cell) if any(f.felt for f in self.system.families) else None
-        return force, per_cell.tension.copy(), contact, felt
+        return force, per_cell.tension, contact, felt
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
@@ -75,8 +75,7 @@ class State:
         from ..effects.elasticity import strains
 
         strain = strains(self.system.at(self.time).net, self.x).max(axis=1)
-        if self.system.weakness is not None:
-            strain[self.system.net.broken] = 0.0
+        strain[self.system.net.broken] = 0.0
         return strain
 
     @cached_property

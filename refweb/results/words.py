@@ -114,6 +114,9 @@ def on_run(summary):
         yield "passage", f"{name}: {text}"
     if (breaks := summary.get("breaks")) is not None:
         yield from _breaks(breaks)
+    if before := summary.get("broken_before"):
+        told = f"{', '.join(map(str, before[:FEW_BREAKS]))}{', ...' * (len(before) > FEW_BREAKS)}"
+        yield "broken", f"{len(before)} line{'s' * (len(before) > 1)} before the run began: {told}"
     if worst := summary.get("utilisation"):
         digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
         yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"

@@ -96,7 +96,7 @@ class Newton:
     """
 
     def __init__(self, system, progress=None, first=None):
-        self.system = system
+        self.system, self._shown, self._blocks = system, system.per_cell(), system.blocks()
         self.progress = progress or (lambda text: None)
         net = system.net if first is None else system.at(first).net
         self.geometric = system.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
@@ -186,7 +186,7 @@ class Newton:
 
     def _evaluated(self, t, x, stats):
         """The `Iterate` at x."""
-        force, per_cell = self.system.forces(t, x)
+        force, per_cell = self.system.forces(t, x, per_cell=self._shown)
         stats["nfev"] += 1
         return Iterate(x, force, per_cell.tension.copy())
 
@@ -202,7 +202,7 @@ class Newton:
         return ResidualSearch(self.system, self.factor, t)
 
     def _matrix(self, t, x, shift, definite, ahead=None):
-        values = self.system.stiffness(t, x, definite=definite)
+        values = self.system.stiffness(t, x, definite=definite, blocks=self._blocks)
         values += shift * self.geometric
         if ahead is not None:
             bars = Bars(self.system.at(t).net, x)

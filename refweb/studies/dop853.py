@@ -57,7 +57,7 @@ class Dop853:
         refuse_massless(system, NAME)
         if system.constraints:
             raise InputError(f'[[link]] needs method = "ida": {NAME} does not hold lengths')
-        if system.weakness is not None:
+        if system.weakness is not None and (system.weakness.watched or system.weakness.times):
             raise InputError(f"[rupture] has breaks, which {NAME} does not find")
         self.system, self._unknowns = system, len(system.free)
         x = np.zeros((system.rows, 3)) if begin.x is None else begin.x.copy()

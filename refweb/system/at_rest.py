@@ -7,9 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..errors import InputError
+
 
 def at_rest(system):
-    """A copy in which free bodies are held and feel nothing, and what needs velocity is left out; or the system."""
+    """A copy in which free bodies are held and feel nothing, and what needs velocity is left out; or the system.
+
+    Raises
+    ------
+    InputError
+        For a line that is broken.
+    """
+    refuse_broken(system.net)
     waiting = [body.row for body in system.net.bodies if not body.fixed]
     if not waiting and all(family.at_rest for family in system.families):
         return system
@@ -33,3 +42,12 @@ def at_rest(system):
             rest.families.append(replace(family, cells=family.cells[felt], data=family.data[felt]))
     rest.arrange()
     return rest
+
+
+def refuse_broken(net):
+    """Refuse a net with broken lines, which statics does not take."""
+    if len(net.broken):
+        raise InputError(
+            f"line {net.line[net.broken[0]]} is broken, and statics takes no broken lines: use [solve] "
+            'kind = "dynamic" and start = "web", or leave the line out of the web'
+        )

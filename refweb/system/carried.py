@@ -99,8 +99,8 @@ class Carried:
         number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max() // 3), -1)
         number[free] = np.arange(len(free))
         keys = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr)) * np.int64(pattern.size) + pattern.indices
-        self._entries = [_entries(cell.rows, pattern.size, number, keys) for cell in self._cells]
         self._spun = [_entries(rows[1:].tolist(), pattern.size, number, keys) for rows in self.turns.rows]
+        self._entries = [_entries(cell.rows, pattern.size, number, keys) for cell in self._cells]
 
     def _state(self, x, v):
         """Of each node its arm, and of its body ω, W, u and δθ by the quaternion, (3, 4) from that behind on."""

@@ -29,7 +29,7 @@ class PerCell(list):
 
 
 class Forces(NamedTuple):
-    """Force on every row [N], shape (rows, 3), and what families observe; the next evaluation writes over that."""
+    """Force on every row [N], shape (rows, 3), and what families observe."""
 
     force: np.ndarray
     per_cell: PerCell

@@ -94,16 +94,13 @@ class Links:
 
     def _arrange(self):
         """The fixed pattern of [[M, Gᵀ], [G, 0]]."""
-        from scipy.sparse import csc_array
-
         n, M = len(self._at), self._M.tocoo()
         size = n + len(self)
         rows = np.concatenate([M.row, self._unknown, n + self._link])
         columns = np.concatenate([M.col, n + self._link, self._unknown])
         keys, self._place = np.unique(columns.astype(np.int64) * size + rows, return_inverse=True)
         indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
-        self._matrix = csc_array((np.zeros(len(keys)), (keys % size).astype(np.int32), indptr), shape=(size, size))
-        self._lu = None
+        self._pattern, self._lu = ((keys % size).astype(np.int32), indptr), None
 
     def _entries(self, x):
         """∂g/∂x of the ends that move."""
@@ -133,26 +130,22 @@ class Links:
 
     def solve(self, x, f, b):
         """a and λ of M a + Gᵀλ = f, G a = b, by the last factorization where refinement makes up for its age."""
-        G = self._entries(x)
-        self._matrix.data[:] = np.bincount(self._place, np.concatenate([self._M.data, G, G]))
+        from scipy.sparse import csc_array
+
+        G, size = self._entries(x), len(self._pattern[1]) - 1
+        data = np.bincount(self._place, np.concatenate([self._M.data, G, G]))
+        matrix, lu = csc_array((data, *self._pattern), shape=(size, size)), self._lu
         rest = wanted = np.concatenate([f, b])
         found = np.zeros_like(wanted)
         for i in range(5):
-            if self._lu is None or i == 4:
-                self._lu, rest, found = self._factorized(), wanted, np.zeros_like(wanted)
-            found = found + self._lu.solve(rest)
-            rest = wanted - self._matrix @ found
+            if lu is None or i == 4:
+                self._lu = lu = _factorized(matrix)
+                rest, found = wanted, np.zeros_like(wanted)
+            found = found + lu.solve(rest)
+            rest = wanted - matrix @ found
             if np.abs(rest).max() <= 1e-10 * np.abs(wanted).max():
                 break
         return found[: len(f)], found[len(f) :]
-
-    def _factorized(self):
-        from scipy.sparse.linalg import splu
-
-        try:
-            return splu(self._matrix)
-        except RuntimeError:
-            raise SolverError("links have moved so that their forces are not determined") from None
 
     def start(self, x, v, force):
         """Accelerations of what has mass [m/s²], and λ [N], for the forces of all else [N]."""
@@ -175,3 +168,12 @@ class Links:
                 break
             moving[self._at] += self.solve(x, still, -excess)[0]
         v.ravel()[self._at] += self.solve(x, still, -self.pairs.speed(x, v))[0]
+
+
+def _factorized(matrix):
+    from scipy.sparse.linalg import splu
+
+    try:
+        return splu(matrix)
+    except RuntimeError:
+        raise SolverError("links have moved so that their forces are not determined") from None

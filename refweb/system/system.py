@@ -6,6 +6,8 @@ A `System` concatenates the families of its effects once and has the interface o
 Where effects prescribe natural lengths, the numbers of the lines are a function of time, `System.line_data`: every
 force and energy asks for those of its own t, and `System.at` is the system as it stands at one time. The net is as
 built throughout. A loop of kernels, which cannot ask, keeps an array of its own and sets lengths in that.
+
+What is evaluated is written to arrays of the caller, by default new ones, so that threads may share a system.
 """
 
 from __future__ import annotations
@@ -92,10 +94,7 @@ class System:
         """Find what follows from what is supported and acts."""
         self.free = np.flatnonzero(~self.supported)
         self._zero = np.zeros((self.rows, 3))
-        self._observed = self.per_cell()
-        sizes = [(len(f.cells), 3 * f.cells.shape[1]) for f in self._in_tangent]
-        self._blocks = [np.empty((count, size, size)) for count, size in sizes]
-        self._at_time = None  # the last time that lengths were asked for, and `line_data` then
+        self._at_time = None  # the last time that lengths were asked for, and `line_data` then, which stays as it is
 
     @cached_property
     def library(self):
@@ -179,6 +178,11 @@ class System:
         lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.lines)])))
         return PerCell([lines if f.lines else np.zeros((len(f.cells), f.observed)) for f in self.families], lines)
 
+    def blocks(self):
+        """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""
+        sizes = [(len(f.cells), 3 * f.cells.shape[1]) for f in self._in_tangent]
+        return [np.empty((count, size, size)) for count, size in sizes]
+
     @property
     def working(self):
         """Of each family 1 if its power counts as work, −1 if its power is energy lost, else 0."""
@@ -251,9 +255,10 @@ class System:
         """Force on every row [N], supports included, shape (rows, 3)."""
         return self.forces(t, x, v)[0]
 
-    def forces(self, t, x, v=None):
-        """The `Forces` at displacement x and velocity v, by default at rest."""
-        return Forces(self.force_to(self._observed, t, x, self._zero if v is None else v), self._observed)
+    def forces(self, t, x, v=None, per_cell=None):
+        """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
+        per_cell = self.per_cell() if per_cell is None else per_cell
+        return Forces(self.force_to(per_cell, t, x, self._zero if v is None else v), per_cell)
 
     def force_to(self, per_cell, t, x, v):
         """Force on every row [N]; what families show is written to the arrays of ``per_cell``."""
@@ -313,20 +318,21 @@ class System:
         """Total potential Π [J]: that of the lines and of all loads."""
         return sum(self.energy_of(f, t, x).sum() for f in self.families)
 
-    def stiffness(self, t, x, v=None, definite=False, only=None):
+    def stiffness(self, t, x, v=None, definite=False, only=None, blocks=None):
         """Values of K = −∂f/∂x [N/m] in the fixed pattern.
 
-        ``definite`` leaves out what is negative; ``only`` are the families to take, by default all.
+        ``definite`` leaves out what is negative; ``only`` are the families to take, by default all; ``blocks`` are
+        `blocks` to write to, which a loop keeps.
         """
-        v = self._zero if v is None else v
-        for family, blocks in zip(self._in_tangent, self._blocks, strict=True):
+        v, blocks = self._zero if v is None else v, self.blocks() if blocks is None else blocks
+        for family, own in zip(self._in_tangent, blocks, strict=True):
             if family.stiffness is None or not (only is None or family in only):
-                blocks[:] = 0.0
+                own[:] = 0.0
             else:
-                family.stiffness(t, x, v, blocks, family.cells, self._data(family, t), definite)
-        values = self.pattern.assemble(self._blocks)
+                family.stiffness(t, x, v, own, family.cells, self._data(family, t), definite)
+        values = self.pattern.assemble(blocks)
         if self.carriers:
-            self.carriers.add_stiffness(values, self, t, x, v, self._blocks)
+            self.carriers.add_stiffness(values, self, t, x, v, blocks)
         return values
 
     @property
@@ -378,17 +384,21 @@ class System:
         """Radius of the orbit that the web is in [m], None where it is in none."""
         return next((f.orbit_radius for f in self.families if f.orbit_radius is not None), None)
 
-    def damping(self, t, x, v):
-        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity."""
+    def damping(self, t, x, v, blocks=None):
+        """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity.
+
+        ``blocks`` are `blocks` to write to, which a loop keeps.
+        """
         if not any(f.damping is not None for f in self.families):
             return None
-        for family, blocks in zip(self._in_tangent, self._blocks, strict=True):
-            blocks[:] = 0.0
+        blocks = self.blocks() if blocks is None else blocks
+        for family, own in zip(self._in_tangent, blocks, strict=True):
+            own[:] = 0.0
             if family.damping is not None:
-                family.damping(t, x, v, blocks, family.cells, self._data(family, t), False)
-        values = self.pattern.assemble(self._blocks)
+                family.damping(t, x, v, own, family.cells, self._data(family, t), False)
+        values = self.pattern.assemble(blocks)
         if self.carriers:
-            self.carriers.add_damping(values, self, x, v, self._blocks)
+            self.carriers.add_damping(values, self, x, v, blocks)
         return values
 
     def assemble_lines(self, blocks):

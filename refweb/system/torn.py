@@ -45,12 +45,18 @@ def torn(system, elements, energies):
     Parameters
     ----------
     system : refweb.system.system.System
-        With a `refweb.effects.base.Weakness`; it stays as it is.
+        It stays as it is.
     elements : ndarray of int
         Elements.
     energies : ndarray
         What each held [J].
+
+    Raises
+    ------
+    InputError
+        For a consistent mass.
     """
+    system = _breakable(system)
     net = system.net
     numbers = net.line_data.copy()
     numbers[elements, AXIAL_STIFFNESS] = 0.0
@@ -64,6 +70,27 @@ def torn(system, elements, energies):
         other.__dict__.pop(kept, None)
     other.arrange()
     return other
+
+
+def _breakable(system):
+    """The system, or where nothing of it may break one with the column, family and `Weakness` of broken elements."""
+    if system.weakness is not None:
+        return system
+    from ..effects.base import Weakness
+    from ..effects.broken import HELD, held
+
+    other = copy.copy(system)
+    other.net = net = system.net.with_column(HELD, 0.0)
+    other.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
+    other.families.append(held(net))
+    other.weakness = Weakness(np.full(len(net.cells), np.inf))
+    return other
+
+
+def with_broken_lines(system):
+    """The system with the lines broken that are so in its web, each at its middle."""
+    elements = system.net.middle_of(system.net.web.broken)
+    return torn(system, elements, np.zeros(len(elements)))
 
 
 def _severed(family, broken, numbers):

@@ -7,6 +7,7 @@ import nets
 import numpy as np
 import pytest
 import tomli_w
+from scipy.integrate import solve_ivp
 
 import refweb
 from refweb.__main__ import main
@@ -502,3 +503,45 @@ def test_a_record_of_arrays_gives_them_back(tmp_path):
     for name, array in given.items():
         assert found[name].dtype == array.dtype and found[name].shape == array.shape
         assert found[name].tobytes() == array.tobytes()
+
+
+# The end of the twin
+
+
+def test_what_python_saves_has_the_end_of_the_twin(tmp_path):
+    """± of a run that starts from it is that of the command line, and holds the motion that DOP853 finds.
+
+    A mass on two lines, of which one breaks at 20 ms; the run that follows begins at 50 ms.
+    """
+    area, modulus, density, prestrain, force = 1e-4, 1e7, 100.0, 0.01, 5.0
+    supports = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+
+    def whole(at, **solve):
+        return refweb.Scene(
+            web=refweb.Inline(
+                points=[supports[0], [1.0, 0.0, 0.0], supports[1]], lines=[[0, 1], [1, 2]], supports=[0, 2]
+            ),
+            cable=cable(modulus=modulus, area=area, density=density, prestrain=prestrain),
+            effects=[refweb.Load(node=1, force=(0.0, 0.0, force)), refweb.Rupture(**at)],
+            solve=refweb.Dynamic(duration=0.05, **solve),
+            observe=[refweb.Observe(name="z", quantity="position", node=1, component=2)],
+        )
+
+    def rate(t, y, lines):
+        toward = supports[:lines] - y[:3]
+        far = np.linalg.norm(toward, axis=1)
+        pull = modulus * area * np.maximum(far * (1.0 + prestrain) - 1.0, 0.0) / far
+        return np.append(y[3:], (pull @ toward + [0.0, 0.0, force]) * (1.0 + prestrain) / (density * area))
+
+    y = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for lines, begin, end in ((2, 0.0, 0.02), (1, 0.02, 0.1)):
+        y = solve_ivp(rate, (begin, end), y, "DOP853", args=(lines,), max_step=1e-3, rtol=1e-10, atol=1e-12).y[:, -1]
+    first = whole(dict(at=[[1, 0.02]]))
+    refweb.run(first).save(tmp_path / "saved")
+    refweb.run(first, out=tmp_path / "written")
+    saved, written = (
+        refweb.run(whole(dict(strength=1e9), start=str(tmp_path / name))) for name in ("saved", "written")
+    )
+    assert saved.results == written.results and saved.warnings == written.warnings
+    result = saved.results["z"]
+    assert abs(result.value - y[2]) < result.error < 0.02 * y[2]

@@ -1,8 +1,11 @@
 """Rupture: closed forms of what is left behind a break, books, orders, agreement of methods, and what goes on."""
 
+import shutil
+
 import nets
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import refweb
 import validation.dynamics.rupture as three
@@ -14,6 +17,7 @@ from refweb.effects.rupture import GroupRupture, Rupture
 from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.results.state import State
+from refweb.results.words import on_run
 from refweb.system.system import System
 
 METHODS = ["central-difference", "cvode", "ida"]
@@ -284,9 +288,112 @@ def test_another_run_starts_from_the_torn_web(tmp_path):
     assert lines and set(second.state.system.net.broken) >= set(lines)
     assert not second.state.tension[lines].any() and second.history["rupture_energy"][0] == 0.0
     np.testing.assert_array_equal(refweb.load(tmp_path / "second").state.tension, second.state.tension)
-    without = scene.replace(effects=[e for e in scene.effects if not isinstance(e, Rupture)])
-    with pytest.raises(refweb.InputError, match=f"line {lines[0]} is broken there: this scene needs a \\[rupture\\]"):
-        refweb.run(without)
+    without = refweb.run(scene.replace(effects=[e for e in scene.effects if not isinstance(e, Rupture)]))
+    assert without.broken_before == second.broken_before == lines and without.breaks == []
+    assert not without.state.tension[lines].any() and not without.state.strain[lines].any()
+
+
+PRESTRAIN, WEIGHT = 0.01, 5.0
+HELD_AT = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+
+
+def pulled(at=(), web=None, duration=0.05, interval=None, **solve):
+    """A mass on two taut lines of 1 m that is pulled aside, of which the second breaks at some times."""
+    whole = refweb.Inline(points=[HELD_AT[0], [1, 0, 0], HELD_AT[1]], lines=[[0, 1], [1, 2]], supports=[0, 2])
+    return refweb.Scene(
+        web=web or whole,
+        cable=refweb.Cable(
+            law="tension-only", modulus=1e7, area=1e-4, density=100.0, prestrain=0.0 if web else PRESTRAIN
+        ),
+        effects=[refweb.Load(node=1, force=(0.0, 0.0, WEIGHT)), *([Rupture(at=[[1, t] for t in at])] if at else [])],
+        solve=refweb.Dynamic(duration=duration, **solve),
+        output=refweb.Output(interval=interval),
+        observe=[
+            refweb.Observe(name="z", quantity="position", node=1, component="z"),
+            *(refweb.Observe(name=name, quantity=name, line=1, reduce="max") for name in ("tension", "strain")),
+        ],
+    )
+
+
+def place(*spans):
+    """z of that mass by DOP853, on so many lines for so long (lines, end) one after the other."""
+
+    def rate(t, y, lines):
+        toward = HELD_AT[:lines] - y[:3]
+        far = np.linalg.norm(toward, axis=1)
+        pull = 1e3 * np.maximum(far * (1.0 + PRESTRAIN) - 1.0, 0.0) / far
+        return np.append(y[3:], (pull @ toward + [0.0, 0.0, WEIGHT]) * (1.0 + PRESTRAIN) / 1e-2)
+
+    y, begin = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]), 0.0
+    for lines, end in spans:
+        y, begin = (
+            solve_ivp(rate, (begin, end), y, "DOP853", args=(lines,), max_step=1e-3, rtol=1e-10, atol=1e-12).y[:, -1],
+            end,
+        )
+    return y[2]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_frame_keeps_its_broken_lines(tmp_path, method):
+    """As a web it moves on the line that is left: z of DOP853 on one line, not on two; and its own frames do so."""
+    refweb.run(pulled([0.02]), out=tmp_path / "torn")
+    web = refweb.File(path=str(sorted((tmp_path / "torn" / "frames").glob("web_*.vtu"))[-1]))
+    found = refweb.run(pulled(web=web, duration=0.01, method=method), out=tmp_path / "again")
+    z, one, two = found.results["z"], place((1, 0.01)), place((2, 0.01))
+    assert abs(z.value - one) < max(z.error, 1e-6 * one) < 0.01 * abs(two - one)
+    assert found.results["tension"].value == 0.0 and found.results["strain"].value <= 0.0
+    assert found.state.tension[1] == found.state.strain[1] == 0.0
+    assert found.breaks == [] and found.broken_before == [1]
+    assert "1 line before the run began: 1" in dict(on_run(found.summary()))["broken"]
+    read = refweb.load(tmp_path / "again")
+    assert read.broken_before == [1] and read.state.tension[1] == 0.0
+    last = refweb.File(path=str(sorted((tmp_path / "again" / "frames").glob("web_*.vtu"))[-1]))
+    assert last.web().broken.tolist() == [1]
+
+
+def test_statics_refuses_a_frame_with_broken_lines(tmp_path):
+    refweb.run(pulled([0.0], duration=0.01)).save(tmp_path / "torn")
+    web = refweb.File(path=str(tmp_path / "torn" / "frames" / "web_000000.vtu"))
+    words = r"\[web\] line 1 is broken, and statics takes no broken lines"
+    still = pulled(web=web).replace(solve=refweb.Static(), output=refweb.Output())
+    for scene in (still, pulled(web=web, start="equilibrium")):
+        with pytest.raises(refweb.InputError, match=words):
+            refweb.run(scene)
+    with pytest.raises(refweb.InputError, match="line 1 is broken, and statics takes"):
+        refweb.modes(pulled(web=web))
+    with pytest.raises(refweb.InputError, match="ties the ends of a line together that breaks"):
+        refweb.run(pulled(web=web, method="cvode", mass="consistent"))
+
+
+@pytest.mark.parametrize("at", [(), (0.02,)])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_line_breaks_once(tmp_path, method, at):
+    """A run that starts behind a break has the same line broken, with a [rupture] that names it again or without."""
+    first = refweb.run(pulled([0.02], method=method))
+    first.save(tmp_path / "torn")
+    found = refweb.run(pulled(at, start=str(tmp_path / "torn"), method=method))
+    z = found.results["z"]
+    assert len(first.breaks) == 1 and found.breaks == [] and found.broken_before == [1] == [first.breaks[0]["line"]]
+    assert abs(z.value - place((2, 0.02), (1, 0.1))) < z.error
+    assert found.results["tension"].value == 0.0 and found.results["strain"].value == 0.0
+
+
+def test_a_killed_run_goes_on_with_what_was_broken_before(tmp_path):
+    """Bit for bit, and without the folder that it started from."""
+    refweb.run(pulled([0.02])).save(tmp_path / "torn")
+    scene = pulled(start=str(tmp_path / "torn"), interval=0.005)
+    whole = refweb.run(scene, out=tmp_path / "whole")
+
+    def stop(text, share):
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        refweb.run(scene, out=tmp_path / "killed", progress=stop)
+    shutil.rmtree(tmp_path / "torn")
+    resumed = refweb.resume(tmp_path / "killed")
+    assert resumed.results == whole.results and resumed.broken_before == [1]
+    assert (tmp_path / "killed" / "history.csv").read_text() == (tmp_path / "whole" / "history.csv").read_text()
 
 
 def test_what_is_drawn(tmp_path):
@@ -437,8 +544,6 @@ def test_auto_and_cost():
 
 
 def test_the_summary_tells_of_breaks():
-    from refweb.results.words import on_run
-
     solution = refweb.run(struck())
     words = [text for name, text in on_run(solution.summary()) if text.startswith("line")]
     assert len(words) == len(solution.breaks) and words[0].startswith(f"line {solution.breaks[0]['line']} at t = ")

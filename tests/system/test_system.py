@@ -1,5 +1,7 @@
 """The system as a whole: views of it, and what it refuses."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import nets
@@ -99,3 +101,49 @@ def test_one_power_of_the_lines():
 
     with pytest.raises(ValueError, match="one column for a power"):
         System(nets.skew_net(), [Elasticity(), Damping(time=0.02), Again(time=0.02)], FREE)
+
+
+def test_threads_share_a_system():
+    """Two ask for the same at other states, and neither is answered before both have computed.
+
+    A line of 1 m along x and along y: its tension is EA ε, K = EA/L e⊗e + T/l (1 − e⊗e), C = τ EA/L e⊗e.
+    """
+    stiffness, time = 1e3, 0.02
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0]], lines=[[0, 1]], supports=[0]),
+        cable=refweb.Cable(law="linear", modulus=1e7, area=1e-4, density=100.0),
+        effects=[refweb.Damping(time=time), refweb.Reel(lines="all", factor=[(0.0, 1.0), (1.0, 0.5)])],
+        solve=refweb.Dynamic(duration=1.0, method="cvode"),
+    )
+    system, together = scene.build(), threading.Barrier(2, timeout=10.0)
+    _ = system.pattern
+
+    def meeting(kernel):
+        def call(*numbers):
+            kernel(*numbers)
+            together.wait()
+
+        return None if kernel is None else call
+
+    parts = ("force", "stiffness", "damping")
+    system.families = [replace(f, **{part: meeting(getattr(f, part)) for part in parts}) for f in system.families]
+
+    def found(t, place):
+        x = np.array([[0.0, 0.0, 0.0], np.subtract(place, [1.0, 0.0, 0.0])])
+        length = system.natural_length(t)[0]
+        force, per_cell = system.forces(t, x)
+        values = [system.stiffness(t, x), system.damping(t, x, np.zeros_like(x))]
+        matrices = [system.pattern.matrix(one).toarray() for one in values]
+        return length, force[1], per_cell.tension.copy(), *matrices
+
+    states = [(0.2, [1.1, 0.0, 0.0]), (0.6, [0.0, 1.3, 0.0])]
+    with ThreadPoolExecutor(2) as threads:
+        answers = list(threads.map(found, *zip(*states, strict=True)))
+    for (t, place), (length, force, tension, K, C) in zip(states, answers, strict=True):
+        far, natural = np.linalg.norm(place), 1.0 - 0.5 * t
+        along, pull = np.outer(place, place) / far**2, stiffness * (far / natural - 1.0)
+        rates = stiffness / natural * along
+        np.testing.assert_allclose([length, tension[0]], [natural, pull], rtol=1e-12)
+        np.testing.assert_allclose(force, -pull * np.array(place) / far, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(K, rates + pull / far * (np.eye(3) - along), rtol=1e-12, atol=1e-9)
+        np.testing.assert_allclose(C, time * rates, rtol=1e-12, atol=1e-9)

@@ -39,6 +39,8 @@ def tensions(solution):
         force = stiffness * (ramp(strain - slackness) - ramp(-slackness))
         stored = stiffness * (integral(strain - slackness) - integral(-slackness) - ramp(-slackness) * strain)
     broken = [one["element"] for one in solution.breaks or ()]
+    if isinstance(solution.scene.web, refweb.Web):  # of lines that are elements
+        broken += solution.scene.web.broken.tolist()
     force[broken] = stored[broken] = 0.0
     return force, vector / np.where(length > 0, length, 1.0)[:, None], (stored * natural).sum()
 

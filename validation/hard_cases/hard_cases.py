@@ -1,11 +1,11 @@
 """Hard cases: each either right by an invariant, or refused with a reason.
 
-Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of
-1 : 1e6, mechanisms, everything slack, a snap of all lines at once, impacts up to 7 km/s, contact from soft to hard,
-bodies that start inside of the web, edges that lines press deeper than
-they are round, boxes that tumble onto edges and corners, plates at 50 m/s, surfaces with slivers, a body at rest on a
-net for 1e5 steps, lines and bodies that touch their like, pulses and peaks between steps, hammer blows, tables with
-more corners than steps.
+Small webs under what breaks solvers: no tension at all and a million newtons, moduli from 1 to 1e12 Pa, elements of 1 :
+1e6, mechanisms, lines that were broken before, everything slack, a snap of all lines at once, impacts up to 7 km/s,
+contact from soft to hard, bodies that start inside of the web, edges that lines press deeper than they are round, boxes
+that tumble onto edges and corners, plates at 50 m/s, surfaces with slivers, a body at rest on a net for 1e5 steps,
+lines and bodies that touch their like, pulses and peaks between steps, hammer blows, tables with more corners than
+steps.
 Each is solved by every method that takes it; a number proves each result:
 
 - statics: the largest force that is left at a free node, over the largest of loads and tensions. Tensions come from
@@ -317,6 +317,9 @@ def rubbing(*effects, **contact):
 
 
 THROWN = refweb.Velocity(node="centre", value=UP)
+WHOLE = window(4).web()
+HOLES = np.flatnonzero((WHOLE.lines == WHOLE.centre).any(axis=1))[:2].tolist() + [5, 11]
+HOLED = refweb.Web(WHOLE.points, WHOLE.lines, rim=WHOLE.rim, broken=HOLES)
 MASS = refweb.PointMass(node="centre", mass=1.0), THROWN
 CRITICAL = 0.2 / (7e7 / 200.0) ** 0.5
 """Time constant of damping that is critical for the highest frequency 2c/L of lines of 0.2 m [s]."""
@@ -365,6 +368,12 @@ MOTIONS = {
             duration=0.3 / v,
         )
         for v in (10.0, 100.0, 1000.0)
+    },
+    "lines that were broken before": {
+        "four of a web, thrown": free(THROWN, web=HOLED, supports=RIM),
+        "one of them breaks again": free(THROWN, refweb.Rupture(at=[[HOLES[0], 0.0], [HOLES[1], 0.005], [0, 0.01]]),
+                                         web=HOLED, supports=RIM),
+        "under a ball": hit(ball(position=(0.05, 0.1, -0.32), radius=0.3), web=HOLED),
     },
     "contact stiffness [N/m]": {
         k: hit(stiffness=k, duration=0.02 if k < 1e8 else 2e-3) for k in (1e2, 1e4, 1e6, 1e8, 1e10)

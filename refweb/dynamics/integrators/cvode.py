@@ -103,7 +103,7 @@ class Cvode(Sundials):
         self._at_state = t, x, v
         if self.rotations:
             self.rotations.linearize(x, v)
-        return self.system.stiffness(t, x, v), self.system.damping(t, x, v)
+        return self.system.stiffness(t, x, v, blocks=self._blocks), self.system.damping(t, x, v, self._blocks)
 
     # Block elimination
 
@@ -153,7 +153,9 @@ class Cvode(Sundials):
             values[system.pattern.diagonal] += self._mass
 
         def definite():
-            return values + gamma * gamma * (system.stiffness(*self._at_state, definite=True) - self._stiffness)
+            return values + gamma * gamma * (
+                system.stiffness(*self._at_state, definite=True, blocks=self._blocks) - self._stiffness
+            )
 
         self._factorize(values, definite)
 

@@ -152,10 +152,10 @@ class Ida(Sundials):
         self._at_state = t, x, v
         if self.rotations:
             self.rotations.linearize(x, v)
-        K = self.system.stiffness(t, x, v)
+        K = self.system.stiffness(t, x, v, blocks=self._blocks)
         if self._massless:
             self._adrift = t, self._massless.adrift(K)
-        return K, self.system.damping(t, x, v)
+        return K, self.system.damping(t, x, v, self._blocks)
 
     # Block elimination
 
@@ -171,7 +171,7 @@ class Ida(Sundials):
             K = self.rotations.eliminated(system.pattern, K)
 
         def definite():
-            values = rest + system.stiffness(*self._at_state, definite=True) / c**2
+            values = rest + system.stiffness(*self._at_state, definite=True, blocks=self._blocks) / c**2
             values[system.pattern.diagonal[self._bare]] += np.abs(K).max() / c**2
             return values
 

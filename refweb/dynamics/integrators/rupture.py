@@ -90,7 +90,8 @@ class Rupturing:
         course = self.inner.start(x, v)
         course.breaks = Breaks()
         over = np.flatnonzero(self._shares(course) >= 1.0)
-        now = [element for time, element in self._weakness.times if time <= 0.0]
+        held = self._holding(np.append(self._whole.net.broken, over))
+        now = [element for time, element in self._weakness.times if time <= 0.0 and held(element)]
         if len(over) or now:
             self._break(course, np.union1d(over, now).astype(np.int64))
         return course
@@ -133,10 +134,17 @@ class Rupturing:
 
     def _due(self, course, until):
         """The next (time, element) of those that break at a time, None where none does until then."""
+        held = self._holding(self.inner.system.net.broken)
         for time, element in self._weakness.times:
-            if course.time <= time <= until and element not in course.breaks.elements:
+            if course.time <= time <= until and held(element):
                 return time, element
         return None
+
+    def _holding(self, broken):
+        """Whether the line of an element has none that is ``broken``, a function of the element."""
+        line = self._whole.net.line
+        gone = set(line[broken])
+        return lambda element: line[element] not in gone
 
     def _torn_now(self, course):
         """Whether the event of a break, and no other, has ended the run."""
@@ -144,12 +152,8 @@ class Rupturing:
         return watched and course.events[-1]["time"] < np.inf and not ended_by(course.events[:-1])
 
     def _shares(self, course):
-        """Tension of each element over its limit.
-
-        In arrays of its own: those of the system may be written by another thread, where a twin runs beside.
-        """
-        system, shown = self.inner.system, self.inner.system.per_cell()
-        system.force_to(shown, course.time, course.x, course.v)
+        """Tension of each element over its limit."""
+        shown = self.inner.system.forces(course.time, course.x, course.v).per_cell
         return shown.tension / self._weakness.limits
 
     def _kept(self, course):

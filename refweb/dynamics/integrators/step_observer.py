@@ -92,6 +92,7 @@ class StepObserver(Integrator):
 
     def __init__(self, system, probes=(), sums=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
         self.system, self.rtol = system, rtol
+        self._shown, self._blocks = system.per_cell(), system.blocks()
         if not self.takes_massless:
             refuse_massless(system, self.method)
         if system.constraints and not self.takes_links:
@@ -180,7 +181,7 @@ class StepObserver(Integrator):
     def force_at(self, t, x, v):
         """Force on each unknown [N] at a state of all rows."""
         self.stats["nfev"] += 1
-        rows = self.system.force(t, x, v)
+        rows = self.system.force_to(self._shown, t, x, v)
         force = rows.ravel()[self.system.free]
         if self._wrong is None and not np.isfinite(force.sum()):
             self._wrong = t, rows

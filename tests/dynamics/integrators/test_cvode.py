@@ -229,7 +229,7 @@ def damped(system):
     matrix = system.pattern.matrix(values)
     matrix = (matrix + matrix.T).tocsc()
     matrix.sort_indices()
-    system.damping = lambda t, x, v: matrix.data
+    system.damping = lambda t, x, v, blocks: matrix.data
     return system
 
 

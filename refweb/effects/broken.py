@@ -1,0 +1,63 @@
+"""What broken elements show, and what they held: tension and strain 0, and an energy that stays.
+
+Every system with broken elements has this family, whether a ``[rupture]`` broke them or the web came with them.
+"""
+
+from __future__ import annotations
+
+import functools
+
+from ..errors import InputError
+from ..kernels import ENERGY, FORCE, kernel
+from ..net.net import AXIAL_STIFFNESS
+from .base import STRAIN, TENSION, Family
+
+HELD = "rupture_energy"
+"""Column of the numbers of the lines with what a broken element held [J]."""
+
+
+@functools.cache
+def kernels(column):
+    """Force and energy kernels; what elements held is in a ``column`` of the numbers of the lines."""
+
+    @kernel(FORCE)
+    def force(t, x, v, f, cells, data, out):
+        for c in range(cells.shape[0]):
+            if data[c, AXIAL_STIFFNESS] == 0.0:
+                out[c, TENSION] = 0.0
+                out[c, STRAIN] = 0.0
+
+    @kernel(ENERGY)
+    def energy(t, x, cells, data, out):
+        for c in range(cells.shape[0]):
+            out[c] = data[c, column]
+
+    return force, energy
+
+
+def held(net):
+    """The `Family` of what broken elements held, and of their tension and strain, which are 0.
+
+    Raises
+    ------
+    InputError
+        For a consistent mass.
+    """
+    if net.consistent_minus_lumped is not None:
+        raise InputError(
+            'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
+            '"lumped"'
+        )
+    force, energy = kernels(net.column(HELD))
+    return Family(
+        name="rupture",
+        cells=net.cells,
+        data=net.line_data,
+        force=force,
+        energy=energy,
+        book="rupture_energy",
+        observed=2,
+        lines=True,
+        internal=True,
+        at_rest=False,
+    )
