@@ -185,6 +185,7 @@ class Simulation:
         course, ahead = self._set_off(folder)
         self._refuse_overlap(course)
         tell(ahead / len(times))
+
         def told(share):
             tell(share)
             self.look_at_budget(share)
