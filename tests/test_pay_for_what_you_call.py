@@ -58,7 +58,18 @@ EVERY |= {
 }
 EVERY |= {
     f"results.{name}"
-    for name in ("state", "solution", "folder", "files", "vtu", "vtu_file", "provenance", "progress", "run_status")
+    for name in (
+        "columns",
+        "state",
+        "solution",
+        "folder",
+        "files",
+        "vtu",
+        "vtu_file",
+        "provenance",
+        "progress",
+        "run_status",
+    )
 }
 EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
 """What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
@@ -72,7 +83,9 @@ NEWTON = (
 )
 NEWTON |= {"system.conjugate_gradients"}
 DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
-DYNAMICS |= {f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "initial_state")}
+DYNAMICS |= {
+    f"dynamics.{name}" for name in ("simulation", "history", "schedule", "accuracy_loop", "budget", "initial_state")
+}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
 DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
 LOOP = ("central_difference", "explicit_loop", "between_steps", "rows", "step", "step_bound")
