@@ -50,8 +50,10 @@ class Budget:
     """
 
     def __init__(self, given):
-        self._given, self._began, self._begun = given, clock(), (clock(), 0.0)
-        self.runs, self.kept = [], True
+        self._given, self._began = given, clock()
+        self._begun = self._began, 0.0
+        self.runs: list[Run] = []
+        self.kept = True
 
     @property
     def whole(self):

@@ -316,7 +316,7 @@ def test_search_finds_all_pairs(flat, skin):
     web = Web(points=points, lines=rows, natural_length=lengths, rim=np.array([0]))
     net = discretisation.build(web, refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3))
     touch = refweb.SelfContact(radius=1e-4)
-    cells, data = touch._elements(net)
+    cells, data = touch._elements(net, np.zeros((len(rows), 0)))
     x = 0.3 * rng.standard_normal((60, 3))
     place = (points + x)[rows]
     near = search.REACH * 2e-4 + skin
@@ -342,6 +342,23 @@ def test_what_is_near_along_the_net_does_not_touch():
     f = np.zeros((12, 3))
     family.force(0.0, 0.0 * f, 0.0 * f, f, family.cells, family.data, np.zeros((len(family.cells), 1)))
     assert len(family.cells) and not f.any()
+
+
+@pytest.mark.parametrize("radius, least, most", [(1e9, 2**0.5, 2**0.5), (1.0, 0.5**0.5 - 0.1, 1.0), (0.3, 0.1, 0.3)])
+def test_a_radius_is_refused_before_pairs_are_searched(monkeypatch, radius, least, most):
+    """By half the diagonal of a square net of 2 m; or by lines 2r apart along the net, and 2r/√2 or more in space."""
+    monkeypatch.setattr(table, "near_along", None)
+    web = refweb.Window(mesh="square", rows=20, columns=20, side=0.1)
+    scene = refweb.Scene(
+        web=web,
+        cable=refweb.Cable(law="linear", modulus=1e5, area=1e-6, density=1e3),
+        effects=[refweb.SelfContact(radius=radius)],
+        solve=refweb.Dynamic(duration=0.1),
+    )
+    with pytest.raises(InputError, match=r"must be (<|≤) [\d.]+ \[m\]") as refused:
+        scene.build()
+    limit = float(re.search(r"must be . ([\d.]+) \[m\]", str(refused.value))[1])
+    assert 0.999 * least < limit < 1.001 * most
 
 
 def test_refusals():

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ... import memory
 from ...errors import InputError
 from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from ...tables import Table, boolean, real, table
@@ -20,6 +21,9 @@ LISTED = 20_000
 """Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
 ROUNDING = 1e-9
 """Share of the radius by which a distance may be wrong."""
+FAR, SOME = 4.0, 8
+"""Distance of touch, over the longest line, above which some elements are looked at first, and how many: what all of
+them have beside them along the net takes long to find and fills the memory."""
 
 
 @table
@@ -97,8 +101,9 @@ class SelfContact(Table):
             )
         from . import crossing, press
 
-        cells, data = self._elements(net)
-        self._refuse_overlap(net, cells, data)
+        self._refuse_too_large(net)
+        cells, data = self._elements(net, near_along(net, 2.0 * self.radius))
+        self._refuse_overlap(net, *found(0.0, np.zeros_like(net.points), cells, data))
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
         common = dict(internal=True, sever=without(SCALE), finder=None, near=near)
         if chosen is not None and len(chosen) <= LISTED:
@@ -147,9 +152,9 @@ class SelfContact(Table):
             return self.stiffness
         return float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
 
-    def _elements(self, net):
-        """Nodes and numbers of all elements, see `refweb.effects.self_contact.pair`."""
-        touch, beside = 2.0 * self.radius, near_along(net, 2.0 * self.radius)
+    def _elements(self, net, beside):
+        """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""
+        touch = 2.0 * self.radius
         data = np.zeros((len(net.cells), APART + beside.shape[1]))
         data[:, TOUCH], data[:, DAMPING] = touch, self.damping
         data[:, SCALE] = self.stiffness_on(net) / (math.sqrt(12.0) * touch**3)
@@ -160,13 +165,30 @@ class SelfContact(Table):
         data[:, APART:] = beside
         return np.ascontiguousarray(net.cells, dtype=np.int32), data
 
-    def _refuse_overlap(self, net, cells, data):
-        """Refuse lines that overlap in the web's position."""
-        rest = np.zeros_like(net.points)
-        chosen, rows, numbers = found(0.0, rest, cells, data)
+    def _refuse_too_large(self, net):
+        """Refuse a radius by the size of the web, by some of its elements and by memory, before all pairs are found."""
+        touch, size = 2.0 * self.radius, float(np.linalg.norm(np.ptp(net.points[: net.nodes], axis=0)))
+        if touch >= size:
+            raise InputError(
+                f"radius = {self.radius:g} must be < {0.5 * size:.4g} [m], half the size of the web: all lines would "
+                "touch each other"
+            )
+        if touch < FAR * net.natural_length.max():
+            return
+        cells, data = self._elements(net, np.zeros((len(net.cells), 0)))
+        graph, most = _graph(net), 0
+        for one in np.linspace(0, len(cells) - 1, SOME).astype(np.int64):
+            beside = _reached(graph, cells[one], touch).any(axis=0)[cells].any(axis=1)
+            most = max(most, int(beside.sum()))
+            chosen = np.column_stack([np.full((~beside).sum(), one), np.flatnonzero(~beside)])
+            self._refuse_overlap(net, chosen, *paired(chosen, cells, data))
+        memory.check(8.0 * SOME * most * len(cells), f"radius = {self.radius:g}: neighbours of {len(cells)} elements")
+
+    def _refuse_overlap(self, net, chosen, rows, numbers):
+        """Refuse pairs of lines that overlap in the web's position."""
         if not len(rows):
             return
-        apart = distances(rest, rows, numbers)
+        apart = distances(np.zeros_like(net.points), rows, numbers)
         worst = int(apart.argmin())
         deep = 2.0 * self.radius - apart[worst]
         if deep <= ROUNDING * self.radius:
@@ -192,6 +214,23 @@ def listed(cells, data):
     return np.column_stack([one, other])[~shared].astype(np.int64)
 
 
+def _graph(net):
+    """Lengths of elements between nodes, natural ones at their shortest in the run, a sparse matrix (nodes, nodes)."""
+    from scipy.sparse import coo_array
+
+    ends, lengths = np.sort(net.cells, axis=1), shortest_of(net)
+    order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))
+    shortest = order[np.append(True, (np.diff(ends[order], axis=0) != 0).any(axis=1))]
+    return coo_array((lengths[shortest], ends[shortest].T), shape=(net.nodes, net.nodes)).tocsr()
+
+
+def _reached(graph, nodes, distance):
+    """Which nodes are within a distance of some nodes along the net, shape (nodes given, nodes)."""
+    from scipy.sparse.csgraph import dijkstra
+
+    return np.isfinite(dijkstra(graph, directed=False, indices=nodes, limit=distance * (1.0 + ROUNDING)))
+
+
 def near_along(net, distance):
     """Elements that share no node and are within a distance of each other along the net, shape (elements, most).
 
@@ -200,19 +239,14 @@ def near_along(net, distance):
     cells, count, natural = net.cells, net.nodes, shortest_of(net)
     if distance < natural.min():
         return np.zeros((len(cells), 0))
-    from scipy.sparse import coo_array, csr_array
-    from scipy.sparse.csgraph import dijkstra
+    from scipy.sparse import csr_array
 
-    ends, lengths = np.sort(cells, axis=1), natural
-    order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))
-    shortest = order[np.append(True, (np.diff(ends[order], axis=0) != 0).any(axis=1))]
-    graph = coo_array((lengths[shortest], ends[shortest].T), shape=(count, count)).tocsr()
+    graph = _graph(net)
     meets = csr_array((np.ones(2 * len(cells)), (cells.ravel(), np.repeat(np.arange(len(cells)), 2))))
     reached = []
     for begin in range(0, count, 1000):
         nodes = np.arange(begin, min(begin + 1000, count))
-        away = dijkstra(graph, directed=False, indices=nodes, limit=distance * (1.0 + ROUNDING))
-        one, other = np.nonzero(np.isfinite(away))
+        one, other = np.nonzero(_reached(graph, nodes, distance))
         reached.append(np.column_stack([nodes[one], other]))
     one, other = np.concatenate(reached).T
     close = csr_array((np.ones(len(one)), (one, other)), shape=(count, count))
