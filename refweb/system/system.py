@@ -257,17 +257,13 @@ class System:
 
     def forces(self, t, x, v=None, per_cell=None):
         """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
-        per_cell = self.per_cell() if per_cell is None else per_cell
-        return Forces(self.force_to(per_cell, t, x, self._zero if v is None else v), per_cell)
-
-    def force_to(self, per_cell, t, x, v):
-        """Force on every row [N]; what families show is written to the arrays of ``per_cell``."""
+        v, per_cell = self._zero if v is None else v, self.per_cell() if per_cell is None else per_cell
         f, lines = np.zeros((self.rows, 3)), self.line_data(t)
         for family, out in zip(self.families, per_cell, strict=True):
             family.force(t, x, v, f, family.cells, lines if family.lines else family.data, out)
         if self.carriers:
             self.carriers.hand_on(x, f)
-        return f
+        return Forces(f, per_cell)
 
     def force_of(self, family, t, x, v=None):
         """Force on every row of one family [N]."""
@@ -277,11 +273,9 @@ class System:
 
     def outer_force(self, t, x=None, v=None):
         """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
-        outer, x = np.zeros((self.rows, 3)), self._zero if x is None else x
-        for family in self.families:
-            if not family.internal:
-                outer += self.force_of(family, t, x, v)
-        return outer
+        x = self._zero if x is None else x
+        outer = [self.force_of(family, t, x, v) for family in self.families if not family.internal]
+        return sum(outer, np.zeros((self.rows, 3)))
 
     @cached_property
     def links(self):

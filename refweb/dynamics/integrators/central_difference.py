@@ -198,7 +198,7 @@ class CentralDifference(Integrator):
         """The `ExplicitCourse` of a checkpoint; families show what they do there."""
         self.prepare()
         course, self._taken = ExplicitCourse.of_arrays(arrays), None
-        self.system.force_to(self._outs, course.time, course.x, course.v)
+        self.system.forces(course.time, course.x, course.v, self._outs)
         return course
 
     @property

@@ -181,7 +181,7 @@ class StepObserver(Integrator):
     def force_at(self, t, x, v):
         """Force on each unknown [N] at a state of all rows."""
         self.stats["nfev"] += 1
-        rows = self.system.force_to(self._shown, t, x, v)
+        rows = self.system.forces(t, x, v, self._shown).force
         force = rows.ravel()[self.system.free]
         if self._wrong is None and not np.isfinite(force.sum()):
             self._wrong = t, rows
