@@ -84,6 +84,11 @@ class Carried:
         """Rows that are coupled, each of shape (1, rows)."""
         return [np.array([cell.rows], dtype=np.int32) for cell in self._cells]
 
+    def moving(self, rows):
+        """Rows whose motion is that of some rows: of each node that is carried its body, of any other itself."""
+        bodies = dict(zip(self.turns.carried[:, 0].tolist(), self.turns.carried[:, 1].tolist(), strict=True))
+        return [int(self.turns.rows[bodies[row], 0]) if row in bodies else row for row in rows]
+
     def carry(self, x, v):
         """Write places and velocities of the nodes, shape (rows, 3)."""
         carry(x, v, self.turns)

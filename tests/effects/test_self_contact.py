@@ -563,6 +563,35 @@ def test_lines_that_are_moved_through_each_other_are_refused_without_a_stiffness
             refweb.run(one, progress=False)
 
 
+def on_boxes(bodies, speed, stiffness):
+    """A line of a box that comes down on that of another box, which is crossed and lies 20 mm below."""
+    points = [(-0.5, 0, 0), (0.5, 0, 0), (0, -0.5, 0.02), (0, 0.5, 0.02)]
+    lower = {"name": "lower", "position": [-0.52, 0, 0], **bodies}
+    upper = {"name": "upper", "position": [0, -0.52, 0.02], "velocity": [0, 0, -speed], **bodies}
+    boxes = [{"shape": "box", "size": [0.01] * 3, **body} for body in (lower, upper)]
+    return refweb.Scene.from_dict(
+        dict(
+            web={"kind": "inline", "points": points, "lines": [[0, 1], [2, 3]]},
+            cable={"law": "tension-only", "modulus": 7e7, "area": 1e-6, "density": 1000.0},
+            body=boxes,
+            attach=[{"body": "lower", "node": [0, 1]}, {"body": "upper", "node": [2, 3]}],
+            self_contact={"radius": 5e-3, "stiffness": stiffness},
+            solve={"kind": "dynamic", "duration": 0.1},
+            output={"interval": 2e-3},
+            accuracy={"error": "none"},
+        )
+    )
+
+
+def test_lines_that_free_bodies_carry_have_the_mass_of_these():
+    """They are no supports: two boxes of 2 kg that come at 1 m/s have the energy ½ (2·2/(2 + 2)) 1² = 0.5 J."""
+    with pytest.raises(SolverError, match="lines 0 and 1 overlap") as caught:
+        refweb.run(on_boxes({"mass": 2.0}, 1.0, 10.0), progress=False)
+    assert "prescribed" not in str(caught.value)
+    enough = float(re.search(r"stiffness = (\S+)", str(caught.value))[1])
+    refweb.run(on_boxes({"mass": 2.0}, 1.0, 2.0 * enough), progress=False)
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_certified_runs_keep_linking_numbers(seed):
     """Four loops of random planes about one place, thrown at random: linked or not, they stay so.

@@ -241,8 +241,8 @@ class Overlaps:
             least = first_stiffness(self.system, body, exponent, self._load_steps)
         if self._moving and time == 0.0:
             self._initial[i] = overlap
-        net, supported = self.system.net, self.system.supported
-        held = overlap > allowed(body) and bool(supported[[body.row, *net.cells[net.line == line].ravel()]].all())
+        net, unmoved = self.system.net, self.system.held
+        held = overlap > allowed(body) and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
         own = stiffness, exponent, self._moving, least, body.name in self._chosen, self._initial[i], held
         return Deepest(body, overlap, time, line, *own)
 

@@ -53,12 +53,17 @@ def holding(energy, radius):
 def would_pass(system, v, nodes):
     """That two lines would pass, and which stiffness would hold them; ``nodes (4,)`` are those of both.
 
-    It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v.
+    It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v. A node that a body
+    carries comes with the mass of the body.
     """
-    held, pairs = system.supported.all(axis=1), np.reshape(nodes, (2, 2))
+    held, pairs = system.held.all(axis=1), np.reshape(nodes, (2, 2))
     crossing = system.families[pressed(system)].crossing
     given = f"{lines_of(system.net, nodes)} would pass through each other"
-    heavy = [np.inf if held[pair].all() else system.net.mass[pair[~held[pair]]].sum() for pair in pairs]
+    heavy = []
+    for pair in pairs:
+        free = pair[~held[pair]].tolist()
+        rows = list(set(system.carriers.moving(free) if system.carriers else free))
+        heavy.append(system.net.mass[rows].sum() if free else np.inf)
     mass = 1.0 / (1.0 / heavy[0] + 1.0 / heavy[1]) if np.isfinite(heavy).any() else np.inf
     speed = max(float(np.linalg.norm(v[i] - v[k])) for i in pairs[0] for k in pairs[1])
     if np.isinf(mass):
@@ -173,7 +178,7 @@ class Passage:
         own = self._elements[cell]
         names = " and ".join(str(n) for n in self._system.net.line[own].ravel().tolist()) if own.ndim else None
         names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
-        if own.ndim and self._system.supported[self._system.net.cells[own]].all():
+        if own.ndim and self._system.held[self._system.net.cells[own]].all():
             raise SolverError(
                 f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}: {PRESCRIBED}"
             )

@@ -229,7 +229,7 @@ def damped(system):
     matrix = system.pattern.matrix(values)
     matrix = (matrix + matrix.T).tocsc()
     matrix.sort_indices()
-    system.damping = lambda t, x, v, blocks: matrix.data
+    system.damping = lambda t, x, v, blocks=None: matrix.data
     return system
 
 
@@ -746,8 +746,8 @@ def test_a_number_that_is_not_finite_is_named(capfd, monkeypatch, method, linear
     own, system = System.forces, small(size=3)
     (node, *_), from_now = np.flatnonzero(~system.supported.all(axis=1))[::-1], 0.3 * END
 
-    def forces(self, t, x, v=None):
-        found = own(self, t, x, v)
+    def forces(self, t, x, v=None, per_cell=None):
+        found = own(self, t, x, v, per_cell)
         found.force[node] += np.nan if t > from_now else 0.0
         return found
 
