@@ -5,6 +5,7 @@
 `records`, `tables`  what kernels take by one pointer
 `keys`               what the machine code of a kernel depends on
 `store`              where it is kept: a folder of the user's, and one in the package of a wheel
+`second_process`     a copy of the process that compiles as well, from the other end of a list
 `numba_internals`    all that relies on private parts of numba, each with its reason and a way without it
 ===================  ==========================================================================================
 """

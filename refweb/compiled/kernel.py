@@ -18,6 +18,7 @@ from typing import Annotated, Any
 from numba import types
 
 from . import keys, numba_internals, watchers
+from .second_process import beside
 
 COMMON = {"error_model": "numpy", "fastmath": {"contract"}, "nogil": True}
 """Options of all kernels: products and sums may contract, nothing else departs from IEEE arithmetic."""
@@ -224,8 +225,9 @@ def prepare(kernels, features=None):
         See `needed`.
     """
     wanted = [one for one in needed(kernels, features) if one.signature is not None]
-    new = {one.name: n for n, one in enumerate([one for one in wanted if watchers and not one.known()])}
-    with _no_collection():
+    unknown = [one for one in wanted if not one.known()]
+    new = {one.name: n for n, one in enumerate(unknown)}
+    with _no_collection(), beside(unknown):
         for one in wanted:
             for tell in watchers if one.name in new else ():
                 tell(new[one.name], len(new))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 import time
 
 from ..errors import SolverError
@@ -32,16 +33,21 @@ def _compiling():
     return listener
 
 
+def _cpu():
+    """CPU time of this process and of those that it has begun and that have ended [s]."""
+    return time.process_time() + sum(os.times()[2:4])
+
+
 class Clock:
     """CPU and wall time since it was made, and what of it kernels took to compile."""
 
     def __init__(self):
-        self._cpu, self._wall, self._compiled = time.process_time(), time.perf_counter(), _compiling().seconds
+        self._cpu, self._wall, self._compiled = _cpu(), time.perf_counter(), _compiling().seconds
 
     def spent(self):
         """What has passed since, ``cpu_s``, ``wall_s`` and ``compile_s`` [s]."""
         return {
-            "cpu_s": time.process_time() - self._cpu,
+            "cpu_s": _cpu() - self._cpu,
             "wall_s": time.perf_counter() - self._wall,
             "compile_s": _compiling().seconds - self._compiled,
         }

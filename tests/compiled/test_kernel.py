@@ -277,3 +277,49 @@ def test_of_processes_that_want_a_kernel_at_once_one_compiles_it(tmp_path):
         assert all(process.poll() is None for process in both)
     (tmp_path / "go").write_text("go")
     assert sorted(process.communicate()[0] for process in both) == ["0\n", "1\n"]
+
+
+MANY = """
+import os, sys, time
+from numba.core import event
+from refweb.compiled import kernel as kernels
+from refweb.compiled.second_process import beside
+from refweb.kernels import kernel
+
+def made_of(number):
+    @kernel(apart=())
+    def one(value: float) -> float:
+        return number * value
+    return one
+
+seen = event.RecordingListener()
+event.register("numba:compile", seen)
+many = [made_of(float(n)) for n in range(10)]
+try:
+    with beside(many):
+        while sys.argv[1] == "wait" and not all(one.known() for one in many):
+            time.sleep(0.001)
+        if sys.argv[1] == "end":
+            raise KeyboardInterrupt
+except KeyboardInterrupt:
+    print("ended")
+try:
+    os.waitpid(-1, 0)
+except ChildProcessError:
+    print("alone")
+kernels.prepare(many)
+print(len([1 for _, e in seen.buffer if e.is_start]), *(one(2.0) for one in many))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no second process there")
+@pytest.mark.skipif(len(getattr(os, "sched_getaffinity", lambda _: [0])(0)) < 2, reason="one core")
+@pytest.mark.parametrize("what, words, most", [("wait", ["alone"], 0), ("end", ["ended", "alone"], 10)])
+def test_a_second_process_compiles_the_same_and_none_is_left(tmp_path, what, words, most):
+    """A block that waits finds all there, and one that is interrupted ends the second process."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "REFWEB_CACHE": str(tmp_path / "cache")}
+    environment.pop("REFWEB_COMPILERS", None)
+    done = subprocess.run([sys.executable, "-c", MANY, what], env=environment, capture_output=True, text=True)
+    *told, count = done.stdout.split()[:-10]
+    assert told == words and int(count) <= most and done.stderr == ""
+    assert done.stdout.split()[-10:] == [str(2.0 * n) for n in range(10)]
