@@ -531,8 +531,8 @@ MUTANTS = [
     Mutant("net/mesh_file", "np.flatnonzero(broken[of])", "np.zeros(0, dtype=np.int64)"),
     Mutant(
         "system/system",
-        "per_cell = self.per_cell() if",
-        "per_cell = self.__dict__.setdefault('one', self.per_cell()) if",
+        "self.per_cell() if per_cell is",
+        "self.__dict__.setdefault('one', self.per_cell()) if per_cell is",
     ),
     Mutant("system/torn", "other.families.append(held(net))", "pass"),
     Mutant(

@@ -7,10 +7,10 @@ that it exports are imported when they are used.
 """
 
 import ast
-import pathlib
 import re
 
 import pytest
+from import_graph import MODULES, PACKAGES, at_head, imports, uses
 
 import refweb
 from refweb.registry import EFFECTS
@@ -95,67 +95,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     ("commands", "*", "The verbs of the command line, one file each; they know everything, and nothing knows them."),
     ("the door", "__main__", ""),
 ]
-ROOT = pathlib.Path(refweb.__file__).parent
 EFFECT = re.compile(r"(?:refweb\.)?effects\.([\w.]+)")
-
-
-def name_of(path):
-    """Name of a module below the package, "" for the package itself."""
-    parts = path.relative_to(ROOT).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def parsed(path):
-    """What runs of a file: without what stands there for type checkers alone."""
-
-    class Running(ast.NodeTransformer):
-        def visit_If(self, node):
-            self.generic_visit(node)
-            return node.orelse if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING" else node
-
-    return Running().visit(ast.parse(path.read_text(encoding="utf-8")))
-
-
-MODULES = {name_of(path): parsed(path) for path in sorted(ROOT.rglob("*.py"))}
-PACKAGES = {name_of(path) for path in ROOT.rglob("__init__.py")}
-
-
-def imported(name, node):
-    """Absolute names that an import statement asks for; those of refweb begin with "refweb."."""
-    if isinstance(node, ast.Import):
-        return [alias.name for alias in node.names]
-    base = node.module or ""
-    if node.level:
-        here = ["refweb", *name.split(".")] if name else ["refweb"]
-        here = here if name in PACKAGES else here[:-1]
-        base = ".".join([*here[: len(here) - node.level + 1], *filter(None, [base])])
-    return [f"{base}.{alias.name}" for alias in node.names]
-
-
-def imports(name, tree=None):
-    """Absolute names of all imports in a module."""
-    nodes = ast.walk(MODULES[name] if tree is None else tree)
-    return [found for node in nodes if isinstance(node, ast.Import | ast.ImportFrom) for found in imported(name, node)]
-
-
-def at_head(tree):
-    """Statements that run when a module is imported."""
-    for node in tree.body:
-        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
-            yield node
-        elif isinstance(node, ast.ClassDef):
-            yield from at_head(node)
-
-
-def uses(name):
-    """Modules of the package that a module imports, the longest name that is one."""
-    found = set()
-    for absolute in imports(name):
-        parts = absolute.split(".")
-        if parts[0] == "refweb":
-            below = [".".join(parts[1:end]) for end in range(len(parts), 0, -1)]
-            found.add(next(module for module in below if module in MODULES))
-    return found
 
 
 def texts(name):

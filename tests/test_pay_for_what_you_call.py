@@ -1,12 +1,13 @@
 """What a scene does not call for is not there: no module of it is loaded, no entry of the tangent and no kernel waits.
 
-Modules are those of a process of its own that runs one scene and nothing else. Entries of the pattern are counted from
-the lines of the web and the pairs that an effect couples, kernels from what the compiled loop is called with.
+Modules are those of a process of its own that runs one scene and nothing else: what its tables name in the registry,
+what is imported inside functions for a reason that its tables give, and all that these import at their heads. Entries
+of the pattern are counted from the lines of the web and the pairs that an effect couples, kernels from what the
+compiled loop is called with.
 """
 
 import importlib.util
 import json
-import pathlib
 import subprocess
 import sys
 import tomllib
@@ -14,131 +15,18 @@ from functools import cache
 
 import numpy as np
 import pytest
+from import_graph import loaded_with
 
 import refweb
 from refweb.dynamics.integrators import central_difference
 from refweb.kernels import Functions, Record
-from refweb.registry import EFFECTS, OBSERVABLES, SHAPES, WEBS, load
+from refweb.registry import EFFECTS, INTEGRATORS, OBSERVABLES, SHAPES, STATICS, WEBS, load
 from refweb.scene import SHIPPED_SCENES
-
-ROOT = pathlib.Path(refweb.__file__).parent
-MODULES = {".".join(p.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__") for p in ROOT.rglob("*.py")}
 
 # Modules
 
-EVERY = {
-    "accepted",
-    "errors",
-    "messages",
-    "tables",
-    "kernels",
-    "memory",
-    "settings",
-    "registry",
-    "scene",
-    "build",
-    "runner",
-}
-EVERY |= {
-    "net",
-    *(f"net.{name}" for name in ("net", "discretisation", "elements", "tension_laws", "cable", "web", "groups")),
-}
-EVERY |= {"net.rigid_body", "effects.line_kernels", "compiled"}
-EVERY |= {f"compiled.{name}" for name in ("kernel", "keys", "numba_internals", "records", "store", "tables")}
-EVERY |= {
-    "solution",
-    "results",
-    "effects",
-    "effects.base",
-    "effects.elasticity",
-    "system",
-    "system.system",
-    "system.forces",
-    "system.start",
-}
-EVERY |= {
-    f"results.{name}"
-    for name in (
-        "columns",
-        "state",
-        "solution",
-        "folder",
-        "files",
-        "vtu",
-        "vtu_file",
-        "provenance",
-        "progress",
-        "run_status",
-    )
-}
-EVERY |= {f"results.observables{name}" for name in ("", ".observe", ".observable")}
-"""What every scene needs: a web, its lines and their law, a system, results; bodies without their shapes."""
-TANGENT = {"system.sparsity", "system.factorization"}
-STATICS = {"statics", "statics.equilibrium", "system.at_rest", "system.unsupported_parts"}
-LOAD_STEPS = {"statics.simulation", "statics.remarks"}
-NEWTON = (
-    STATICS
-    | TANGENT
-    | {"statics.load_steps", "statics.newton", "statics.bars", "statics.floating", "statics.energy_search"}
-)
-NEWTON |= {"system.conjugate_gradients"}
-DYNAMICS = {"dynamics", "dynamics.integrators", "results.probes", "results.observables.book"}
-DYNAMICS |= {
-    f"dynamics.{name}" for name in ("budget", "simulation", "history", "schedule", "accuracy_loop", "initial_state")
-}
-DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("integrator", "energy_book", "momentum_book", "crossings")}
-DYNAMICS |= {f"dynamics.integrators.{name}" for name in ("averages", "events", "extremes")} | {"net.rotation"}
-LOOP = ("central_difference", "explicit_loop", "between_steps", "rows", "step", "step_bound")
-LOOP += (
-    "records",
-    "rubbed",
-    "nearby",
-    "guard",
-    "contacts",
-    "features",
-    "observed",
-    "room",
-    "spread",
-    "explicit_course",
-)
-EXPLICIT = {f"dynamics.integrators.{name}" for name in LOOP} | {"net.rotation_bounds", "system.contact_forces"}
-AROUND_STEPS = (
-    "step_observer",
-    "observed_course",
-    "step_limits",
-    "simpson_book",
-    "measurements",
-    "event_search",
-    "tolerances",
-)
-SUNDIALS = TANGENT | {"system.mass"} | {f"dynamics.integrators.{name}" for name in ("sundials", *AROUND_STEPS)}
-METHOD = {
-    "newton": NEWTON | LOAD_STEPS,
-    "relaxation": STATICS | LOAD_STEPS | {"statics.dynamic_relaxation"},
-    "central-difference": DYNAMICS | EXPLICIT,
-    "cvode": DYNAMICS | SUNDIALS | {"dynamics.integrators.cvode"},
-    "ida": DYNAMICS | SUNDIALS | {"dynamics.integrators.ida"},
-}
-TABLES_OF_TIME = {"effects.time_tables"}
-BELOW = {name: TABLES_OF_TIME | {"effects.outer_load"} for name in ("load", "pressure", "thrust")}
-BELOW |= {"motion": TABLES_OF_TIME}
-BELOW |= {name: TABLES_OF_TIME | {"effects.length_factor"} for name in ("reel", "temperature")}
-VECTORS = {"effects.vectors"}
-CONTACT = "nearest_point", "overlap", "pair", "passing"
-BELOW |= {"contact": {"effects.contact", *(f"effects.contact.{name}" for name in CONTACT)}}
-BELOW["contact"] |= VECTORS | {"net.rotation", "system.contact_forces"}
-FOLLOWED = {"dynamics.integrators.followed_lines", "dynamics.integrators.followed_bodies"}
-LINES_ON_LINES = ("", ".crossing", ".pair", ".passage", ".press", ".search", ".smeared")
-BELOW["self_contact"] = VECTORS | {f"effects.self_contact{name}" for name in LINES_ON_LINES}
-BELOW |= {name: {"effects.turning_axes"} for name in ("frame", "orbit")}
-BELOW |= {"bending": VECTORS, "drag": VECTORS | {f"effects.drag{name}" for name in ("", ".force", ".kick")}}
-MESH = {"net.boundary", *(f"net.boundary.{name}" for name in ("closed", "crossings", "distances", "field"))}
-MESH |= {"net.boundary.surface_file", "net.mesh_readers", "effects.contact.several"}
+MESH = ("closed", "crossings", "distances", "field", "surface_file")
 """What a body from a file of triangles is made of."""
-GENERAL = {"effects.contact.places", "effects.contact.tumbling", "net.grown_core"}
-"""What effects are made of besides their own file."""
-OBSERVED = {"reaction": {"results.observables.nodal"}}
-"""What observables are made of besides their own file."""
 DEFAULT = [{"quantity": quantity} for quantity in ("displacement", "stress", "tension")]
 """What a scene observes that does not say."""
 BASE = ("numpy", "numba", "numba.core.typing.cffi_utils", "platformdirs")
@@ -165,73 +53,97 @@ def brought(*names):
     return libraries(run(*(f"import {name}" for name in names)))
 
 
+def registered(reference):
+    """Module of an entry of the registry."""
+    return reference.split(":")[0].removeprefix("refweb.")
+
+
+def roots(given, method):
+    """Modules that a scene calls for by its tables: entries of the registry, and what is imported inside functions."""
+    static, bodies, contact = given["solve"]["kind"] == "static", given.get("body", ()), given.get("contact")
+    law, follower, spun = (
+        given["cable"]["law"],
+        given.keys() & {"pressure", "thrust"},
+        given.keys() & {"frame", "orbit"},
+    )
+    law, shapes = given["cable"]["law"], [body.get("shape", "sphere") for body in bodies]
+    yield from ("runner", "build", "net.cable", "results.observables.observe")
+    yield from ("statics.simulation", "statics.remarks") if static else ("dynamics.simulation",)
+    yield registered(STATICS[method] if static else INTEGRATORS[method].integrator)
+    yield registered(WEBS[given["web"]["kind"]])
+    yield from (registered(EFFECTS[effect]) for effect in given.keys() & EFFECTS.keys())
+    yield from (registered(OBSERVABLES[observe["quantity"]]) for observe in given.get("observe", DEFAULT))
+    yield from (registered(SHAPES[shape]) for shape in shapes)
+    if given["web"].get("path", "").endswith(".csv"):
+        yield "net.csv_files"
+    if "fold" in given or "positions" in given["web"]:
+        yield "effects.fold"
+    if "attach" in given:
+        yield "system.carried"
+    if "throw" in given:
+        yield "results.throw"
+    if any(shape in ("cylinder", "box") and not body.get("fixed") for shape, body in zip(shapes, bodies, strict=True)):
+        yield from ("net.solid", *(["effects.turning_bodies"] if spun else []))
+    if "mesh" in shapes:
+        yield from ("effects.contact.several", *(f"net.boundary.{name}" for name in MESH))
+    if len(bodies) > 1 and not (contact or {}).get("between_bodies"):
+        yield "effects.contact.silent"  # bodies that overlap in silence
+    if "self_contact" in given:
+        yield from (f"effects.self_contact.{name}" for name in ("crossing", "passage", "press"))
+    if not static and given.get("accuracy", {}).get("error") != "none":
+        yield "dynamics.twin_error"
+    if contact is not None:
+        yield from contact_roots(contact, shapes, static)
+    if method in ("cvode", "ida"):
+        yield from ("system.sparsity", "system.contact_forces")
+        yield from ["dynamics.integrators.followed_bodies"] if contact is not None else []
+        yield from ["dynamics.integrators.followed_lines"] if "self_contact" in given else []
+    if not static and given["solve"].get("start") != "equilibrium":
+        return
+    yield from ("statics.remarks", "system.sparsity", "system.unsupported_parts")
+    if method != "relaxation":
+        yield "statics.load_steps"
+    if spun:
+        yield "statics.critical_speed"
+    elif law == "tension-only":
+        yield "statics.duality_bound"
+    if law == "linear":  # bars, which may snap through
+        yield "statics.other_side"
+    if law != "tension-only" or follower or spun or contact is not None:
+        yield "statics.stability"  # the energy is not convex
+    if follower:
+        yield "statics.residual_search"
+    elif len(given["solve"].get("load_steps", [1.0])) > 1 and law == "tension-only" and not bodies:
+        yield "statics.predictor"
+
+
+def contact_roots(contact, shapes, static):
+    """The same of contact."""
+    keys = contact.keys() | {key for own in contact.get("bodies", {}).values() for key in own}
+    yield from ("statics.passage",) if static else ("effects.contact.passage", "results.observables.overlap")
+    if keys & {"damping", "friction"}:
+        yield "effects.contact.rubbing"
+    elif "exponent" in keys or set(shapes) != {"sphere"}:
+        yield "effects.contact.penalty"
+    if keys & {"damping", "friction", "exponent"} and "mesh" not in shapes or set(shapes) - {"sphere", "mesh"}:
+        yield "net.grown_core"  # a surface of triangles has no core of its own
+    if "sphere" in shapes and "exponent" not in keys:
+        yield "effects.contact.sphere"
+
+
 def called(given):
     """(modules of refweb, libraries) that a scene calls for, from its tables."""
-    solve, web, tension_only = given["solve"], given["web"]["kind"], given["cable"]["law"] == "tension-only"
+    solve, web = given["solve"], given["web"]["kind"]
     method = solve.get("method", "newton" if solve["kind"] == "static" else "central-difference")
-    modules, outside = EVERY | METHOD[method], list(BASE)
-    modules.add(WEBS[web].split(":")[0].removeprefix("refweb."))
-    for effect in given.keys() & EFFECTS.keys():
-        modules |= {EFFECTS[effect].split(":")[0].removeprefix("refweb.")} | BELOW.get(effect, set())
-    for quantity in (observe["quantity"] for observe in given.get("observe", DEFAULT)):
-        modules |= {OBSERVABLES[quantity].split(":")[0].removeprefix("refweb.")} | OBSERVED.get(quantity, set())
-    if given["web"].get("path", "").endswith(".csv"):
-        modules.add("net.csv_files")
-    if "fold" in given or "positions" in given["web"]:
-        modules |= {"effects.fold", "net.folding"}
-    if "self_contact" in given and method in ("cvode", "ida"):
-        modules.add("dynamics.integrators.followed_lines")
-    modules |= {"system.carried"} if "attach" in given else set()
-    modules |= {"results.throw"} if "throw" in given else set()
-    for body in given.get("body", ()):
-        if body.get("shape") in ("cylinder", "box") and not body.get("fixed"):
-            modules |= {"net.shapes.rounding", "net.solid"}
-            modules |= {"effects.turning_bodies", *VECTORS} if {"frame", "orbit"} & given.keys() else set()
-        modules |= MESH if body.get("shape") == "mesh" else set()
-        modules |= {"net.shapes", SHAPES[body.get("shape", "sphere")].split(":")[0].removeprefix("refweb.")}
-    if len(given.get("body", ())) > 1 and not given.get("contact", {}).get("between_bodies"):
-        modules |= {"effects.contact", "effects.contact.silent", "net.skeleton"}  # bodies that overlap in silence
-    if "contact" in given and solve["kind"] == "dynamic":
-        modules |= {"effects.contact.passage"}
-        modules |= FOLLOWED if method in ("cvode", "ida") else set()
-    if "contact" in given:
-        modules.add("results.observables.overlap" if solve["kind"] == "dynamic" else "statics.passage")
-        keys = given["contact"].keys() | {key for own in given["contact"].get("bodies", {}).values() for key in own}
-        general = "exponent" in keys or any(body.get("shape", "sphere") != "sphere" for body in given["body"])
-        if keys & {"damping", "friction"}:
-            modules |= {"effects.contact.friction", "effects.contact.rubbing", "effects.contact.penalty", *GENERAL}
-            modules.add("effects.kicks")
-            if any(body.get("shape") == "mesh" for body in given["body"]):  # which has no core of its own
-                modules -= {"net.grown_core"}
-        elif general:
-            modules |= {"effects.contact.penalty", *GENERAL}
-        if any(body.get("shape", "sphere") == "sphere" for body in given["body"]) and not keys & {"exponent"}:
-            modules.add("effects.contact.sphere")
+    modules, outside = loaded_with(roots(given, method)), list(BASE)
     rests = solve["kind"] == "static" or solve.get("start") == "equilibrium"
-    if solve["kind"] == "dynamic" and given.get("accuracy", {}).get("error") != "none":
-        modules.add("dynamics.twin_error")
-    if rests:
-        modules.add("statics.remarks")
-        if method != "relaxation":
-            modules |= NEWTON
-        if {"frame", "orbit"} & given.keys():
-            modules |= TANGENT | {"statics.critical_speed"}
-        elif tension_only:
-            modules |= TANGENT | {"statics.duality_bound", "statics.floating"}
-        if given["cable"]["law"] == "linear":  # bars, which may snap through
-            modules |= TANGENT | {"statics.other_side"}
-        if not tension_only or given.keys() & {"pressure", "thrust", "frame", "orbit", "contact"}:
-            modules |= TANGENT | {"statics.stability"}  # the energy is not convex
-        if given.keys() & {"pressure", "thrust"}:
-            modules.add("statics.residual_search")
-        elif len(solve.get("load_steps", [1.0])) > 1 and tension_only and not given.keys() & {"body"}:
-            modules.add("statics.predictor")
+    factorized = "system.factorization" in modules
     if given["cable"].get("order", 1) > 1:
         modules.add("net.curved")
         outside.append("skfem")
-    if "mesh" not in given["web"] or "self_contact" in given or rests or modules >= TANGENT:  # parts, neighbours
+    if "mesh" not in given["web"] or "self_contact" in given or rests or factorized:  # parts, neighbours
         outside.append("scipy.sparse.csgraph")
-    if modules >= TANGENT:
+    if factorized:
         outside.append("qdldl")
         if given["web"].get("mesh") == "hexagon" and importlib.util.find_spec("rslab"):
             outside.append("rslab")  # of more unknowns than any other
@@ -262,8 +174,6 @@ SCENES["by relaxation"] = brief("catenary", method="relaxation")
 SCENES["by relaxation"]["cable"] |= {"law": "linear"}
 
 
-INDEXED = {"effects.contact.pressing", "net.skeleton"}
-"""What may come along from the disk: the index of a kernel names all types that it was ever compiled for."""
 ALIKE = ("triangle-impact", "hexagon-impact", "square-oblique-impact", "triangle-load", "hexagon-load")
 """Scenes that call for what others of the same kind call for, on another web."""
 
@@ -272,12 +182,11 @@ ALIKE = ("triangle-impact", "hexagon-impact", "square-oblique-impact", "triangle
 def test_a_run_loads_what_its_scene_calls_for(name):
     given = SCENES[name]
     modules, outside = called(given)
-    assert modules <= MODULES
     loaded = run(
         "import refweb",
         f"refweb.run(refweb.Scene.from_dict(json.loads({json.dumps(given)!r}), {str(SHIPPED_SCENES)!r}))",
     )
-    own = {m.removeprefix("refweb.") for m in loaded if m.startswith("refweb.")} - (INDEXED - modules)
+    own = {m.removeprefix("refweb.") for m in loaded if m.startswith("refweb.")}
     assert own == modules, f"not called for: {sorted(own - modules)}, not seen: {sorted(modules - own)}"
     assert libraries(loaded) <= brought(*outside), sorted(libraries(loaded) - brought(*outside))
 
