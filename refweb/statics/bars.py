@@ -52,7 +52,7 @@ class Bars:
         if not (width > 0.0 and slack.any()):
             return np.zeros_like(self._strain)
         root = np.sqrt(self._strain**2 + 4.0 * width**2)
-        return np.where(slack, self.stiffness * 2.0 * width**2 / ((root - self._strain) * root), 0.0)
+        return np.where(slack, self.stiffness * 2.0 * width**2 / ((root + abs(self._strain)) * root), 0.0)
 
     def besides(self, tension, along):
         """What other tensions make of the stiffness across the bars, and a stiffness ``along`` them that is added.
