@@ -70,8 +70,8 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
     supported = _supported(net, supports, support)
     system = System(net, [Elasticity(), *_acting(effects)], supported, solve.factorization)
     if len(net.web.broken):
-        from .system.at_rest import refuse_broken
-        from .system.torn import with_broken_lines
+        from .system.broken_lines import with_broken_lines
+        from .system.static_system import refuse_broken
 
         with refused_at("[web]"):
             system = with_broken_lines(system)

@@ -16,11 +16,11 @@ class SolverError(RuntimeError):
     """A solver that found no answer; the message says what, where and when."""
 
 
-class NoEnd(SolverError):
+class IntegrationError(SolverError):
     """A method of dynamics cannot finish a scene; another method may."""
 
 
-class OpenBook(NoEnd):
+class EnergyDriftError(IntegrationError):
     """The energy of a run drifted away from the work done on it, or its momentum from the impulses that it was given.
 
     ``drift`` says how far, over the largest energy or momentum.
@@ -31,7 +31,7 @@ class OpenBook(NoEnd):
         self.drift = drift
 
 
-class TooSoft(SolverError):
+class PenetrationError(SolverError):
     """A run whose contact, of a stiffness that refweb chose, lets lines too deep into bodies.
 
     ``stiffness`` is what each of these bodies is to have instead [N/m^p], by name.

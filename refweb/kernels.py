@@ -5,36 +5,37 @@ mixture of them without Python, and every other solver calls the same code. ``x`
 each row from its reference position: with the strain formula of `refweb.effects.elasticity` a net under 1e-9 N keeps
 all its digits, which it loses when positions are the unknowns.
 
-=============  ==========================================================================================
-`FORCE`        ``(t, x, v, f, cells, data, out)``: adds forces [N] to ``f``, writes ``out`` per cell
-`ENERGY`       ``(t, x, cells, data, out)``: writes the energy [J] of each cell to ``out (c,)``
-`STIFFNESS`    ``(t, x, v, blocks, cells, data, definite)``: writes −∂f/∂x [N/m] per cell; ``definite`` asks for
-               a positive semidefinite part
-`BOUND`        ``(reach, speed, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of |K|
-               [N/m], for all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most
-`LINES`        ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
-`IMPULSE`      ``(t, x, cells, data, total)``: adds ∫F dt [N s], F the sum of the forces of all cells, to ``total
-               (3,)``, but for a constant
-`MEET`         ``(h, x, v, inverse, cells, data, touches, begin)``: writes what touches to rows of ``touches`` from
-               ``begin`` on, for a kick of size h from velocities v, ``inverse (rows, 3)`` being 1/m, 0 where a support
-               holds; the row behind them, also where ``touches`` has no room for all
-`KEPT`         ``(number, memory, f, touches, begin, end)``: adds to f the forces of what touched in the step before
-               this one, of a ``number`` > 0
-`SWEEP`        ``(h, number, f, inverse, touches, count)``: solves contacts one after the other and adds what their
-               forces change by to f; the largest change of a velocity in a kick [m/s]
-`GIVE`         ``(number, memory, v, touches, begin, end, out)``: notes forces in the ``memory`` of a step, and writes
-               the power of each cell to ``out`` [W], with the force that a body feels [N] where families show it
-`NEAR`         ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come nearer
-               by ``skin`` [m] to ``chosen``; their number
-`MEETS`        ``(room, way, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come nearer
-               than ``room`` [m] in a drift behind a kick, in which rows come nearer by ``way`` [m] at most, with
-               ``inverse`` as in `MEET`; its rows are written to ``met``
-`WATCH`        ``(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells that are
-               looked at when their turn comes: ``due`` has the way of all drifts after which that is, behind them that
-               way itself, what it may come to with those that are ``chosen``, the last of which is their number, and
-               how far the turn of the next is at least
-`SOON`         ``(x, v, cells, data)``: time in which no cell comes much nearer [s]
-=============  ==========================================================================================
+=================  ===================================================================================================
+`FORCE`            ``(t, x, v, f, cells, data, out)``: adds forces [N] to ``f``, writes ``out`` per cell
+`ENERGY`           ``(t, x, cells, data, out)``: writes the energy [J] of each cell to ``out (c,)``
+`STIFFNESS`        ``(t, x, v, blocks, cells, data, definite)``: writes −∂f/∂x [N/m] per cell; ``definite`` asks for a
+                   positive semidefinite part
+`BOUND`            ``(reach, speed, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of
+                   |K| [N/m], for all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most
+`LINES`            ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
+`IMPULSE`          ``(t, x, cells, data, total)``: adds ∫F dt [N s], F the sum of the forces of all cells, to ``total
+                   (3,)``, but for a constant
+`DETECT`           ``(h, x, v, inverse, cells, data, touches, begin)``: writes what touches to rows of ``touches``
+                   from ``begin`` on, for a kick of size h from velocities v, ``inverse (rows, 3)`` being 1/m, 0 where
+                   a support holds; the row behind them, also where ``touches`` has no room for all
+`WARM_START`       ``(number, memory, f, touches, begin, end)``: adds to f the forces of what touched in the step
+                   before this one, of a ``number`` > 0
+`GAUSS_SEIDEL`     ``(h, number, f, inverse, touches, count)``: solves contacts one after the other and adds what
+                   their forces change by to f; the largest change of a velocity in a kick [m/s]
+`COMMIT`           ``(number, memory, v, touches, begin, end, out)``: notes forces in the ``memory`` of a step, and
+                   writes the power of each cell to ``out`` [W], with the force that a body feels [N] where families
+                   show it
+`NEAR`             ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come
+                   nearer by ``skin`` [m] to ``chosen``; their number
+`MEETS`            ``(room, way, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come
+                   nearer than ``room`` [m] in a drift behind a kick, in which rows come nearer by ``way`` [m] at
+                   most, with ``inverse`` as in `DETECT`; its rows are written to ``met``
+`CCD_NEIGHBOURS`   ``(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells
+                   that are looked at when their turn comes: ``due`` has the way of all drifts after which that is,
+                   behind them that way itself, what it may come to with those that are ``chosen``, the last of which
+                   is their number, and how far the turn of the next is at least
+`TIME_TO_CONTACT`  ``(x, v, cells, data)``: time in which no cell comes much nearer [s]
+=================  ===================================================================================================
 
 `STIFFNESS` is also the signature of −∂f/∂v [N s/m], and `BOUND` that of its row sums.
 
@@ -82,16 +83,16 @@ BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_
 IMPULSE = ENERGY
 LINES = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
-MEET = types.int64(
+DETECT = types.int64(
     _f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2), types.int64
 )
-SWEEP = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
-KEPT = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
-GIVE = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
+GAUSS_SEIDEL = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
+WARM_START = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
+COMMIT = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
 _drift = (_f, _f, _f, _f, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, MATRIX)
 MEETS = types.boolean(*_drift, INTEGERS)
-WATCH = types.boolean(*_drift, VECTOR, INTEGERS, INTEGERS)
-SOON = types.float64(MATRIX, MATRIX, INDICES, MATRIX)
+CCD_NEIGHBOURS = types.boolean(*_drift, VECTOR, INTEGERS, INTEGERS)
+TIME_TO_CONTACT = types.float64(MATRIX, MATRIX, INDICES, MATRIX)
 NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 
@@ -106,12 +107,12 @@ ForceTable = Annotated[Functions, FORCE]
 EnergyTable = Annotated[Functions, ENERGY]
 BoundTable = Annotated[Functions, BOUND]
 LinesTable = Annotated[Functions, LINES]
-MeetTable = Annotated[Functions, MEET]
-KeptTable = Annotated[Functions, KEPT]
-SweepTable = Annotated[Functions, SWEEP]
-GiveTable = Annotated[Functions, GIVE]
+MeetTable = Annotated[Functions, DETECT]
+KeptTable = Annotated[Functions, WARM_START]
+SweepTable = Annotated[Functions, GAUSS_SEIDEL]
+GiveTable = Annotated[Functions, COMMIT]
 MeetsTable = Annotated[Functions, MEETS]
-WatchTable = Annotated[Functions, WATCH]
+WatchTable = Annotated[Functions, CCD_NEIGHBOURS]
 ImpulseTable = EnergyTable
 """Annotations of tables of kernels in records."""
 

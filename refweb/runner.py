@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from . import memory
-from .errors import InputError, TooSoft, in_file
+from .errors import InputError, PenetrationError, in_file
 from .messages import short
 from .results.folder import Folder, check_folder, fingerprint, is_alive
 from .results.progress import followed
@@ -114,7 +114,7 @@ def _solve(scene, out, progress, announce, kept=None, summary=None):
         while True:
             try:
                 return _attempt(scene, out, tell, announce, clock, told, kept, summary)
-            except TooSoft as soft:
+            except PenetrationError as soft:
                 told.append(str(soft))
                 scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
                 if len(told) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused

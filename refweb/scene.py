@@ -293,7 +293,7 @@ class Scene:
         bodies = [effect for effect in self.effects if name_of(EFFECTS, effect) == "body"] if self.contact else []
         missing = self.contact.left_out(bodies) if bodies else ()
         if any(name_of(EFFECTS, e) == "self_contact" and e.stiffness is None for e in self.effects):
-            from .effects.self_contact.passage import first_stiffness as first_of_lines
+            from .effects.self_contact.penetration import first_stiffness as first_of_lines
 
             system = self.with_stiffness({"self_contact": 1.0}).build()
             with in_file(self.file):

@@ -117,7 +117,7 @@ class Dynamic(Table):
     method : {"central-difference", "explicit", "cvode", "ida", "auto"}
         Explicit central differences, explicit steps of higher order, or CVODE or IDA of SUNDIALS with steps that follow
         from the error; "auto" chooses by what the scene is, see `refweb.dynamics.method_choice`, and tries
-        others where its choice cannot finish, see `refweb.dynamics.fallback`.
+        others where its choice cannot finish, see `refweb.dynamics.method_fallback`.
     duration : float
         Time to simulate [s].
     safety : float

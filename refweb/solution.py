@@ -355,7 +355,7 @@ def _last_state(folder, scene):
     if x.shape != (system.rows, 3):
         raise InputError(f"{short(str(path))}: is not that of a run that scene.toml leads to")
     if broken and len(broken[0]):
-        from .system.torn import torn
+        from .system.broken_lines import torn
 
         system = torn(system, *broken)
     return State(system, time, x, v)

@@ -212,14 +212,14 @@ def functions(name):
 
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_functions_and_files_are_short(name):
-    """At most 14 parameters; 80 lines of code and docstring, but for factories of kernels; 400 lines a file."""
+    """At most 14 parameters; 80 lines of code and docstring, but for factories of kernels; 700 lines a file."""
     for node, factory in functions(name):
         arguments = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
         assert len(arguments) <= 14, f"{node.name} takes {len(arguments)} parameters"
         size = node.end_lineno - node.lineno + 1
         assert factory or size <= 80, f"{node.name} has {size} lines"
     last = max((node.end_lineno for node in MODULES[name].body), default=0)
-    assert last <= 400, f"{last} lines"
+    assert last <= 700, f"{last} lines"
 
 
 def test_names_say_something():

@@ -20,7 +20,7 @@ import refweb
 import refweb.effects
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects import elasticity
-from refweb.effects.base import Drive
+from refweb.effects.base import PrescribedMotion
 from refweb.errors import InputError
 from refweb.net import discretisation
 from refweb.system.system import System
@@ -403,7 +403,7 @@ def test_bound_sees_only_bodies_within_reach():
 
 def drive(net, system):
     (driven,) = system.drives
-    assert isinstance(driven, Drive) and system.supported[driven.cells[:, 0]].all()
+    assert isinstance(driven, PrescribedMotion) and system.supported[driven.cells[:, 0]].all()
     times, steps = (0.3, 1.7), np.array([1e-2, 5e-3])
     for t in times:
         here, there, v = (np.zeros_like(net.points) for _ in range(3))

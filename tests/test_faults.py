@@ -24,7 +24,7 @@ import tomli_w
 import refweb
 from refweb.__main__ import main
 from refweb.dynamics.integrators import central_difference, step_observer
-from refweb.errors import OpenBook
+from refweb.errors import EnergyDriftError
 
 WEB = refweb.Window(mesh="hexagon", rows=4, columns=3, side=0.2)
 CABLE = refweb.Cable(law="tension-only", modulus=7e7, area=1e-4, density=200.0)
@@ -246,18 +246,18 @@ def test_a_run_that_goes_on_has_no_more_attempts(tmp_path, monkeypatch, pays, at
         if interrupting and attempt == cut_at and course.time > 0.0105:
             raise KeyboardInterrupt
         if course.time > 0.0205:
-            raise OpenBook("the book is open", 0.25**attempt if pays else 0.5)
+            raise EnergyDriftError("the book is open", 0.25**attempt if pays else 0.5)
         return own(self, course, times)
 
     monkeypatch.setattr(central_difference.CentralDifference, "advance", advance)
     case, whole, cut = scene(), tmp_path / "whole", tmp_path / "cut"
-    with pytest.raises(OpenBook):
+    with pytest.raises(EnergyDriftError):
         refweb.run(case, out=whole)
     interrupting.append(True)
     with pytest.raises(KeyboardInterrupt):
         refweb.run(case, out=cut)
     interrupting.clear()
-    with pytest.raises(OpenBook):
+    with pytest.raises(EnergyDriftError):
         refweb.resume(cut)
     assert len(told(whole)["warnings"]) == attempts - 1 and told(cut) == told(whole)
 

@@ -79,15 +79,15 @@ def roots(given, method):
     if "fold" in given or "positions" in given["web"]:
         yield "effects.fold"
     if "attach" in given:
-        yield "system.carried"
+        yield "system.attached_nodes"
     if "throw" in given:
         yield "results.throw"
     if any(shape in ("cylinder", "box") and not body.get("fixed") for shape, body in zip(shapes, bodies, strict=True)):
         yield from ("net.solid", *(["effects.turning_bodies"] if spun else []))
     if "mesh" in shapes:
-        yield from ("effects.contact.several", *(f"net.boundary.{name}" for name in MESH))
+        yield from ("effects.contact.nonconvex_contacts", *(f"net.boundary.{name}" for name in MESH))
     if len(bodies) > 1 and not (contact or {}).get("between_bodies"):
-        yield "effects.contact.silent"  # bodies that overlap in silence
+        yield "effects.contact.undetected_overlap"  # bodies that overlap in silence
     if "self_contact" in given:
         yield from (f"effects.self_contact.{name}" for name in ("crossing", "passage", "press"))
     if not static and given.get("accuracy", {}).get("error") != "none":
@@ -96,8 +96,8 @@ def roots(given, method):
         yield from contact_roots(contact, shapes, static)
     if method in ("cvode", "ida"):
         yield from ("system.sparsity", "system.contact_forces")
-        yield from ["dynamics.integrators.followed_bodies"] if contact is not None else []
-        yield from ["dynamics.integrators.followed_lines"] if "self_contact" in given else []
+        yield from ["dynamics.integrators.line_body_ccd"] if contact is not None else []
+        yield from ["dynamics.integrators.line_line_ccd"] if "self_contact" in given else []
     if not static and given["solve"].get("start") != "equilibrium":
         return
     yield from ("statics.remarks", "system.sparsity", "system.unsupported_parts")
@@ -108,7 +108,7 @@ def roots(given, method):
     elif law == "tension-only":
         yield "statics.duality_bound"
     if law == "linear":  # bars, which may snap through
-        yield "statics.other_side"
+        yield "statics.snap_through"
     if law != "tension-only" or follower or spun or contact is not None:
         yield "statics.stability"  # the energy is not convex
     if follower:
@@ -120,9 +120,11 @@ def roots(given, method):
 def contact_roots(contact, shapes, static):
     """The same of contact."""
     keys = contact.keys() | {key for own in contact.get("bodies", {}).values() for key in own}
-    yield from ("statics.passage",) if static else ("effects.contact.passage", "results.observables.overlap")
+    yield from (
+        ("statics.body_penetration",) if static else ("effects.contact.penetration", "results.observables.overlap")
+    )
     if keys & {"damping", "friction"}:
-        yield "effects.contact.rubbing"
+        yield "effects.contact.line_body_friction"
     elif "exponent" in keys or set(shapes) != {"sphere"}:
         yield "effects.contact.penalty"
     if keys & {"damping", "friction", "exponent"} and "mesh" not in shapes or set(shapes) - {"sphere", "mesh"}:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import refweb
-from refweb.dynamics.integrators.energy_book import DRIFT
+from refweb.dynamics.integrators.energy_balance import DRIFT
 from refweb.registry import COMMANDS
 from refweb.scene import SHIPPED_SCENES
 

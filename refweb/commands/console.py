@@ -14,8 +14,7 @@ from ..errors import InputError
 from ..messages import shown
 from ..registry import EFFECTS, INTEGRATORS, name_of
 from ..results.provenance import web_of
-from ..results.units import readable
-from ..results.words import (
+from ..results.summary_text import (
     between,
     on_cost,
     on_results,
@@ -26,6 +25,7 @@ from ..results.words import (
     rows_of_results,
     rows_of_steps,
 )
+from ..results.units import readable
 
 
 def _console():
@@ -71,7 +71,7 @@ def print_scene(scene, system):
         from ..dynamics.schedule import FEW_CORNERS
 
         if len(system.corners) > FEW_CORNERS:
-            from ..dynamics.corners import remarks_on_corners
+            from ..dynamics.breakpoints import remarks_on_corners
 
             corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
     if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
@@ -106,7 +106,7 @@ def _stiffness(scene, system):
             text = f'stiffness {stiffness:g} {unit} for body "{body.name}", chosen for an overlap of at most '
             yield "contact", text + readable(allowed(body), None, "m")
     if "self_contact" in scene.chosen:
-        from ..effects.self_contact.passage import Passage
+        from ..effects.self_contact.penetration import Passage
 
         own = Passage(system).plain()
         text = f"stiffness {own['stiffness']:.3g} N/m for lines on lines, chosen for an overlap of at most "
@@ -243,7 +243,7 @@ def _compared(value):
 
 def print_sweep_begins(found):
     """Print what a study is about to run."""
-    from ..results.study_words import on_design
+    from ..results.study_text import on_design
 
     study = found.study.to_dict()
     varied, how = on_design(study)
@@ -258,7 +258,7 @@ def print_sweep_begins(found):
 
 def print_sweep(summary):
     """Print the box of a study from the content of its ``run.json``."""
-    from ..results import study_words as words
+    from ..results import study_text as words
 
     rows: list = [("cases", words.on_count(summary)), *(("", text) for text in summary["reasons"])]
     for entry in summary["chances"]:

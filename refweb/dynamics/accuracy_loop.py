@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import OpenBook
+from ..errors import EnergyDriftError
 from .budget import Spent
 
 ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
@@ -25,7 +25,7 @@ STUCK = 1.5
 
 
 @dataclass
-class Standing:
+class AccuracyState:
     """Where the loop stands, which a checkpoint keeps.
 
     Attributes
@@ -92,7 +92,7 @@ def run_within_drift(simulation, folder, tell):
         with _twin_of(simulation) as twin:
             try:
                 run = simulation.run(folder, functools.partial(tell, text))
-            except OpenBook as error:
+            except EnergyDriftError as error:
                 pays = error.drift <= PAYS * standing.drift and standing.repeated < MOST_ATTEMPTS - 1
                 if scene.solve.step_size is not None or standing.repeated >= ATTEMPTS - 1 and not pays:
                     raise

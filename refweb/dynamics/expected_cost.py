@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, LENGTH
-from ..net.rotation import Turns
+from ..net.rotation import RigidRotations
 from ..net.rotation_bounds import carry_rates
 from ..registry import INTEGRATORS
 from ..results.units import prefixed
@@ -61,7 +61,7 @@ def ruling(integrator, system, reach, speed):
 
 def _parts(system, bounds, reach, speed):
     """What each family adds to the bounds of the row sums, shape (families, rows)."""
-    rates, parts, turns = np.zeros(system.rows), [], Turns.of(system.net)
+    rates, parts, turns = np.zeros(system.rows), [], RigidRotations.of(system.net)
     for family, bound in zip(system.families, bounds, strict=True):
         before, data = rates.copy(), system.net.line_data if family.lines else family.data
         if bound is not None:

@@ -13,7 +13,7 @@ from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
 from ..results import probes
 from ..results.columns import FIRST, components, dynamic_energies, vectors
-from ..results.observables.book import weights
+from ..results.observables.balances import weights
 from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
 from ..results.state import State
@@ -205,7 +205,7 @@ class Watch:
         """The `refweb.results.state.State` that a course is in."""
         system, breaks = self.system, course.breaks
         if breaks is not None and len(breaks.elements):
-            from ..system.torn import torn
+            from ..system.broken_lines import torn
 
             system = torn(system, breaks.elements, breaks.energies)
         return State(system, course.time, course.x, course.v)

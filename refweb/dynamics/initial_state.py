@@ -41,7 +41,7 @@ class Start(NamedTuple):
         """The system as it is there: with what is broken."""
         if self.broken is None:
             return system
-        from ..system.torn import torn
+        from ..system.broken_lines import torn
 
         return torn(system, self.broken, np.zeros(len(self.broken)))
 

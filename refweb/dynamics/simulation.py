@@ -7,16 +7,16 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects.base import pairs_of
-from ..errors import InputError, NoEnd, SolverError
+from ..errors import InputError, IntegrationError, SolverError
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
-from .accuracy_loop import Standing, follow
+from .accuracy_loop import AccuracyState, follow
 from .budget import Budget, look
 from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
 from .integrators.crossings import APART, BESIDE, THROUGH
-from .integrators.integrator import MAX_STEPS_PER_ROW, Course
+from .integrators.integrator import MAX_STEPS_PER_ROW, IntegratorState
 from .schedule import FEW_CORNERS, Schedule, blocks
 
 NO_TWIN = (
@@ -25,12 +25,12 @@ NO_TWIN = (
 )
 
 
-class Ended(NamedTuple):
+class RunResult(NamedTuple):
     """A run at its end: its results by name, without errors, what they owe to looks between steps, and its course."""
 
     results: dict[str, Result]
     corrections: dict[str, float]
-    course: Course
+    course: IntegratorState
 
 
 class Simulation:
@@ -73,9 +73,9 @@ class Simulation:
     def __init__(self, scene, system, solution, kept=None):
         self._ways = None
         if scene.solve.method == "auto":
-            from .fallback import Ways
+            from .method_fallback import MethodFallback
 
-            self._ways = Ways(scene, system, kept)
+            self._ways = MethodFallback(scene, system, kept)
             scene = self._ways.scene
         self.begin, self.begin_of_twin = Start(system.laid), None
         if kept is not None:
@@ -97,7 +97,7 @@ class Simulation:
         self._stand(kept)
         self.integrator = self.integrator_at(self.standing.knob)
         if kept is None and len(system.corners) > FEW_CORNERS:
-            from .corners import remarks_on_corners
+            from .breakpoints import remarks_on_corners
 
             solution.warnings += remarks_on_corners(scene, system)
         if scene.solve.start != "equilibrium" and kept is None:
@@ -139,7 +139,7 @@ class Simulation:
         while True:
             try:
                 follow(self, folder, tell)
-            except NoEnd as error:
+            except IntegrationError as error:
                 if self._ways is None:
                     raise
                 self._fall_back(self._ways, error, folder)
@@ -149,7 +149,7 @@ class Simulation:
     def _stand(self, kept=None):
         """Stand at the beginning of a method, or where a checkpoint has it."""
         solve = self.scene.solve
-        self.standing = Standing.of(getattr(solve, INTEGRATORS[solve.method].knob), kept)
+        self.standing = AccuracyState.of(getattr(solve, INTEGRATORS[solve.method].knob), kept)
         self.budget = Budget(self.scene.accuracy.budget)
 
     def _fall_back(self, ways, error, folder):
@@ -170,14 +170,14 @@ class Simulation:
         self.solution.warnings += [text for _, text in on_stability(there, found, "the equilibrium it starts from")]
         self.solution.warnings += remarks_on(self.begin, self.system)
         if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
-            from ..statics.passage import Passage
+            from ..statics.body_penetration import Passage
 
             passage = Passage(self.scene, self.system)
             passage.note(State(self.system, 0.0, found.x))
             passage.overlaps.refuse()
 
     def run(self, folder, tell):
-        """One run from start to end, an `Ended`; ``tell`` is called with the share that is done."""
+        """One run from start to end, an `RunResult`; ``tell`` is called with the share that is done."""
         times, integrator = self.schedule.times, self.integrator
         course, ahead = self._set_off(folder)
         self._refuse_overlap(course)
@@ -187,7 +187,7 @@ class Simulation:
             tell(share)
             look(self, share)
 
-        integrator.breathe = lambda t: told(t / times[-1])
+        integrator.on_progress = lambda t: told(t / times[-1])
         try:
             for first, history, compared in blocks(integrator, course, self.schedule, ahead):
                 table = self.watch.table(history)
@@ -213,7 +213,7 @@ class Simulation:
             self._note(course)
         relative = self.standing.knob if integrator.knob == "rtol" else 0.0
         corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
-        return Ended(self.watch.results(course, self._tables[-1][-1]), corrections, course)
+        return RunResult(self.watch.results(course, self._tables[-1][-1]), corrections, course)
 
     def compared(self, folder):
         """Rows that are compared with those of a twin, see `refweb.dynamics.history.Watch.compared`."""
@@ -251,7 +251,7 @@ class Simulation:
             self.overlaps.refuse()
         if (deepest := self.watch.overlap_of_lines(course)) is not None:
             if self._lines is None:
-                from ..effects.self_contact.passage import Passage
+                from ..effects.self_contact.penetration import Passage
 
                 chosen = self.scene.settled().chosen
                 self._lines = Passage(self.system, self._unfollowed(), "self_contact" in chosen)
@@ -371,19 +371,19 @@ def _overlaps_of(scene, system):
 
 
 def _through_of(system):
-    """The `refweb.effects.contact.passage.BodyPassage` of a system, None without contact."""
+    """The `refweb.effects.contact.penetration.BodyPassage` of a system, None without contact."""
     if not system.contact:
         return None
-    from ..effects.contact.passage import BodyPassage
+    from ..effects.contact.penetration import BodyPassage
 
     return BodyPassage(system)
 
 
 def _silent_of(system):
-    """The `refweb.effects.contact.silent.Silent` of a system, None where there are no two bodies."""
+    """The `refweb.effects.contact.undetected_overlap.Silent` of a system, None where there are no two bodies."""
     if len(system.net.bodies) < 2:
         return None
-    from ..effects.contact.silent import silent_of
+    from ..effects.contact.undetected_overlap import silent_of
 
     return silent_of(system)
 

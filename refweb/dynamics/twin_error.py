@@ -14,7 +14,7 @@ import numpy as np
 from ..results.solution import Result
 from .budget import look
 from .history import SPREAD
-from .integrators.integrator import Course
+from .integrators.integrator import IntegratorState
 from .schedule import blocks
 
 THREADS = True
@@ -42,7 +42,7 @@ class TwinRun(NamedTuple):
     """
 
     results: dict[str, Result]
-    course: Course
+    course: IntegratorState
     rows: np.ndarray
 
 
@@ -89,7 +89,7 @@ class Twin:
         simulation, rows = self._simulation, []
         try:
             integrator = made()
-            integrator.breathe = self._breathe
+            integrator.on_progress = self._breathe
             begin = simulation.begin if simulation.begin_of_twin is None else simulation.begin_of_twin
             course = integrator.start(*begin.motion)
             for block in blocks(integrator, course, simulation.schedule):

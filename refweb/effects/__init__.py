@@ -83,9 +83,10 @@ that order and subdivision add in "all" as well. `refweb.effects.base.column` ma
 and checks its value: ``real(above=0.0, unit="N/m")``; the others are in `refweb.tables`.
 
 A force with a potential has ``energy=energy, book="spring_energy"`` instead of a power: that name heads a column of
-``history.csv`` and counts in the total energy. It is observed once it has a `refweb.results.observables.book.Booked`
-and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps stable, not accurate: something stiff may need a
-smaller ``safety``. ``definite`` asks for a part of the stiffness that is positive semidefinite, such as none.
+``history.csv`` and counts in the total energy. It is observed once it has a
+`refweb.results.observables.balances.Booked` and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps
+stable, not accurate: something stiff may need a smaller ``safety``. ``definite`` asks for a part of the stiffness that
+is positive semidefinite, such as none.
 
 The book of momentum integrates the force of an effect along the steps, which only tells whether a method gives what it
 has. It sees what steps miss where ``impulse=impulse`` brings ∫F dt as a kernel, and nothing of what is ``internal``.

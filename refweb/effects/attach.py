@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..kernels import FORCE, kernel
 from ..messages import nearest, shown
 from ..tables import Several, Table, nodes, table, text, vector
-from .base import Drive, column
+from .base import PrescribedMotion, column
 
 
 @kernel(FORCE)
@@ -112,7 +112,7 @@ class Attach(Table):
         rows = np.array(body.carried)[own]
         data = body.points[own] @ body.axes - (net.points[rows] - net.points[body.row])
         data[np.abs(data) <= 1e-13 * np.abs(body.points).max()] = 0.0  # of rounding
-        return Drive(cells=column(rows), data=np.ascontiguousarray(data), kernel=hold)
+        return PrescribedMotion(cells=column(rows), data=np.ascontiguousarray(data), kernel=hold)
 
 
 def _joined(body, mass, added):

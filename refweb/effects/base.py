@@ -5,7 +5,7 @@ matrix and knows no other effect.
 
 ``on(net)``
     A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
-    `Drive`, a `LineDrive`, a `Constraint` or a `Weakness`.
+    `PrescribedMotion`, a `LineDrive`, a `Constraint` or a `BreakLimits`.
 ``extend(net)``
     The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
     has no ``on`` first.
@@ -41,7 +41,7 @@ DEPTH, FORCE, ELEMENT, FELT_COLUMNS = 0, 1, 4, 5
 force on the body [N]; the element of that depth, −1 where nothing touches; and their number."""
 
 
-class Rubbing(NamedTuple):
+class ImplicitContactKernels(NamedTuple):
     """Kernels that solve for losses where an explicit method kicks velocities.
 
     Attributes
@@ -196,7 +196,7 @@ class Family:
     damping_bound: Callable | None = None
     near: Callable | None = None
     finder: Callable | None = None
-    rubbing: Rubbing | None = None
+    rubbing: ImplicitContactKernels | None = None
     crossing: Crossing | None = None
     passing: Callable | None = None
     internal: bool = False
@@ -207,7 +207,7 @@ class Family:
     at_rest: bool = True
     times: tuple = ()
     elements: np.ndarray | None = None
-    sever: Callable | None = None
+    disable_cells: Callable | None = None
 
     @property
     def dead(self):
@@ -243,16 +243,16 @@ def refuse_found(families, what):
 
 
 def without(columns):
-    """A `Family.sever` that leaves nothing in some columns, a number or a slice."""
+    """A `Family.disable_cells` that leaves nothing in some columns, a number or a slice."""
 
-    def sever(numbers):
+    def disable_cells(numbers):
         numbers[:, columns] = 0.0
 
-    return sever
+    return disable_cells
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class PrescribedMotion:
     """Rows whose motion is prescribed; ``kernel`` (signature `FORCE`) writes their x and v at time t.
 
     Attributes
@@ -325,7 +325,7 @@ class Constraint:
 
 
 @dataclass(frozen=True, eq=False)
-class Weakness:
+class BreakLimits:
     """Elements that break.
 
     Attributes

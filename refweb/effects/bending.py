@@ -214,5 +214,5 @@ class Bending(Table):
             book="bending_energy",
             internal=True,
             elements=elements,
-            sever=without(0),
+            disable_cells=without(0),
         )

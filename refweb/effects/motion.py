@@ -6,7 +6,7 @@ import numpy as np
 
 from ..kernels import FORCE, kernel
 from ..tables import Several, Table, nodes, rows, table
-from .base import Drive, column
+from .base import PrescribedMotion, column
 from .time_tables import flattened, interpolate
 
 
@@ -50,4 +50,6 @@ class Motion(Table):
         """The driven rows."""
         driven = net.find(self.node)
         data = np.tile(flattened(self.displacement), (len(driven), 1))
-        return Drive(cells=column(driven), data=data, kernel=drive, times=tuple(row[0] for row in self.displacement))
+        return PrescribedMotion(
+            cells=column(driven), data=data, kernel=drive, times=tuple(row[0] for row in self.displacement)
+        )

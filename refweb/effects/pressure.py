@@ -156,7 +156,7 @@ class Pressure(Table):
             bound=bound,
             symmetric=False,
             elements=at,
-            sever=without(slice(NORMAL, NORMAL + 3)),
+            disable_cells=without(slice(NORMAL, NORMAL + 3)),
         )
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, real, rows, table
-from .base import Weakness
+from .base import BreakLimits
 from .broken import HELD, held
 
 
@@ -113,7 +113,7 @@ class Rupture(Table):
             )
         elements = net.middle_of([line for line, _ in self._due])
         middles = [(time, int(element)) for (_, time), element in zip(self._due, elements, strict=True)]
-        weakness = Weakness(limits, tuple(sorted(middles)))
+        weakness = BreakLimits(limits, tuple(sorted(middles)))
         if net.quasi_static:
             return weakness
         return [held(net), weakness]

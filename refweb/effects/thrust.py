@@ -123,7 +123,7 @@ class Thrust(Table):
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
         own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
-        own |= dict(elements=np.array([cell]), sever=without(0))
+        own |= dict(elements=np.array([cell]), disable_cells=without(0))
         return outer_load(net, "thrust", cells, data, self.factor, **own)
 
     def _line(self, web, node):

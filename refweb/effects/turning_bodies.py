@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..net.rotation import Turns, matrix_at, times, to_quaternion
+from ..net.rotation import RigidRotations, matrix_at, times, to_quaternion
 from .base import Family
 from .vectors import cross
 
@@ -166,7 +166,7 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
 
 def families(net, speed, pull, own):
     """The families of all bodies that turn in space, see `refweb.effects.turning_axes.families`."""
-    turns = Turns.of(net)
+    turns = RigidRotations.of(net)
     tensors = [turns.moment[n] * np.linalg.inv(mobility) for n, mobility in enumerate(turns.mobility)]
     spreads = [0.5 * np.trace(tensor) * np.eye(3) - tensor for tensor in tensors]
     largest = [

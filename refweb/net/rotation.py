@@ -96,7 +96,7 @@ def to_quaternion(block, x, spin, turn, at):
         block[i, at + 3] = -size * (k0 * a + k1 * b + k2 * c)
 
 
-class Turns(Record):
+class RigidRotations(Record):
     """Bodies whose orientation counts.
 
     Attributes
@@ -212,7 +212,7 @@ def angular_velocity(n, x, v, turns):
 
 
 @kernel(leaf=True, apart=("turning",))
-def more_kinetic(x: Matrix, v: Matrix, turns: Turns) -> float:
+def more_kinetic(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
     """Kinetic energy of bodies that turn less ½ I |L/I|² of each [J], which their rows have as all others."""
     total = 0.0
     for n in range(turns.moment.size):
@@ -301,7 +301,7 @@ def fastest_about(n, u, turns):
 
 
 @kernel(leaf=True, apart=("turning",))
-def turn_on(h: float, v: Matrix, x: Matrix, turns: Turns) -> None:
+def advance_rotation(h: float, v: Matrix, x: Matrix, turns: RigidRotations) -> None:
     """Turn free bodies by a time h [s] from the quaternions that are noted, and write them to x."""
     for n in range(turns.moment.size):
         s, q = turns.rows[n, 1], turns.before[n]
@@ -313,12 +313,12 @@ def turn_on(h: float, v: Matrix, x: Matrix, turns: Turns) -> None:
         x[turns.rows[n, 2], 0] = q[0] - 1.0
         for k in range(3):
             x[s, k] = q[1 + k]
-    carry(x, v, turns)
+    update_attached_nodes(x, v, turns)
 
 
 @kernel(apart=("turning", "looks"))
 def turns_within(
-    s: float, h: float, old: Cube, x: Matrix, v: Matrix, turns: Turns, here: Matrix, speed: Matrix
+    s: float, h: float, old: Cube, x: Matrix, v: Matrix, turns: RigidRotations, here: Matrix, speed: Matrix
 ) -> None:
     """Write rotations, and what bodies carry, to ``here`` and ``speed``.
 
@@ -336,18 +336,18 @@ def turns_within(
         here[t, 0] = first[0] - 1.0 + way * (last[0] - first[0]) + rate0 * d0[0] + rate1 * d1[0]
         for k in range(3):
             here[p, k] = first[1 + k] + way * (last[1 + k] - first[1 + k]) + rate0 * d0[1 + k] + rate1 * d1[1 + k]
-    carry(here, speed, turns)
+    update_attached_nodes(here, speed, turns)
 
 
 @kernel(leaf=True)
-def carry(x, v, turns):
+def update_attached_nodes(x, v, turns):
     """Write places and velocities of the nodes that bodies carry, where they carry any."""
     if turns.carried.shape[0]:
         carry_nodes(x, v, turns)
 
 
 @kernel(leaf=True, apart=("carried",))
-def carry_nodes(x: Matrix, v: Matrix, turns: Turns) -> None:
+def carry_nodes(x: Matrix, v: Matrix, turns: RigidRotations) -> None:
     """Write places and velocities of the nodes that bodies carry."""
     for c in range(turns.carried.shape[0]):
         i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]
@@ -362,14 +362,14 @@ def carry_nodes(x: Matrix, v: Matrix, turns: Turns) -> None:
 
 
 @kernel(leaf=True)
-def hand_on(x, f, turns):
+def add_forces_to_bodies(x, f, turns):
     """Add the forces on nodes that bodies carry to those on the bodies, where they carry any."""
     if turns.carried.shape[0]:
         forces_to_bodies(x, f, turns)
 
 
 @kernel(leaf=True, apart=("carried",))
-def forces_to_bodies(x: Matrix, f: Matrix, turns: Turns) -> None:
+def forces_to_bodies(x: Matrix, f: Matrix, turns: RigidRotations) -> None:
     """Add the forces on nodes that bodies carry, and their moments, to those on the bodies."""
     for c in range(turns.carried.shape[0]):
         i, n, a = turns.carried[c, 0], turns.carried[c, 1], turns.arms[c]

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 
 from ..kernels import Matrix, Vector, kernel
-from .rotation import Turns, along_principal, fastest_about, matrix_at
+from .rotation import RigidRotations, along_principal, fastest_about, matrix_at
 
 
 @kernel(leaf=True, apart=("carried",))
-def carry_rates(rates: Vector, turns: Turns) -> None:
+def carry_rates(rates: Vector, turns: RigidRotations) -> None:
     """Make row sums of |K|, or of damping, of nodes that bodies carry those of the bodies.
 
     A node at the arm a moves by δ + θ × a. In place of its displacement there are two unknowns, scaled to be no more
@@ -25,7 +25,7 @@ def carry_rates(rates: Vector, turns: Turns) -> None:
 
 
 @kernel(leaf=True, apart=("carried",))
-def pull_rates(rates: Vector, f: Matrix, turns: Turns) -> None:
+def pull_rates(rates: Vector, f: Matrix, turns: RigidRotations) -> None:
     """Add what forces f on the nodes that a body carries make of its rotation, for twice these forces."""
     for c in range(turns.carried.shape[0]):
         i = turns.carried[c, 0]
@@ -59,7 +59,7 @@ def pushes(n, x, f, turns):
 
 
 @kernel(leaf=True, apart=("turning",))
-def fastest_surface(x: Matrix, v: Matrix, turns: Turns) -> float:
+def fastest_surface(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
     """Largest speed that rotation adds at the surface of any body while it moves freely, at most [m/s]."""
     fastest = 0.0
     for n in range(turns.moment.size):
@@ -68,7 +68,7 @@ def fastest_surface(x: Matrix, v: Matrix, turns: Turns) -> float:
 
 
 @kernel(leaf=True, apart=("turning",))
-def fastest_point(x: Matrix, v: Matrix, turns: Turns) -> float:
+def fastest_point(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
     """Largest speed of any point of a body while it moves freely, at most [m/s]."""
     fastest = 0.0
     for n in range(turns.moment.size):
@@ -78,7 +78,7 @@ def fastest_point(x: Matrix, v: Matrix, turns: Turns) -> float:
 
 
 @kernel(leaf=True, apart=("turning",))
-def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: Turns) -> float:
+def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations) -> float:
     """Largest acceleration of any point of a body by forces f, at most [m/s²]."""
     hardest = 0.0
     for n in range(turns.moment.size):
@@ -88,7 +88,9 @@ def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: Turns) -> float:
 
 
 @kernel(apart=("turning", "guarded"))
-def beside_places(kick: float, drift: float, x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, turns: Turns) -> float:
+def beside_places(
+    kick: float, drift: float, x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations
+) -> float:
     """By how much points of bodies come elsewhere than their places do in a drift behind a kick, at most [m].
 
     Of the surface that is what it turns by; of nodes that bodies carry how far they are off the way that the velocities

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..messages import shown
 from ..registry import EFFECTS
 from ..results.files import as_toml
-from ..results.words import (
+from ..results.summary_text import (
     on_cost,
     on_results,
     on_run,

@@ -7,11 +7,11 @@ from pathlib import Path
 from ..pictures.pictures import target
 from ..pictures.plots import as_svg
 from ..pictures.studies import draw, of_folder
-from ..results import study_words as words
+from ..results import study_text as words
 from ..results.case_rows import FIRST, LAST, NAME, read
 from ..results.files import write_text
 from ..results.folder import so_far
-from ..results.words import on_cost
+from ..results.summary_text import on_cost
 from . import page
 from .markup import figure, html, image, listing, pairs, section, table, tag
 

@@ -10,9 +10,9 @@ from ..errors import InputError
 from ..net.web import Web
 from ..results.units import readable
 from .frames import Frame
+from .plot_data import unit_of
 from .record import CLOCKS
 from .sheet import PALE, Panel, label, legend
-from .shown import unit_of
 
 FIELDS = {"stress": "Pa", "tension": "N", "strain": "1"}
 """What can be drawn, and its unit."""

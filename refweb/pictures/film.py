@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..results.files import write_atomically
-from . import moving, render
+from . import movie_writer, render
 from .pictures import blank_page, clock_line, look_of, pixels, record_of, target, with_clear_white
 from .polygons import flat_images
 from .stage import DARK, PALE, Seen, Stage, colour_map
@@ -23,7 +23,7 @@ SIZE = (1200, 750)
 """Of a film [pixel]."""
 PHASES, SWINGS = 24, 12.0
 """Images of a period of a mode, and of them in a second [1/s]."""
-KEPT = 64
+WARM_START = 64
 """Frames that are held in memory, to be drawn after the camera has seen all."""
 SAMPLES = 6
 """Images that a GIF has its colours of."""
@@ -58,9 +58,9 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
         As for `refweb.picture`; for an ``.mp4`` without ffmpeg.
     """
     record = record_of(source)
-    out = target(out, moving.ENDINGS)
+    out = target(out, movie_writer.ENDINGS)
     if out.suffix.lower() == ".mp4":
-        moving.ffmpeg()
+        movie_writer.ffmpeg()
     if not 0 < fps <= 50:
         raise InputError(f"fps = {fps} must be > 0 and ≤ 50 [1/s]")
     if record.kind != "modes" and (frame is not None or time is not None):
@@ -96,7 +96,7 @@ class _Film:
         self._record, self._poses, self._look = record, poses, look
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
-        self._read = functools.lru_cache(KEPT)(record.frame)
+        self._read = functools.lru_cache(WARM_START)(record.frame)
         self._last = self._read(poses[-1].number)
         self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
 
@@ -110,13 +110,13 @@ class _Film:
         gif = path.suffix.lower() == ".gif"
         with render.Renderer(self._stage.views, self._sizes, render.COARSE) as renderer:
             drawn = {i: self._image(renderer, self._poses[i]) for i in ahead} if gif else {}
-            film = moving.writer(
+            film = movie_writer.writer(
                 path, SIZE, self._fps, list(drawn.values()), colour_map()(np.linspace(0, 1, 64))[:, :3]
             )
             try:
                 for i, pose in enumerate(self._poses):
                     image = drawn.pop(i) if i in drawn else self._image(renderer, pose)
-                    film.add(image, moving.LAST if i == count - 1 and not self._swings else 0.0)
+                    film.add(image, movie_writer.LAST if i == count - 1 and not self._swings else 0.0)
                     progress("drawing frames", (i + 1) / count)
                 film.close()
             except BaseException:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..results.units import scale_of
+from .plot_data import bar, told, unit_of
 from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, dot, label, legend, telling
-from .shown import bar, told, unit_of
 
 OF_ALL = "Points: results of all steps, with ± where it is known. Lines: rows of the history."
 MOST_TICKS = 12

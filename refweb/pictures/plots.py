@@ -14,11 +14,11 @@ from ..errors import InputError
 from ..messages import nearest
 from ..messages import shown as as_shown
 from ..results.files import write_atomically
-from . import books, distances, histories, spectra
+from . import balances, distances, histories, spectra
 from .pictures import shows_itself, target
+from .plot_data import Shown, refuse_spoilt
 from .record import Record, of_folder
 from .sheet import Ink, sheet
-from .shown import Shown, refuse_spoilt
 
 ENDINGS = ("png", "svg", "pdf")
 """Formats of plots."""
@@ -44,7 +44,7 @@ def kinds(record):
     offered = {}
     if shown.energies:
         offered["energy"] = "Energy by kind" + (", and how far its book is open" if dynamic else "")
-    if dynamic and books.has_momentum(shown):
+    if dynamic and balances.has_momentum(shown):
         offered["momentum"] = "Momentum against the impulses of supports and loads"
     if dynamic and rows >= spectra.FEWEST and shown.observables:
         offered["spectrum"] = f"Spectrum of {shown.observables[0]}"
@@ -201,7 +201,7 @@ def _panels(shown, name):
         return spectra.spectrum(shown, name.removeprefix(SPECTRUM))
     if name.endswith(DISTANCE):
         return distances.distances(shown, name.removesuffix(DISTANCE))
-    return books.energy(shown) if name == "energy" else books.momentum(shown)
+    return balances.energy(shown) if name == "energy" else balances.momentum(shown)
 
 
 class Plotted(NamedTuple):

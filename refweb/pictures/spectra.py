@@ -8,8 +8,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..results.units import scale_of, with_error
+from .plot_data import unit_of
 from .sheet import DARK, Panel, label, legend, telling
-from .shown import unit_of
 
 FEWEST = 32
 """Number of rows below which a spectrum tells nothing: it would have a dozen frequencies."""

@@ -140,8 +140,8 @@ class _Balance:
     def bound(self, solve, weigh):
         """The `DualityBound` by a correction of the forces at hand.
 
-        It is what ``weigh`` makes of the changes of the bars' vectors by displacements that ``solve`` finds from what
-        is unbalanced. Both are approximate; what stays unbalanced enters the gap.
+        It is what ``weigh`` makes of the changes of the bars' vectors by displacements that ``solve`` finds from
+        what is unbalanced. Both are approximate; what stays unbalanced enters the gap.
         """
         bars = self._bars
         correction, unbalanced = np.zeros(self._force.shape, dtype=np.longdouble), self._unbalanced(self._force)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels import FORCE, INDICES, MATRIX, Arrays, Functions, kernel
-from ..system.at_rest import at_rest
+from ..system.static_system import at_rest
 from .equilibrium import (
     LIMIT,
     TOLERANCE,

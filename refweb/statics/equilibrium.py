@@ -72,7 +72,7 @@ class Equilibrium:
     stability : Stability, optional
         Whether it is stable; None where its energy is convex, and so it is.
     may_turn_over : bool
-        Whether there may be other equilibria as lines can push, see `refweb.statics.other_side`.
+        Whether there may be other equilibria as lines can push, see `refweb.statics.snap_through`.
     duality_bound : refweb.statics.duality_bound.DualityBound, optional
         Of energy and tension, for the tension-only law.
     deviations : ndarray, shape (k, rows, 3), optional

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..net.net import AXIAL_STIFFNESS, G0
 from ..net.tension_laws import LINEAR, TENSION_ONLY
-from ..system.at_rest import at_rest
+from ..system.static_system import at_rest
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_touches
 from .newton import Newton
 

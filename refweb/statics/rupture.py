@@ -27,7 +27,7 @@ def refuse_break(system, solve, found, before):
     Parameters
     ----------
     system : refweb.system.system.System
-        With a `refweb.effects.base.Weakness`.
+        With a `refweb.effects.base.BreakLimits`.
     solve : callable
         The method of statics, see `refweb.registry.STATICS`.
     found : refweb.statics.equilibrium.Equilibrium

@@ -13,7 +13,7 @@ from ..registry import STATICS, load
 from ..results.columns import FIRST, static_energies
 from ..results.solution import SOLVER, Result
 from ..results.state import State
-from ..system.at_rest import at_rest
+from ..system.static_system import at_rest
 from .remarks import Remarks, open_rows, remarks_on
 
 
@@ -174,18 +174,18 @@ def _load(system, found):
 
 
 def _passage_of(scene, system):
-    """The `refweb.statics.passage.Passage` of a scene, None without contact."""
+    """The `refweb.statics.body_penetration.Passage` of a scene, None without contact."""
     if not system.contact:
         return None
-    from .passage import Passage
+    from .body_penetration import Passage
 
     return Passage(scene, system)
 
 
 def _lines_of(scene, system):
-    """The `refweb.statics.line_passage.LinePassage` of a scene, None without lines that touch lines."""
+    """The `refweb.statics.line_penetration.LinePassage` of a scene, None without lines that touch lines."""
     if not any(family.crossing is not None for family in system.families):
         return None
-    from .line_passage import LinePassage
+    from .line_penetration import LinePassage
 
     return LinePassage(system, "self_contact" in scene.settled().chosen)

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from ..errors import SolverError
 from ..results.state import State
-from ..system.at_rest import at_rest
+from ..system.static_system import at_rest
 from .newton import Newton
 
 SHARE = 0.1

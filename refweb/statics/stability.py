@@ -70,7 +70,7 @@ def ask(system, rest, state, solver=None):
     Parameters
     ----------
     system, rest : refweb.system.system.System
-        With all that acts, and as statics sees it, see `refweb.system.at_rest`.
+        With all that acts, and as statics sees it, see `refweb.system.static_system`.
     state : Equilibrium
         Where it is; the sign of its smallest pivot, where that is in its stats, is not asked for again.
     solver : refweb.system.factorization.Lu, optional
@@ -84,7 +84,7 @@ def ask(system, rest, state, solver=None):
     _ask_of_kinks(system, rest, state)
     state.stats["smallest_pivot"] = state.stability.sign
     if (rest.net.laws == LINEAR).any():
-        from .other_side import may_turn_over
+        from .snap_through import may_turn_over
 
         state.may_turn_over = may_turn_over(rest, state)
 
@@ -116,7 +116,7 @@ class Question:
     system : refweb.system.system.System
         With all that acts, also what depends on velocity alone.
     rest : refweb.system.system.System
-        As statics sees it, see `refweb.system.at_rest`.
+        As statics sees it, see `refweb.system.static_system`.
     state : refweb.statics.equilibrium.Equilibrium
         Where it is.
     """

@@ -18,7 +18,7 @@ from ..results.state import State
 from ..scene import Scene
 from ..solution import Solution
 from ..statics.remarks import Remarks, open_rows
-from ..system.at_rest import at_rest
+from ..system.static_system import at_rest
 from ..tables import checked, integer
 from .mode_remarks import left_out, remarks_on
 from .spectrum import spectrum

@@ -27,8 +27,8 @@ from ..scene import Scene, file_of
 from .case import Job, here, keep_outcome, kept_files
 from .design import Base, cases_of, files_of
 from .expressions import Expression
-from .found import Sweep, columns_of, row_of
 from .study import Study, load
+from .study_result import Sweep, columns_of, row_of
 from .workers import Given, Processes, through
 
 

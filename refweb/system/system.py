@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import Constraint, Drive, Family, LineDrive, Weakness
+from ..effects.base import BreakLimits, Constraint, Family, LineDrive, PrescribedMotion
 from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
@@ -72,9 +72,9 @@ class System:
                 acting += part if isinstance(part, list) else [part]
         self.families = [a for a in acting if isinstance(a, Family)]
         self.line_drives = [a for a in acting if isinstance(a, LineDrive)]
-        self.drives = [a for a in acting if isinstance(a, Drive)]
+        self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
-        self.weakness = next((a for a in acting if isinstance(a, Weakness)), None)
+        self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
         if sum(family.lines and family.power is not None for family in self.families) > 1:
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
@@ -147,10 +147,10 @@ class System:
 
     @cached_property
     def carriers(self):
-        """The `refweb.system.carried.Carried` of bodies that carry nodes; None where none does."""
+        """The `refweb.system.attached_nodes.Carried` of bodies that carry nodes; None where none does."""
         if not self.carried.any():
             return None
-        from .carried import Carried
+        from .attached_nodes import Carried
 
         return Carried(self.net, self._in_tangent)
 
@@ -249,7 +249,7 @@ class System:
         for d in self.drives:
             d.kernel(t, x, v, self._zero, d.cells, d.data, self._zero)
         if self.carriers:
-            self.carriers.carry(x, v)
+            self.carriers.update_attached_nodes(x, v)
 
     def force(self, t, x, v=None):
         """Force on every row [N], supports included, shape (rows, 3)."""
@@ -262,7 +262,7 @@ class System:
         for family, out in zip(self.families, per_cell, strict=True):
             family.force(t, x, v, f, family.cells, lines if family.lines else family.data, out)
         if self.carriers:
-            self.carriers.hand_on(x, f)
+            self.carriers.add_forces_to_bodies(x, f)
         return Forces(f, per_cell)
 
     def force_of(self, family, t, x, v=None):

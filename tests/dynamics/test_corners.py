@@ -11,7 +11,7 @@ import pytest
 
 import refweb
 from refweb.dynamics import method_choice
-from refweb.dynamics.corners import remarks_on_corners
+from refweb.dynamics.breakpoints import remarks_on_corners
 from refweb.results.files import as_toml
 
 BEGIN = 0.0123

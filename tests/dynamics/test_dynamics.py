@@ -21,7 +21,7 @@ from refweb.__main__ import main
 from refweb.dynamics import schedule, simulation
 from refweb.dynamics.history import SPREAD, Watch
 from refweb.dynamics.integrators import central_difference
-from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
+from refweb.dynamics.integrators.central_difference import CentralDifference, EnergyDriftError
 from refweb.dynamics.integrators.integrator import History
 from refweb.errors import SolverError
 from refweb.results.state import State
@@ -740,7 +740,7 @@ def test_a_fixed_step_is_never_halved(monkeypatch):
             super().__init__(*arguments, **named)
 
     monkeypatch.setattr(central_difference, "CentralDifference", Noted)
-    with pytest.raises(OpenBook, match="use a smaller step_size than 0.0001"):
+    with pytest.raises(EnergyDriftError, match="use a smaller step_size than 0.0001"):
         refweb.run(scene(step_size=1e-4))
     assert steps == [1e-4]
 

@@ -7,7 +7,7 @@ import pytest
 
 import refweb
 from refweb.dynamics import accuracy_loop, method_choice
-from refweb.errors import OpenBook, SolverError
+from refweb.errors import EnergyDriftError, SolverError
 from refweb.results.folder import Folder
 
 
@@ -78,7 +78,7 @@ def test_the_next_that_takes_the_scene(more, used, once, tmp_path, capsys):
     print_run(json.loads((tmp_path / "run" / "run.json").read_text()))
     said = " ".join(capsys.readouterr().out.replace("│", " ").split())
     assert f"central-difference cannot finish, {used}" in said and "takes over; energy drift" in said
-    with pytest.raises(OpenBook):
+    with pytest.raises(EnergyDriftError):
         refweb.run(hammer(method="central-difference"))
 
 

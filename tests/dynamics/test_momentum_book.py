@@ -8,13 +8,13 @@ import pytest
 from scipy.integrate import quad
 
 import refweb
-from refweb.dynamics.integrators import momentum_book
-from refweb.dynamics.integrators.momentum_book import CLOSURE, allowed
+from refweb.dynamics.integrators import momentum_balance
+from refweb.dynamics.integrators.momentum_balance import CLOSURE, allowed
 from refweb.dynamics.integrators.step_limits import StepLimits
 from refweb.effects import gravity
 from refweb.effects.base import Family
 from refweb.effects.time_tables import flattened, integrate, interpolate
-from refweb.errors import OpenBook
+from refweb.errors import EnergyDriftError
 from refweb.kernels import FORCE, kernel
 from refweb.registry import EFFECTS
 from refweb.system.system import System
@@ -235,7 +235,7 @@ def test_a_kernel_that_gives_too_much(method, monkeypatch):
     made = gravity.Gravity.on
     monkeypatch.setattr(gravity.Gravity, "on", wrong)
     with pytest.raises(
-        OpenBook, match=r"^momentum drift 0.00\d+ of the largest momentum of the run, limit \S+: .*; use"
+        EnergyDriftError, match=r"^momentum drift 0.00\d+ of the largest momentum of the run, limit \S+: .*; use"
     ):
         refweb.run(scene(method, WEIGHT, *THROWN, supports=FREE, duration=2e-3, interval=1e-3))
 
@@ -245,14 +245,14 @@ def test_steps_that_pass_over_a_pulse(method, monkeypatch):
     """Steps that know of no corners miss it whole, with its work: no other book sees that."""
     monkeypatch.setattr(System, "corners", np.zeros(0))
     monkeypatch.setattr(StepLimits, "stop", lambda self, t, x, v, end: np.inf)
-    with pytest.raises(OpenBook, match="momentum drift (1|0.[1-9])"):
+    with pytest.raises(EnergyDriftError, match="momentum drift (1|0.[1-9])"):
         refweb.run(scene(method, pulse(1e-8)))
 
 
 def test_forces_that_turn_what_nothing_turns(monkeypatch):
     monkeypatch.setitem(EFFECTS, "couple", f"{__name__}:Couple")
     pair = Couple(node=0, value=(0.0, 0.0, 0.0))
-    with pytest.raises(OpenBook, match=f"^angular momentum drift .* limit {CLOSURE:g}"):
+    with pytest.raises(EnergyDriftError, match=f"^angular momentum drift .* limit {CLOSURE:g}"):
         refweb.run(scene("central-difference", pair, *THROWN, supports=FREE))
 
 
@@ -305,4 +305,4 @@ def test_a_run_that_goes_on_keeps_its_book(tmp_path):
 
 def test_the_book_names_what_it_does_not_see():
     for word in ("reels", "temperature", "pressure", "[[motion]]"):
-        assert word in momentum_book.__doc__.split("does not see")[1]
+        assert word in momentum_balance.__doc__.split("does not see")[1]

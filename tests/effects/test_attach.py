@@ -14,7 +14,7 @@ from refweb.dynamics.integrators.rotations import Rotations
 from refweb.effects.elasticity import Elasticity
 from refweb.net.rotation import quaternion_rate
 from refweb.runner import notices
-from refweb.system.at_rest import at_rest
+from refweb.system.static_system import at_rest
 from refweb.system.system import System
 from validation.methods.as_constraint import Tied
 

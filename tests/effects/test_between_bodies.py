@@ -13,11 +13,11 @@ import solids
 from scipy.optimize import minimize
 
 import refweb
+from refweb.dynamics.integrators.body_body_ccd import FollowedPairs
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.crossings import PAIRS as MET
 from refweb.dynamics.integrators.crossings import none_met
-from refweb.dynamics.integrators.followed_lines import Place
-from refweb.dynamics.integrators.followed_pairs import FollowedPairs
+from refweb.dynamics.integrators.line_line_ccd import Place
 from refweb.net import discretisation
 from refweb.net.rotation import quaternion_rate
 from refweb.system.system import System

@@ -13,7 +13,7 @@ from refweb.dynamics.expected_cost import expected_cost
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.method_choice import decided
 from refweb.effects.base import OWN
-from refweb.effects.kicks import CELL, SHARES, THETA
+from refweb.effects.contact_solver import CELL, SHARES, THETA
 
 G = 9.81
 LOSSES = {
@@ -116,7 +116,7 @@ def test_forces_of_contact_are_those_of_the_law(loss, column):
             seen = (1.0 - theta) * kick.v + theta * kick.after
             where = family.cells[cell], family.data[cell]
             family.force(0.0, kick.x, seen, total, *where, np.zeros((1, family.observed)))
-        kick.system.carriers.hand_on(kick.x, total)
+        kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-8 * np.abs(kick.own).max())
         found += bool(np.isin(family.cells[touches[:, CELL].astype(int), :2], kick.system.net.carried).any())
     assert found > 10  # with a node that a body carries
@@ -129,7 +129,7 @@ def test_forces_of_drag_are_those_of_the_law():
         total = np.zeros_like(kick.v)
         for one in kick.families:
             one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), one.observed)))
-        kick.system.carriers.hand_on(kick.x, total)
+        kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-10 * np.abs(kick.own).max())
 
 

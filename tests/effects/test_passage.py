@@ -7,10 +7,10 @@ import pytest
 import solids
 
 import refweb
-from refweb.dynamics.integrators.followed_bodies import FollowedBodies
+from refweb.dynamics.integrators.line_body_ccd import FollowedBodies
+from refweb.effects.contact.line_body_ccd import MIDDLE, SHOWN, limits_of
 from refweb.effects.contact.overlap import CORE
-from refweb.effects.contact.passing import MIDDLE, SHOWN, limits_of
-from refweb.results.words import on_run
+from refweb.results.summary_text import on_run
 from validation.hard_cases.overlaps import random_hit, through
 from validation.hard_cases.topology import knot_determinant, passed
 

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.effects.base import CONTACT_COLUMNS, FELT, OWN
-from refweb.effects.kicks import CELL, DAMPING, FRICTION, ROWS, SHARES, THETA, fitted
+from refweb.effects.contact_solver import CELL, DAMPING, FRICTION, ROWS, SHARES, THETA, fitted
 
 GRAVITY = 9.81
 SLIPS = (1e-9, 1e-4, 1e-2, 1.0)

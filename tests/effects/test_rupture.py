@@ -17,7 +17,7 @@ from refweb.effects.rupture import GroupRupture, Rupture
 from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.results.state import State
-from refweb.results.words import on_run
+from refweb.results.summary_text import on_run
 from refweb.system.system import System
 
 METHODS = ["central-difference", "cvode", "ida"]
@@ -441,7 +441,7 @@ def test_what_hangs_below_a_break_falls(method, order, subdivide):
 
 def test_what_ends_with_an_element():
     """Whatever acts through a broken element ends: it adds no force, and the energy of all is kept."""
-    from refweb.system.torn import tear
+    from refweb.system.broken_lines import tear
 
     effects = [
         refweb.Body(name="ball", radius=0.3, mass=1.0, position=(0.5, 0.0, 0.25)),
@@ -477,7 +477,7 @@ def test_order_beyond_the_horizon():
     """Where run and twin break other lines, what is found from the earlier of both on has no ±, and it is said."""
     from refweb.dynamics.break_errors import add_errors_of_breaks
     from refweb.results.solution import Result
-    from refweb.system.torn import Breaks
+    from refweb.system.broken_lines import Breaks
 
     def breaks(elements, times):
         count = len(elements)

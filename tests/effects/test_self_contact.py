@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import brentq, lsq_linear
 
 import refweb
-from refweb.effects.self_contact import losses, press, search, slipping, table
+from refweb.effects.self_contact import line_line_damping, line_line_friction, line_line_penalty, search, table
 from refweb.effects.self_contact.pair import (
     DAMPING,
     FRICTION,
@@ -27,7 +27,7 @@ from refweb.errors import InputError, SolverError
 from refweb.net import discretisation
 from refweb.net.web import Web
 from refweb.registry import INTEGRATORS
-from refweb.results.words import on_run
+from refweb.results.summary_text import on_run
 
 RADIUS, STIFFNESS = 0.1, 100.0
 REST = np.zeros((4, 3))
@@ -48,22 +48,22 @@ class Pair:
 
     def energy(self, x=REST):
         out = np.zeros(1)
-        press.energy(0.0, x, ONE, self.data, out)
+        line_line_penalty.energy(0.0, x, ONE, self.data, out)
         return out[0]
 
     def force(self, x=REST):
         f, out = np.zeros((4, 3)), np.zeros((1, 1))
-        press.force(0.0, x, 0.0 * x, f, ONE, self.data, out)
+        line_line_penalty.force(0.0, x, 0.0 * x, f, ONE, self.data, out)
         return f, out[0, 0]
 
     def loss(self, x, v):
         f, out = np.zeros((4, 3)), np.zeros((1, 1))
-        losses.force(0.0, x, v, f, ONE, self.data, out)
+        line_line_damping.force(0.0, x, v, f, ONE, self.data, out)
         return f, out[0, 0]
 
     def rub(self, x, v):
         f, out = np.zeros((4, 3)), np.zeros((1, 1))
-        slipping.force(0.0, x, v, f, ONE, self.data, out)
+        line_line_friction.force(0.0, x, v, f, ONE, self.data, out)
         return f, out[0, 0]
 
     def tangent(self, kernel, x, v, definite=False):
@@ -154,14 +154,14 @@ def test_what_reaches_past_an_end_pushes_further_than_lines_are_thick(beyond, he
 
 def test_tangents_are_those_of_the_forces():
     for pair, x, v in some_pairs():
-        stiffness = pair.tangent(press.stiffness, x, v)
+        stiffness = pair.tangent(line_line_penalty.stiffness, x, v)
         size = np.abs(stiffness).max()
         change = by_differences(lambda y, pair=pair: pair.force(y)[0].ravel(), x)
         np.testing.assert_allclose(-change, stiffness, atol=1e-4 * size)
         assert np.abs(stiffness - stiffness.T).max() <= 1e-13 * size
-        part = np.linalg.eigvalsh(pair.tangent(press.stiffness, x, v, True))
+        part = np.linalg.eigvalsh(pair.tangent(line_line_penalty.stiffness, x, v, True))
         assert part[0] >= -1e-12 * part[-1]
-        own = pair.tangent(losses.stiffness, x, v)
+        own = pair.tangent(line_line_damping.stiffness, x, v)
         change = by_differences(lambda y, pair=pair, v=v: pair.loss(y, v)[0].ravel(), x)
         np.testing.assert_allclose(-change, own, atol=1e-3 * np.abs(own).max() + 1e-12)
 
@@ -190,8 +190,8 @@ def test_friction_takes_energy_and_keeps_momenta():
         turning = np.cross([0.3, -0.7, 0.4], pair.points + x) + [1.0, 2.0, 3.0]
         assert np.abs(pair.rub(x, turning)[0]).max() <= 1e-10 * 0.4 * normal
         for kernel, change in (
-            (slipping.damping, by_differences(lambda u, pair=pair, x=x: pair.rub(x, u)[0].ravel(), v)),
-            (slipping.stiffness, by_differences(lambda y, pair=pair, v=v: pair.rub(y, v)[0].ravel(), x)),
+            (line_line_friction.damping, by_differences(lambda u, pair=pair, x=x: pair.rub(x, u)[0].ravel(), v)),
+            (line_line_friction.stiffness, by_differences(lambda y, pair=pair, v=v: pair.rub(y, v)[0].ravel(), x)),
         ):
             own = pair.tangent(kernel, x, v)
             np.testing.assert_allclose(-change, own, atol=2e-3 * np.abs(own).max() + 1e-9)
@@ -222,8 +222,8 @@ def test_friction_of_lines_that_do_not_roll():
         assert np.abs(force.sum(axis=0)).max() <= 1e-13 * size
         assert np.abs(pair.rub(x, v + [1.0, 2.0, 3.0])[0] - force).max() <= 1e-10 * size
         for kernel, change in (
-            (slipping.damping, by_differences(lambda u, pair=pair, x=x: pair.rub(x, u)[0].ravel(), v)),
-            (slipping.stiffness, by_differences(lambda y, pair=pair, v=v: pair.rub(y, v)[0].ravel(), x)),
+            (line_line_friction.damping, by_differences(lambda u, pair=pair, x=x: pair.rub(x, u)[0].ravel(), v)),
+            (line_line_friction.stiffness, by_differences(lambda y, pair=pair, v=v: pair.rub(y, v)[0].ravel(), x)),
         ):
             own = pair.tangent(kernel, x, v)
             np.testing.assert_allclose(-change, own, atol=2e-3 * np.abs(own).max() + 1e-9)
@@ -279,9 +279,9 @@ def test_what_slides_along_a_line_feels_no_joint():
 def test_bound_is_above_row_sums():
     """Rows of blocks, whose sums bound the largest eigenvalue."""
     for pair, x, v in some_pairs(200):
-        blocks = pair.tangent(press.stiffness, x, v).reshape(4, 3, 4, 3).transpose(0, 2, 1, 3)
+        blocks = pair.tangent(line_line_penalty.stiffness, x, v).reshape(4, 3, 4, 3).transpose(0, 2, 1, 3)
         rows, rates = np.linalg.norm(blocks, 2, axis=(2, 3)).sum(axis=1), np.zeros(4)
-        press.bound(0.0, 0.0, x, np.ones(4), rates, ONE, pair.data)
+        line_line_penalty.bound(0.0, 0.0, x, np.ones(4), rates, ONE, pair.data)
         assert rows.max() <= rates.max()
 
 

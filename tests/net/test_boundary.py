@@ -242,7 +242,9 @@ def test_gradient_and_hessian_are_those_of_the_field():
         bound = 2.0 * h * h / field.spacing**2
         np.testing.assert_allclose((above - below) / (2 * h), gradient[:, axis], rtol=0, atol=bound + 1e-9)
         np.testing.assert_allclose((up - down) / (2 * h), hessian[:, columns], rtol=0, atol=10 * h / field.spacing**2)
-    assert np.linalg.norm(gradient, axis=1).max() < 1.25  # what `refweb.effects.contact.several` takes for the most
+    assert (
+        np.linalg.norm(gradient, axis=1).max() < 1.25
+    )  # what `refweb.effects.contact.nonconvex_contacts` takes for the most
 
 
 def test_the_error_of_the_field_falls_with_the_grid():

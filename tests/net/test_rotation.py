@@ -8,7 +8,14 @@ from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
 
 from refweb.net.rigid_body import Grown, RigidBody, matrix_of
-from refweb.net.rotation import Turns, angular_velocity, more_kinetic, note_turns, quaternion_of, turn_on
+from refweb.net.rotation import (
+    RigidRotations,
+    advance_rotation,
+    angular_velocity,
+    more_kinetic,
+    note_turns,
+    quaternion_of,
+)
 from refweb.net.rotation_bounds import pushes, speeds
 from refweb.net.shapes.box import Box
 from refweb.net.solid import inertia, moments
@@ -24,7 +31,7 @@ class Rotor:
         axes = np.eye(3) if axes is None else axes
         tensor = np.array(moments_) * np.eye(3) if np.ndim(moments_) == 1 else np.array(moments_)
         body = RigidBody("it", 0, Box(size=(0.1, 0.2, 0.3)), (0, 0, 0), False, axes, tensor, omega, True, 1, 2)
-        self.body, self.turns = body, Turns.of(type("Net", (), {"bodies": (body,)}))
+        self.body, self.turns = body, RigidRotations.of(type("Net", (), {"bodies": (body,)}))
         self.x, self.v = np.zeros((2, 3, 3))
         self.v[1] = body.start_spin
         self.omega = np.array(omega)
@@ -32,7 +39,7 @@ class Rotor:
     def on(self, h, steps=1):
         for _ in range(steps):
             note_turns(self.x, self.turns)
-            turn_on(h, self.v, self.x, self.turns)
+            advance_rotation(h, self.v, self.x, self.turns)
 
     @property
     def own(self):

@@ -14,7 +14,7 @@ import refweb
 from refweb.__main__ import main
 from refweb.errors import InputError
 from refweb.pictures import film as films
-from refweb.pictures import moving, pictures
+from refweb.pictures import movie_writer, pictures
 from refweb.pictures import render as drawing
 from refweb.pictures.camera import View, choose
 from refweb.pictures.frames import read
@@ -532,7 +532,7 @@ def test_colours_of_a_gif_are_those_of_its_images(tmp_path):
         pixels[np.arange(64), 20 + turn] = np.roll(np.round(255 * bar), 16 * turn, axis=0)
         pixels[10:30, 40:60] = np.linspace(60, 200, 20, dtype=np.uint8)[:, None, None] * np.ones((1, 1, 3), np.uint8)
         images.append(Image.fromarray(pixels))
-    gif = moving.Gif(tmp_path / "a.gif", (90, 64), 10.0, images[:2], bar)
+    gif = movie_writer.Gif(tmp_path / "a.gif", (90, 64), 10.0, images[:2], bar)
     for image in images:
         gif.add(image)
     gif.close()

@@ -11,9 +11,9 @@ from nets import SMALL
 import refweb
 from refweb.__main__ import main
 from refweb.errors import InputError
-from refweb.pictures import books, distances, plots, sheet
+from refweb.pictures import balances, distances, plots, sheet
+from refweb.pictures.plot_data import Shown
 from refweb.pictures.record import of_folder, of_solution
-from refweb.pictures.shown import Shown
 from refweb.pictures.spectra import FEWEST, _peak, _stands_out, spectrum_of
 
 SOLVE = '[solve]\nkind = "static"\nload_steps = [1, 2, 3]'
@@ -133,7 +133,7 @@ def test_energies_are_stacked_to_what_came_in(runs):
     They are as large as that at the start and work but for the drift that the run itself has found.
     """
     s = shown(runs / "dynamic")
-    table, book = s.history, books.energy_book(s)
+    table, book = s.history, balances.energy_book(s)
     assert list(book.parts) == ["strain_energy", "potential_energy", "kinetic_energy", "dissipated_energy"]
     low = table["potential_energy"].min()
     assert low < 0.0 and book.least["potential_energy"] == low
@@ -206,7 +206,7 @@ def test_ticks_are_true(runs, rows, value):
 
 def test_momentum_against_impulses(runs):
     """Momentum is what supports, load, gravity and damping gave, along each axis."""
-    book = books.momentum_book(shown(runs / "dynamic"))["z"]
+    book = balances.momentum_book(shown(runs / "dynamic"))["z"]
     largest = np.abs(book.impulses["impulse of loads and all else"]).max()
     assert largest > 0.01 and np.abs(book.drift).max() < 1e-12 * largest
     axes = of(plots.draw(of_folder(runs / "dynamic"), "momentum"), "along z")

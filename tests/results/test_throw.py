@@ -168,7 +168,7 @@ def test_what_run_and_twin_disagree_on_is_not_known():
 
 
 def test_it_is_written_and_read(tmp_path):
-    from refweb.results.words import on_run
+    from refweb.results.summary_text import on_run
 
     scene = thrown()
     solution = refweb.run(scene, out=tmp_path / "run")

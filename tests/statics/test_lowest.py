@@ -8,7 +8,7 @@ from scipy.optimize import minimize_scalar, root_scalar
 import refweb
 from refweb.statics.lowest import _above, _forces, _without_smoothing
 from refweb.statics.newton import Newton
-from refweb.system.at_rest import at_rest
+from refweb.system.static_system import at_rest
 
 AXIAL, RISE = 1e3, 0.1
 

@@ -41,8 +41,8 @@ from collections import Counter
 import numpy as np
 
 import refweb
-from refweb.dynamics.integrators.energy_book import DRIFT
-from refweb.errors import OpenBook
+from refweb.dynamics.integrators.energy_balance import DRIFT
+from refweb.errors import EnergyDriftError
 
 from ..harness.case import Case, Row, Table
 from .balances import energy_left, momentum_left, turning_left, unbalanced
@@ -588,8 +588,8 @@ def matrix(groups, methods, prove, tolerance, reason, quick):
                     line.append("left out")
                     continue
                 solution, why = attempt(members[name], method)
-                foreseen = members[name]["refused"].get(method)
-                as_foreseen = foreseen in why if foreseen else not why
+                reject_step = members[name]["refused"].get(method)
+                as_foreseen = reject_step in why if reject_step else not why
                 if not as_foreseen:
                     unforeseen.append(f"{name} by {method}")
                 if solution is None:
@@ -658,7 +658,7 @@ def random_trials(nets, runs):
             with np.errstate(all="ignore"):
                 worst = max(worst, energy_left(refweb.run(near_the_limit(seed))))
         except refweb.SolverError as error:
-            if not isinstance(error, OpenBook) and "passes the core of a body" not in str(error):
+            if not isinstance(error, EnergyDriftError) and "passes the core of a body" not in str(error):
                 raise
             refused += 1
     rows = [

@@ -24,7 +24,7 @@ from ...kernels import Integers, Matrix, Record, Vector, kernel
 
 if TYPE_CHECKING:
     from .extremes import Extremes
-    from .observed import Observed
+    from .monitors import Observed
 
 CELLS = 1024
 """Number of cells of a window. The mean of a sine over a whole period is off its largest value by 4e-12 of that."""

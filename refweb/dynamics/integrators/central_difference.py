@@ -19,24 +19,24 @@ import numpy as np
 
 from ...compiled.kernel import prepare
 from ...effects.base import blind_to_carried
-from ...errors import InputError, NoEnd, OpenBook, SolverError
+from ...errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ...kernels import MATRIX, Arrays
 from .averages import begin_averages
-from .between_steps import LOOKS
-from .energy_book import DRIFT, least_energy, refuse_open
+from .ccd import look_anew
+from .dense_output import LOOKS
+from .energy_balance import DRIFT, least_energy, refuse_open
 from .events import event_rows, starts_above
-from .explicit_course import ExplicitCourse
-from .explicit_loop import BREATH, HELD, advance_rows, begin, step_on
+from .explicit_loop import BREATH, HELD, advance_rows, begin, run_steps
+from .explicit_state import ExplicitState
 from .extremes import Extremes
 from .features import features
-from .guard import look_anew
 from .integrator import MAX_STEPS_PER_ROW, History, Integrator, Variant
-from .momentum_book import CLOSURE, Ledger, open_ledger, refuse_open_momentum
-from .nearby import forget, look_at_all
-from .observed import Observed
+from .momentum_balance import CLOSURE, MomentumBalance, open_balance, refuse_open_momentum
+from .monitors import Observed
+from .neighbour_list import forget, look_at_all
 from .records import CLOCK, Model, Running, Scheme
-from .room import Room
 from .step_bound import safe_step
+from .workspace import Workspace
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
@@ -72,7 +72,7 @@ class CentralDifference(Integrator):
 
     method, order, stretch = "central-difference", 2, 1.0
     knob, retry, beside, follows_lines = "safety", 0.5, True, True
-    breathe = staticmethod(lambda t: None)
+    on_progress = staticmethod(lambda t: None)
     variants = {"central-difference": Variant(kind="splitting")}
     kicks, drifts = np.array([0.5, 0.5]), np.array([1.0])
 
@@ -106,7 +106,7 @@ class CentralDifference(Integrator):
         self._outs = outs = tuple(system.per_cell())
         self._model = Model.of(system, outs)
         self._observed = Observed.of(probes, sums, outs, self._model.contacts)
-        self._touches = Arrays(MATRIX, [np.empty((0, self._model.rubbed.width))])
+        self._touches = Arrays(MATRIX, [np.empty((0, self._model.implicit_contacts.width))])
         self._events, self._least, self._taken, self._prepared = event_rows(events), least_energy(net), None, False
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
@@ -115,7 +115,7 @@ class CentralDifference(Integrator):
         """Compile what the run calls, see `refweb.dynamics.integrators.integrator.Integrator`."""
         if not self._prepared:
             model, observed = self._model, self._observed
-            called = [advance_rows, begin, open_ledger, safe_step, look_anew]
+            called = [advance_rows, begin, open_balance, safe_step, look_anew]
             called += [*model.all_kernels(), *observed.all_kernels()]
             prepare(called, features(self._scheme, model, observed, self._events))
             self._prepared = True
@@ -150,7 +150,7 @@ class CentralDifference(Integrator):
         return dict(nfev=per_step * course.nsteps + 1, njev=0, nlu=0)
 
     def start(self, x=None, v=None):
-        """The `ExplicitCourse` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
+        """The `ExplicitState` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
         self.prepare()
         system, self._taken = self.system, None
         force = np.zeros((system.rows, 3))
@@ -173,9 +173,9 @@ class CentralDifference(Integrator):
         averages = begin_averages(self._observed.windows, extremes)
         extremes.recent[:, 2] = extremes.values
         own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
-        ledger = Ledger.empty()
-        open_ledger(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
-        return ExplicitCourse(
+        ledger = MomentumBalance.empty()
+        open_balance(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
+        return ExplicitState(
             time=0.0,
             x=x,
             v=v,
@@ -191,13 +191,13 @@ class CentralDifference(Integrator):
         )
 
     def save(self, course):
-        """The `ExplicitCourse` as arrays by name, for a checkpoint."""
+        """The `ExplicitState` as arrays by name, for a checkpoint."""
         return course.arrays()
 
     def load(self, arrays):
-        """The `ExplicitCourse` of a checkpoint; families show what they do there."""
+        """The `ExplicitState` of a checkpoint; families show what they do there."""
         self.prepare()
-        course, self._taken = ExplicitCourse.of_arrays(arrays), None
+        course, self._taken = ExplicitState.of_arrays(arrays), None
         self.system.forces(course.time, course.x, course.v, self._outs)
         return course
 
@@ -239,7 +239,7 @@ class CentralDifference(Integrator):
         carried = course.power, np.zeros((2, changing)), course.crossings, self._touches
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
-    def advance(self, course: ExplicitCourse, times):
+    def advance(self, course: ExplicitState, times):
         """Take a course to each of some times; equal steps lead to each.
 
         See `refweb.dynamics.integrators.integrator.Integrator.advance`; a `SolverError` for a number that is not finite
@@ -250,7 +250,7 @@ class CentralDifference(Integrator):
         work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
         done, breath = 0, max(BREATH // max(work, 1), 1)
         running = self._running(course)
-        records = self._scheme, self._model, self._observed, running, Room.of(self._model, running)
+        records = self._scheme, self._model, self._observed, running, Workspace.of(self._model, running)
         clock = running.clock
         if len(self._model.guard.families) or len(self._model.walls.families):
             look_anew(self._model.guard)
@@ -263,14 +263,14 @@ class CentralDifference(Integrator):
                 if more == HELD:
                     self._refuse_passing(course, now)
                 if more < 0:
-                    raise NoEnd(
+                    raise IntegrationError(
                         f"the step at t = {now['time']:.6g} s is {now['step']:.3g} s, more than {MAX_STEPS_PER_ROW:g} "
                         f"steps to the next row: {self._way_out(course.x, float(now['step']))}"
                     )
                 done += more
                 if not now["begun"]:
                     break
-                self.breathe(now["time"] + now["begun"] * now["step"])
+                self.on_progress(now["time"] + now["begun"] * now["step"])
         except BaseException:
             if clock["begun"]:  # back to the last row or corner
                 course.x[:], course.v[:], course.force[:] = course.before
@@ -311,8 +311,8 @@ class CentralDifference(Integrator):
         def after(state, begun, count):
             state, running.clock["begun"] = state.copy(), begun
             copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
-            changing, room = self._model.reels.lengths.size > 0, Room.of(model, copy)
-            step_on(count, float(course.step), changing, self._scheme, model, self._observed, copy, room)
+            changing, room = self._model.reels.lengths.size > 0, Workspace.of(model, copy)
+            run_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, room)
             return state
 
         return after
@@ -322,7 +322,7 @@ class CentralDifference(Integrator):
         net, planned, after = self.system.net, int(running.clock[0]["planned"]), self._again(course, before, running)
         sound, done, ahead = course.before.copy(), 0, planned
         if np.isfinite(after(sound, 0, planned)).all():
-            raise NoEnd(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
+            raise IntegrationError(f"energy not finite at t = {course.time:.6g} s: use a smaller safety")
         while ahead > 1:  # what is not finite stays so: the first step that leads there is between done and ahead of it
             half = ahead // 2
             state = after(sound, done, half)
@@ -336,16 +336,16 @@ class CentralDifference(Integrator):
         lines = net.line[(net.cells == row).any(axis=1)]
         name += f", line {lines[0]}," if len(lines) else ""
         t = before + (done + 1) * course.step
-        raise NoEnd(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
+        raise IntegrationError(f"number not finite at {name} t = {t:.6g} s: use a smaller safety")
 
     def _refuse_passing(self, course, now):
         """Say which lines would pass through what in any step that is not far below the stable one."""
         if self._model.walls.met[3] == 0:
-            from ...effects.contact.passage import would_pass
+            from ...effects.contact.penetration import would_pass
 
             told = would_pass(self.system, self._model.walls.met)
         else:
-            from ...effects.self_contact.passage import would_pass
+            from ...effects.self_contact.penetration import would_pass
 
             told = would_pass(self.system, course.v, self._model.guard.met)
         at = now["time"] + now["begun"] * now["step"]
@@ -363,7 +363,7 @@ class CentralDifference(Integrator):
             state = after(state, n, 1)
             places.append((before + (n + 1) * course.step, state[0]))
         of, cell = source_of(system, places)
-        raise OpenBook(
+        raise EnergyDriftError(
             f"energy drift {course.drift:.3g} of the largest energy between t = {before:.6g} and {course.time:.6g} s, "
             f"limit {DRIFT:g}: energy came in with {of.name} at {name_of(system, of, cell)}; {self._remedy}",
             course.drift,
@@ -375,6 +375,6 @@ class CentralDifference(Integrator):
         return f"use a smaller step_size than {step:g}" if step else f"use a smaller safety than {self.safety:g}"
 
     def refuse_drift(self, course):
-        """Refuse a whole run whose energy drift exceeds `DRIFT`, or that of momentum `CLOSURE`; `OpenBook`."""
+        """Refuse a whole run whose energy drift exceeds `DRIFT`, or that of momentum `CLOSURE`; `EnergyDriftError`."""
         refuse_open(course, DRIFT, self._remedy)
         refuse_open_momentum(course, CLOSURE, self._remedy)

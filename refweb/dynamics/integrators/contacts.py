@@ -9,7 +9,7 @@ import numpy as np
 from ...effects.base import FELT_COLUMNS
 from ...kernels import Indices, IntegerMatrix, Matrix, Record, kernel
 from ...system.contact_forces import CHOSEN, FAMILY, add_felt, forget
-from .nearby import near_of
+from .neighbour_list import near_of
 
 if TYPE_CHECKING:
     from .records import Families

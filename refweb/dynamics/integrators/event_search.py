@@ -14,7 +14,7 @@ def search(events, piece, value, sample_at):
     ----------
     events : ndarray of `refweb.dynamics.integrators.events.EVENT`
         What each has come to; those behind the end of the run are taken back.
-    piece : refweb.dynamics.integrators.simpson_book.Piece
+    piece : refweb.dynamics.integrators.simpson_balance.Piece
         Where they are looked for: in its middle and at its end.
     value : callable
         ``value(slot, sample)`` of a probe or a sum.

@@ -12,7 +12,7 @@ from ...kernels import Integers, Matrix, Vector, inner, kernel
 from .extremes import look_at
 
 if TYPE_CHECKING:
-    from .observed import Observed
+    from .monitors import Observed
 
 EVENT = np.dtype(
     [

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
-from ...net.rotation import hand_on
+from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
 from ...results.probes import PLACE
 from .averages import average
-from .between_steps import look_again, look_at_books, look_behind, look_inside
+from .ccd import LEAST, SHORTER, TOLD, comes_through, look_back_at_drift, passes, reject_step
 from .contacts import feel
-from .energy_book import (
+from .dense_output import look_again, look_at_books, look_behind, look_inside
+from .energy_balance import (
     act,
     begin_powers,
     book_energies,
@@ -32,16 +33,14 @@ from .energy_book import (
     note_motion,
 )
 from .events import ended_by, note_events
-from .extremes import look_at, note_time, plain_value, take_over, turns_back
-from .guard import LEAST, SHORTER, TOLD, comes_through, foreseen, look_back_at_drift, passes
+from .extremes import look_at, note_time, plain_value, turns_back, update_extreme
 from .integrator import MAX_STEPS_PER_ROW, SAME
-from .momentum_book import add_half_steps, push_on, set_push
-from .nearby import covered, follow_near, reach_all, show_near
-from .room import Room
+from .momentum_balance import add_half_steps, push_on, set_push
+from .neighbour_list import covered, reach_all, show_near, update_neighbours
 from .rows import energies_now, write_row
-from .spread import spread_of
 from .step import (
     add_forces,
+    contact_kick,
     give_impulse,
     give_reaction,
     move,
@@ -49,17 +48,18 @@ from .step import (
     note_lengths,
     note_state,
     plain_kick,
-    rubbing_kick,
     set_lengths,
     set_reaction,
     turn_supports,
     viscous_kick,
 )
 from .step_bound import safe_step, step_by_elements
+from .vector_spread import spread_of
+from .workspace import Workspace
 
 if TYPE_CHECKING:
     from .extremes import Extremes
-    from .observed import Observed
+    from .monitors import Observed
     from .records import Model, Reels, Running, Scheme
 
 HELD = -2
@@ -77,7 +77,7 @@ def inner_stages(
     Time goes with the drifts, and in the potential that is booked with the kicks. A step in which lines would pass is
     not begun, which it returns.
     """
-    if foreseen(now - h, h, model, running):
+    if reject_step(now - h, h, model, running):
         return False
     families, inverse, held = model.families, model.inertia.inverse, model.inertia.held
     turns = model.inertia.turns
@@ -95,7 +95,7 @@ def inner_stages(
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
-        hand_on(x, f, turns)
+        add_forces_to_bodies(x, f, turns)
         set_reaction(held, f.reshape(-1), reaction)
         if model.outside.pushing.size:
             set_push(drifted, x, v, model.outside, families, extra, push)
@@ -116,7 +116,8 @@ def begin_more(t: float, changing: bool, extra: Matrix, push: Vector, model: Mod
     """Write powers, forces of natural lengths and push from outside."""
     x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
     if running.clock[0].begun == 0:
-        begin_powers(t, x, v, extra, families, model.rubbed.families, running.clock[0].nsteps > 0, running.power)
+        lossy, again = model.implicit_contacts.families, running.clock[0].nsteps > 0
+        begin_powers(t, x, v, extra, families, lossy, again, running.power)
     if changing:
         reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
     if outside.pushing.size:
@@ -134,17 +135,20 @@ def change_lengths(
 
 
 @kernel(leaf=True, apart=())
-def step_on(
-    count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running, room: Room
-) -> int:
+def run_steps(
+    count: int, h: float, changing: bool, scheme: Scheme, model: Model, observed: Observed, running: Running,
+    space: Workspace,
+) -> int:  # fmt: skip
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
-    where, reaction, known, push, before = room.where, room.reaction, room.known, room.push, room.before
-    aside, extra, half, was, inside, total = room.aside, room.extra, room.half, room.was, room.inside, room.total
+    where, reaction, known, push, before = space.where, space.reaction, space.known, space.push, space.before
+    aside, extra, half, was = space.aside, space.extra, space.half, space.was
+    inside, total = space.inside, space.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    still, viscous, powers, rubbing = families.still, families.viscous, families.powers, model.rubbed.families
+    still, viscous, powers = families.still, families.viscous, families.powers
+    rubbing = model.implicit_contacts.families
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     lines, first, data_of_lines = families.outs[0], families.forces[0], families.data[0]
@@ -174,16 +178,16 @@ def step_on(
         if changing:
             change_lengths(now, x, reels, was, data_of_lines, length_force, work)
         if near:
-            follow_near(drift, x, v, bits, before, model)
+            update_neighbours(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
         first(now, x, v, f, families.cells[0], data_of_lines, lines)
         for i in still:
             act(i, now, x, v, f, families)
         if near:
             show_near(nearby, families)
-        hand_on(x, f, turns)
+        add_forces_to_bodies(x, f, turns)
         if rubbing.size:
-            rubbing_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.touches, model)
+            contact_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.touches, model)
         elif viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:
@@ -204,7 +208,7 @@ def step_on(
                 known[0] = look_at(i, now, x, v, f, lines, observed, where)
             turned = turns_back(i, known[0], signs[i], values[i], recent, ending) or turned
             if signs[i] * known[0] > signs[i] * values[i]:
-                take_over(i, known[0], now, x, v, f, lines, observed, where, extremes)
+                update_extreme(i, known[0], now, x, v, f, lines, observed, where, extremes)
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
@@ -284,7 +288,7 @@ def advance_rows(
     model: Model,
     observed: Observed,
     running: Running,
-    room: Room,
+    space: Workspace,
     history: Matrix,
 ) -> int:
     """Advance to each of some times, and write a row of ``history`` there.
@@ -295,10 +299,10 @@ def advance_rows(
     and does not fall; then ``before`` holds x, v and f at the last corner or row before, of the time ``since``; −1
     where it takes more than `MAX_STEPS_PER_ROW` steps from there. Where an event ends the run, that row is the last,
     and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is felt, and goes
-    on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.guard`.
+    on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.ccd`.
     """
     clock, events, reels, left = running.clock[0], running.events, model.reels, breath
-    total, stopped = room.total, ended_by(events)
+    total, stopped = space.total, ended_by(events)
     for n in range(times.size):
         if reels.lengths.size and not clock.begun:
             set_lengths(clock.time, reels, model.families.data[0])
@@ -314,7 +318,7 @@ def advance_rows(
             if halved > 0.0 and not begun:
                 add_half_steps(-halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             count = min(clock.planned - begun, max(left, 1))
-            taken = step_on(count, clock.step, changing, scheme, model, observed, running, room)
+            taken = run_steps(count, clock.step, changing, scheme, model, observed, running, space)
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
@@ -331,13 +335,13 @@ def advance_rows(
             if halved > 0.0:
                 add_half_steps(halved, model.outside, model.inertia.inverse, running.f, running.ledger.pushed)
             if model.inertia.driven.size and turn_supports(clock.time, model, running):
-                look_behind(model, observed, running, room)
+                look_behind(model, observed, running, space)
             if clock.time < times[n]:  # a corner: what is stored may be gone again at the row
                 largest = energies_now(model, running, total)[1]
                 if not math.isfinite(largest):
                     break
                 clock.largest = max(clock.largest, largest)
-        energy, stored = write_row(history[n], model, observed, running, total, room.where, room.momenta)
+        energy, stored = write_row(history[n], model, observed, running, total, space.where, space.momenta)
         if drifts_away(clock, energy, stored, total[-2], limit):
             return n
         if stopped:
@@ -363,7 +367,7 @@ def begin(
         set_lengths(0.0, model.reels, families.data[0])
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
-    hand_on(x, f, model.inertia.turns)
+    add_forces_to_bodies(x, f, model.inertia.turns)
     feel(model.contacts, families)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE

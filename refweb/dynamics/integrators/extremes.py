@@ -24,7 +24,7 @@ from ...kernels import Integers, Matrix, Record, Vector, inner, kernel
 from ...results.probes import NODES, PLACE, farthest, largest_in
 
 if TYPE_CHECKING:
-    from .observed import Observed
+    from .monitors import Observed
 
 EDGE = 2.0**-16
 """Share of a step at whose distance from an end it is looked at for the rate there."""
@@ -140,7 +140,7 @@ def look_at(i, t, x, v, f, lines, observed, where):
 
 
 @kernel(leaf=True, apart=("watched",))
-def take_over(
+def update_extreme(
     i: int,
     value: float,
     t: float,
@@ -178,7 +178,7 @@ def look(
         value = look_at(i, t, x, v, f, lines, observed, where)
         turned = turns_back(i, value, signs[i], extremes.values[i], extremes.recent, ending) or turned
         if signs[i] * value > signs[i] * extremes.values[i]:
-            take_over(i, value, t, x, v, f, lines, observed, where, extremes)
+            update_extreme(i, value, t, x, v, f, lines, observed, where, extremes)
     return turned
 
 

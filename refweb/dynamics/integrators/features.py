@@ -31,7 +31,7 @@ def features(scheme, model, observed, events):
         "lengths": len(model.reels.lengths),
         "powers": len(families.powers),
         "viscous": len(families.viscous),
-        "rubbing": len(model.rubbed.families),
+        "rubbing": len(model.implicit_contacts.families),
         "pushing": len(outside.pushing),
         "damped": len(outside.damped),
         "booked": len(families.powers) + len(model.reels.lengths) + len(outside.pushing),

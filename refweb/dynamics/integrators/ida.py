@@ -33,7 +33,7 @@ import numpy as np
 
 from ...errors import InputError, SolverError
 from .integrator import Variant
-from .observed_course import ObservedCourse
+from .observed_state import ObservedState
 from .step_observer import Stopped
 from .sundials import Sundials, Symmetric
 from .tolerances import scales
@@ -43,7 +43,7 @@ UNTESTED = 1e30
 
 
 @dataclass(eq=False, kw_only=True)
-class LinkedCourse(ObservedCourse):
+class LinkedCourse(ObservedState):
     """State of a run with links.
 
     Attributes
@@ -245,7 +245,7 @@ class Ida(Sundials):
     # Consistent initial conditions
 
     def start(self, x=None, v=None):
-        """The `Course` at t = 0.
+        """The `IntegratorState` at t = 0.
 
         Nodes without mass are moved to their equilibrium among all others, and what would stretch links is taken out
         of the velocities with the least kinetic energy.

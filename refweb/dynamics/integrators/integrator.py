@@ -24,17 +24,17 @@ from .averages import Averages
 from .crossings import none_met
 from .events import ended_by
 from .extremes import Extremes
-from .momentum_book import Ledger
+from .momentum_balance import MomentumBalance
 
 if TYPE_CHECKING:
-    from ...system.torn import Breaks
+    from ...system.broken_lines import Breaks
 
 SAME = 1e-12
 """Share of a time within which another is the same: corners of tables, rows and ends of steps are sums."""
 MAX_STEPS_PER_ROW = 1e8
 """Largest number of steps that a history row may take."""
-GROUPS = {"extremes": Extremes, "ledger": Ledger, "averages": Averages}
-"""Fields of a `Course` that are records of arrays."""
+GROUPS = {"extremes": Extremes, "ledger": MomentumBalance, "averages": Averages}
+"""Fields of a `IntegratorState` that are records of arrays."""
 
 
 class Sum(NamedTuple):
@@ -53,7 +53,7 @@ class Sum(NamedTuple):
 
 
 @dataclass(eq=False, kw_only=True)
-class Course:
+class IntegratorState:
     """Where a run is: all that it takes to go on from there.
 
     Attributes
@@ -70,7 +70,7 @@ class Course:
         Work of each family that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
-    ledger : refweb.dynamics.integrators.momentum_book.Ledger
+    ledger : refweb.dynamics.integrators.momentum_balance.Ledger
         The book of momentum.
     averages : refweb.dynamics.integrators.averages.Averages
         Means over windows, of the probes that have one.
@@ -90,7 +90,7 @@ class Course:
         Where lines may touch lines, the first two that may have passed through each other, and the first two neighbours
         along the net: time [s], infinite where there are none, and the four nodes of both; the first line that may have
         passed through a body: time, its two nodes, the row of the body and a number.
-    breaks : refweb.system.torn.Breaks, optional
+    breaks : refweb.system.broken_lines.Breaks, optional
         What has broken, where anything may.
     """
 
@@ -101,7 +101,7 @@ class Course:
     events: np.ndarray
     work: np.ndarray
     impulse: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    ledger: Ledger = field(default_factory=Ledger.empty)
+    ledger: MomentumBalance = field(default_factory=MomentumBalance.empty)
     averages: Averages = field(default_factory=Averages.at_start)
     nsteps: int = 0
     step: float = 0.0
@@ -283,9 +283,9 @@ class Integrator(Protocol):
     knob: Literal["safety", "rtol"]
     retry: float
     beside: bool
-    breathe: Callable[[float], None]
+    on_progress: Callable[[float], None]
 
-    def start(self, x: np.ndarray | None = None, v: np.ndarray | None = None) -> Course:
+    def start(self, x: np.ndarray | None = None, v: np.ndarray | None = None) -> IntegratorState:
         """The course at t = 0.
 
         Parameters
@@ -303,7 +303,7 @@ class Integrator(Protocol):
         """
         ...
 
-    def advance(self, course: Course, times: Sequence[float]) -> History:
+    def advance(self, course: IntegratorState, times: Sequence[float]) -> History:
         """Take a course to each of some times in turn.
 
         Parameters
@@ -321,17 +321,17 @@ class Integrator(Protocol):
         Raises
         ------
         OpenBook
-            Where the energy drift exceeds `refweb.dynamics.integrators.energy_book.DRIFT` and does not fall.
+            Where the energy drift exceeds `refweb.dynamics.integrators.energy_balance.DRIFT` and does not fall.
         SolverError
             Where no step is to be had, or a number is not finite.
         """
         ...
 
-    def refuse_drift(self, course: Course) -> None:
-        """Refuse a course that is complete, where its books are open by more than a result may have; `OpenBook`."""
+    def refuse_drift(self, course: IntegratorState) -> None:
+        """Raise `EnergyDriftError` for a complete run whose energy balance is open by more than results may have."""
         ...
 
-    def spent(self, course: Course) -> dict:
+    def spent(self, course: IntegratorState) -> dict:
         """What a course has spent, for ``run.json``.
 
         Returns
@@ -342,11 +342,11 @@ class Integrator(Protocol):
         """
         ...
 
-    def save(self, course: Course) -> dict[str, np.ndarray]:
+    def save(self, course: IntegratorState) -> dict[str, np.ndarray]:
         """A course as arrays by name, for a checkpoint."""
         ...
 
-    def load(self, arrays: dict[str, np.ndarray]) -> Course:
+    def load(self, arrays: dict[str, np.ndarray]) -> IntegratorState:
         """The course of a checkpoint, for an integrator made of the same arguments."""
         ...
 
@@ -361,7 +361,7 @@ class Integrator(Protocol):
         """
         ...
 
-    def error_share(self, course: Course, finer: Course) -> float:
+    def error_share(self, course: IntegratorState, finer: IntegratorState) -> float:
         """Error of a finer run over that of this one, by the order of the method [1].
 
         Parameters

@@ -68,7 +68,7 @@ class Measurements:
         self._where = np.zeros(2, dtype=np.int64)
 
     def probe(self, i, sample):
-        """Value of a probe at a `refweb.dynamics.integrators.simpson_book.Sample`."""
+        """Value of a probe at a `refweb.dynamics.integrators.simpson_balance.Sample`."""
         kernel, rows, data, family = self._probes[i]
         data = sample.shown.get(family, data)
         return kernel(sample.time, sample.x, sample.v, sample.force, sample.lines, rows, data, self._where)

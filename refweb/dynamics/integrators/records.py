@@ -34,16 +34,16 @@ from ...kernels import (
     Vector,
     VectorTable,
 )
-from ...net.rotation import Turns
+from ...net.rotation import RigidRotations
 from .averages import Averages
+from .ccd import BodyCcd, Ccd
 from .contacts import Contacts
-from .energy_book import no_energy
+from .energy_balance import no_energy
 from .events import EventArray
 from .extremes import Extremes
-from .guard import Guard, Walls
-from .momentum_book import Ledger, Outside
-from .nearby import Nearby, near_of
-from .rubbed import Rubbed
+from .implicit_contacts import ImplicitContacts
+from .momentum_balance import MomentumBalance, Outside
+from .neighbour_list import NeighbourList, near_of
 from .step_bound import no_bound
 
 CLOCK = np.dtype(
@@ -64,9 +64,10 @@ CLOCK = np.dtype(
         ("held", np.int64),
     ]
 )
-"""Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.Course` by their names, then the
-energy that a drift is held against at least, the time from which steps are equal, how many of these are taken, 0 where
-none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not pass, 0
+"""Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.IntegratorState` by their names,
+then the energy that a drift is held against at least, the time from which steps are equal, how many of these are taken,
+0 where none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not
+pass, 0
 where it is not, and whether it is to be cut."""
 ClockArray = Annotated[np.ndarray, types.Array(from_dtype(CLOCK), 1, "C")]
 
@@ -137,7 +138,7 @@ class Inertia(Record):
     held: Integers
     driven: Integers
     linear: int
-    turns: Turns
+    turns: RigidRotations
 
     @classmethod
     def of(cls, system):
@@ -147,7 +148,14 @@ class Inertia(Record):
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
         moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
         return cls(
-            net.mass, inverse, np.empty((2, system.rows)), moving, held, driven, system.rows - net.spins, Turns.of(net)
+            net.mass,
+            inverse,
+            np.empty((2, system.rows)),
+            moving,
+            held,
+            driven,
+            system.rows - net.spins,
+            RigidRotations.of(net),
         )
 
 
@@ -291,23 +299,27 @@ class Model(Record):
 
     inertia: Inertia
     families: Families
-    rubbed: Rubbed
+    implicit_contacts: ImplicitContacts
     motions: Motions
     reels: Reels
     corners: Vector
     outside: Outside
-    nearby: Nearby
-    guard: Guard
-    walls: Walls
+    nearby: NeighbourList
+    guard: Ccd
+    walls: BodyCcd
     contacts: Contacts
 
     @classmethod
     def of(cls, system, outs):
         """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
-        inertia, families, rubbed = Inertia.of(system), Families.of(system, outs), Rubbed.of(system)
+        inertia, families, implicit_contacts = (
+            Inertia.of(system),
+            Families.of(system, outs),
+            ImplicitContacts.of(system),
+        )
         motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
-        kept = Nearby.of(system), Guard.of(system), Walls.of(system), Contacts.of(system)
-        return cls(inertia, families, rubbed, motions, reels, system.corners, outside, *kept)
+        kept = NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system)
+        return cls(inertia, families, implicit_contacts, motions, reels, system.corners, outside, *kept)
 
 
 class Running(Record):
@@ -325,7 +337,7 @@ class Running(Record):
         Work of each family and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports [N s].
-    ledger : refweb.dynamics.integrators.momentum_book.Ledger
+    ledger : refweb.dynamics.integrators.momentum_balance.Ledger
         The book of momentum.
     extremes : refweb.dynamics.integrators.extremes.Extremes
         Extremes of probes and sums.
@@ -338,7 +350,7 @@ class Running(Record):
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)
-        What has met, see `refweb.dynamics.integrators.integrator.Course`.
+        What has met, see `refweb.dynamics.integrators.integrator.IntegratorState`.
     touches : table
         One array, space for what touches and is solved for.
     """
@@ -350,7 +362,7 @@ class Running(Record):
     before: Cube
     work: Vector
     impulse: Vector
-    ledger: Ledger
+    ledger: MomentumBalance
     extremes: Extremes
     events: EventArray
     averages: Averages

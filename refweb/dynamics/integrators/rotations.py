@@ -18,7 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
-from ...net.rotation import Turns, quaternion_rate
+from ...net.rotation import RigidRotations, quaternion_rate
 from ...net.rotation_bounds import speeds
 
 
@@ -32,7 +32,7 @@ class Rotations:
     """
 
     def __init__(self, system):
-        self.turns = turns = Turns.of(system.net)
+        self.turns = turns = RigidRotations.of(system.net)
         _, self._spin, self._turn = turns.rows.T
         number = np.full(3 * system.rows, -1)
         number[system.free] = np.arange(len(system.free))

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 from ...kernels import Integers, Matrix, Vector, kernel
 from .averages import write_means
-from .energy_book import book_energies, own_energy
+from .energy_balance import book_energies, own_energy
 from .extremes import look_at
-from .momentum_book import note_momentum
+from .momentum_balance import note_momentum
 
 if TYPE_CHECKING:
-    from .observed import Observed
+    from .monitors import Observed
     from .records import Model, Running
 
 

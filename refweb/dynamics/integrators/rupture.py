@@ -13,7 +13,7 @@ import numpy as np
 from ...effects.base import STRAIN
 from ...errors import InputError
 from ...results.probes import Probe, line, line_of, slack_fraction
-from ...system.torn import Breaks, tear, torn
+from ...system.broken_lines import Breaks, tear, torn
 from .events import Event, ended_by
 from .extremes import begin_anew
 from .integrator import History
@@ -32,7 +32,7 @@ class Rupturing:
     make : callable
         Makes the integrator of a system, probes, sums and events.
     system : refweb.system.system.System
-        With a `refweb.effects.base.Weakness`.
+        With a `refweb.effects.base.BreakLimits`.
     probes, sums, events : sequence
         What to look at. The last of the events, where any tension breaks anything and there are any, is that the
         largest tension over its limit passes 1; it ends the run.
@@ -64,20 +64,20 @@ class Rupturing:
         return getattr(self.inner, name)
 
     @property
-    def breathe(self):
+    def on_progress(self):
         """As in `refweb.dynamics.integrators.integrator.Integrator`."""
-        return self.inner.breathe
+        return self.inner.on_progress
 
-    @breathe.setter
-    def breathe(self, call):
-        self._breathe = self.inner.breathe = call
+    @on_progress.setter
+    def on_progress(self, call):
+        self._breathe = self.inner.on_progress = call
 
     def _of(self, system):
         """The integrator of a system."""
         broken = system.net.broken
         inner = self._make(system, [unstrained(probe, broken) for probe in self._probes], *self._rest)
         if self._breathe is not None:
-            inner.breathe = self._breathe
+            inner.on_progress = self._breathe
         return inner
 
     def refined(self, by=None):

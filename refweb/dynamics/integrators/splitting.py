@@ -9,7 +9,7 @@ Largest values are looked for four times a step, and where parabolas through the
 Dead loads may follow tables of time: steps end at the corners of these, and between them time is a coordinate that
 goes with the drifts, in which a force is taken where its drifts have come to. Their work is what their potential
 loses in each drift, taken at the time that the kicks have come to, see
-`refweb.dynamics.integrators.energy_book.book_potential`.
+`refweb.dynamics.integrators.energy_balance.book_potential`.
 
 The coefficients are those of S. Blanes and P. C. Moan [1]_. On the square web of the paper, thrown by its centre
 (smooth law, η = 1e-4, 0.05 s), errors of any displacement and evaluations of forces are

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...kernels import Cube, ForceTable, IndexTable, Matrix, MatrixTable, copy_rows, kernel, sum_of
 from ...net.net import LENGTH
-from ...net.rotation import Turns, carry, hand_on, note_turns, turn_on
+from ...net.rotation import RigidRotations, add_forces_to_bodies, advance_rotation, note_turns, update_attached_nodes
 from .contacts import feel
-from .energy_book import act
-from .rubbed import meet_all
+from .energy_balance import act
+from .implicit_contacts import meet_all
 
 if TYPE_CHECKING:
     from .records import Families, Model, Reels, Running
@@ -48,7 +48,7 @@ def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
         note_turns(x, turns)
     kick_and_drift(kick, drift, inverse, flat_x, flat_v, flat_f)
     if turns.moment.size:
-        turn_on(drift, v, x, turns)
+        advance_rotation(drift, v, x, turns)
 
 
 @kernel(leaf=True, forceinline=True)
@@ -62,7 +62,7 @@ def last_kick(kick, inverse, v, f):
 def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
     """As `last_kick`, where bodies may carry nodes."""
     last_kick(kick, inverse, flat_v, flat_f)
-    carry(x, v, turns)
+    update_attached_nodes(x, v, turns)
 
 
 @kernel(forceinline=True)
@@ -109,7 +109,7 @@ def viscous_kick(
     half: Matrix,
     extra: Matrix,
     families: Families,
-    turns: Turns,
+    turns: RigidRotations,
 ) -> None:
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
 
@@ -123,10 +123,10 @@ def viscous_kick(
     share, before_that = 1.0, math.inf
     for _ in range(ROUNDS):
         extra[:] = 0.0
-        carry(x, v, turns)
+        update_attached_nodes(x, v, turns)
         for i in families.viscous:
             act(i, t, x, v, extra, families)
-        hand_on(x, extra, turns)
+        add_forces_to_bodies(x, extra, turns)
         change = fastest = 0.0
         for q in range(flat_v.size):
             speed = flat_half[q] + 0.5 * h * flat_inverse[q] * (flat_f[q] + flat_extra[q])
@@ -141,11 +141,11 @@ def viscous_kick(
         before_that = change
     for q in range(flat_v.size):
         flat_f[q] += flat_extra[q]
-    carry(x, v, turns)
+    update_attached_nodes(x, v, turns)
 
 
 @kernel(apart=("rubbing",))
-def rubbing_kick(
+def contact_kick(
     number: int,
     t: float,
     h: float,
@@ -163,10 +163,10 @@ def rubbing_kick(
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
     the first begins without a memory of another. It writes the power of what rubs; ``room`` holds what touches.
     """
-    families, rubbed, turns = model.families, model.rubbed, model.inertia.turns
+    families, implicit_contacts, turns = model.families, model.implicit_contacts, model.inertia.turns
     forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
-    ends = np.zeros(rubbed.families.size, dtype=np.int64)
-    touches = room[0] = meet_all(h, x, v, inverse, families, rubbed, room[0], ends)
+    ends = np.zeros(implicit_contacts.families.size, dtype=np.int64)
+    touches = room[0] = meet_all(h, x, v, inverse, families, implicit_contacts, room[0], ends)
     count, begin = ends[-1], 0
     copy_rows(v, half)
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
@@ -176,8 +176,8 @@ def rubbing_kick(
         fastest = max(fastest, abs(flat_v[q]), h * flat_inverse[q] * abs(flat_f[q]))
     for m in range(ends.size):
         if number == 1:
-            rubbed.memories[m][:] = 0.0
-        rubbed.recalls[m](number, rubbed.memories[m], f, touches, begin, ends[m])
+            implicit_contacts.memories[m][:] = 0.0
+        implicit_contacts.recalls[m](number, implicit_contacts.memories[m], f, touches, begin, ends[m])
         begin = ends[m]
     change, stalled, patience = math.inf, STALLED, 1 if number > 1 else SWEEPS
     if viscous.size:
@@ -188,15 +188,17 @@ def rubbing_kick(
             for q in range(flat_f.size):
                 flat_f[q] -= flat_extra[q]
             extra[:] = 0.0
-            carry(x, v, turns)
+            update_attached_nodes(x, v, turns)
             for i in viscous:
                 forces[i](t, x, v, extra, cells[i], data[i], outs[i])
-            hand_on(x, extra, turns)
+            add_forces_to_bodies(x, extra, turns)
             for q in range(flat_f.size):
                 flat_f[q] += flat_extra[q]
         begin = 0
-        for m in rubbed.last:
-            change = max(change, rubbed.sweeps[m](h, n, f, inverse, touches[begin : ends[m]], ends[m] - begin))
+        for m in implicit_contacts.last:
+            change = max(
+                change, implicit_contacts.sweeps[m](h, n, f, inverse, touches[begin : ends[m]], ends[m] - begin)
+            )
             begin = ends[m]
         if viscous.size:
             for q in range(flat_v.size):
@@ -207,10 +209,12 @@ def rubbing_kick(
             break
     last_kick(0.5 * h, flat_inverse, flat_half, flat_f)
     copy_rows(half, v)
-    carry(x, v, turns)
+    update_attached_nodes(x, v, turns)
     begin = 0
-    for m in range(rubbed.families.size):
-        rubbed.gives[m](number, rubbed.memories[m], v, touches, begin, ends[m], outs[rubbed.families[m]])
+    for m in range(implicit_contacts.families.size):
+        implicit_contacts.gives[m](
+            number, implicit_contacts.memories[m], v, touches, begin, ends[m], outs[implicit_contacts.families[m]]
+        )
         begin = ends[m]
 
 
@@ -252,13 +256,13 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
             now = v[driven[d], k]
             running.work[running.work.size - 1] += 0.5 * mass[driven[d]] * (now + was[d, k]) * (now - was[d, k])
             turned = turned or now != was[d, k]
-    if turned and families.viscous.size + model.rubbed.families.size:
+    if turned and families.viscous.size + model.implicit_contacts.families.size:
         f[:] = 0.0
         for i in range(len(forces)):
             forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
-        hand_on(x, f, model.inertia.turns)
+        add_forces_to_bodies(x, f, model.inertia.turns)
         feel(model.contacts, families)
-        for i in model.rubbed.families:
+        for i in model.implicit_contacts.families:
             running.power[i] = sum_of(families.outs[i][:, 0])
     return turned
 

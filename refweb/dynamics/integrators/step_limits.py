@@ -26,28 +26,28 @@ class StepLimits:
 
     Attributes
     ----------
-    lines : refweb.dynamics.integrators.followed_lines.FollowedLines, optional
+    lines : refweb.dynamics.integrators.line_line_ccd.FollowedLines, optional
         Lines that touch lines, where any do.
-    pairs : refweb.dynamics.integrators.followed_pairs.FollowedPairs, optional
+    pairs : refweb.dynamics.integrators.body_body_ccd.FollowedPairs, optional
         Bodies that touch bodies, where any do.
-    followed : list of refweb.dynamics.integrators.followed_lines.Followed
+    followed : list of refweb.dynamics.integrators.line_line_ccd.Followed
         These, and lines that touch bodies.
     """
 
     def __init__(self, system, rotations=None):
         self.lines = None
         if any(family.crossing is not None for family in system.families):
-            from .followed_lines import FollowedLines
+            from .line_line_ccd import FollowedLines
 
             self.lines = FollowedLines(system)
         self.followed: list = [] if self.lines is None else [self.lines]
         if any(family.passing is not None for family in system.families):
-            from .followed_bodies import FollowedBodies
+            from .line_body_ccd import FollowedBodies
 
             self.followed.append(FollowedBodies(system))
         self.pairs = None
         if any(family.pairs for family in system.families):
-            from .followed_pairs import FollowedPairs
+            from .body_body_ccd import FollowedPairs
 
             self.pairs = FollowedPairs(system)
             self.followed.append(self.pairs)

@@ -11,17 +11,17 @@ import contextlib
 
 import numpy as np
 
-from ...errors import InputError, NoEnd
+from ...errors import InputError, IntegrationError
 from ...system.mass import refuse_massless
-from .energy_book import DRIFT, refuse_open
+from .energy_balance import DRIFT, refuse_open
 from .event_search import search
 from .events import event_rows, starts_above
 from .extremes import EDGE, begin_anew
 from .integrator import MAX_STEPS_PER_ROW, History, Integrator
 from .measurements import Measurements
-from .momentum_book import allowed, refuse_open_momentum
-from .observed_course import ObservedCourse
-from .simpson_book import SimpsonBook
+from .momentum_balance import allowed, refuse_open_momentum
+from .observed_state import ObservedState
+from .simpson_balance import SimpsonBalance
 from .step_limits import StepLimits
 from .tolerances import scales
 
@@ -74,8 +74,8 @@ class StepObserver(Integrator):
 
     method, order = "", 2
     knob, retry, beside, follows_lines = "rtol", 0.1, False, True
-    breathe = staticmethod(lambda t: None)
-    course_type = ObservedCourse
+    on_progress = staticmethod(lambda t: None)
+    course_type = ObservedState
     _made_of: tuple
     takes_massless = takes_links = takes_rotations = False
     """Whether nodes without mass have a place in the method's equations, rigid links, and bodies that turn."""
@@ -114,7 +114,7 @@ class StepObserver(Integrator):
         self.stats = dict(nfev=0, njev=0, nlu=0)
         self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
         still = max(fast, self.atol_velocity / rtol)
-        self._book = SimpsonBook(system, self.hold, still, self._measurements.shown)
+        self._book = SimpsonBalance(system, self.hold, still, self._measurements.shown)
         self._limits = StepLimits(system, self.rotations)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
@@ -204,7 +204,7 @@ class StepObserver(Integrator):
         return dict(self.stats)
 
     def start(self, x=None, v=None):
-        """The `Course` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
+        """The `IntegratorState` at t = 0, see `refweb.dynamics.integrators.integrator.Integrator.start`."""
         system = self.system
         x = np.zeros((system.rows, 3)) if x is None else x.copy()
         v = system.initial_velocity() if v is None else v.copy()
@@ -222,11 +222,11 @@ class StepObserver(Integrator):
         return course
 
     def save(self, course):
-        """The `Course` as arrays by name, for a checkpoint; a method's past steps are not among them."""
+        """The `IntegratorState` as arrays by name, for a checkpoint; a method's past steps are not among them."""
         return {**course.arrays(), "spent": np.array(list(self.stats.values()))}
 
     def load(self, arrays):
-        """The `Course` of a checkpoint, from which the method begins as at t = 0."""
+        """The `IntegratorState` of a checkpoint, from which the method begins as at t = 0."""
         arrays = dict(arrays)
         self.stats.update(zip(self.stats, arrays.pop("spent").tolist(), strict=True))
         course = self.course_type.of_arrays(arrays)
@@ -248,7 +248,7 @@ class StepObserver(Integrator):
         """Factor on rtol for errors that are ``share`` times what they may be."""
         return min(max(0.5 * share**-1.5, 0.01), 0.1)
 
-    def advance(self, course: ObservedCourse, times):
+    def advance(self, course: ObservedState, times):
         """Take a course to each of some times, see `refweb.dynamics.integrators.integrator.Integrator.advance`."""
         times = np.atleast_1d(np.asarray(times, dtype=float))
         history = History.empty(len(times), self._measurements.probed, self.system.families)
@@ -258,7 +258,7 @@ class StepObserver(Integrator):
                 if course.reached <= course.time:
                     self._take_step(course, end)
                     if course.nsteps % BREATH == 0:
-                        self.breathe(course.time)
+                        self.on_progress(course.time)
                 self._cover(course, min(course.reached, end))
             self._fill(history.values[n], course, before)
             if course.stopped:
@@ -266,7 +266,7 @@ class StepObserver(Integrator):
         return history
 
     def refuse_drift(self, course):
-        """Refuse a whole run whose energy drifts by more than `DRIFT`, or its momentum than `allowed`; `OpenBook`."""
+        """Raise `EnergyDriftError` for a run with an energy drift above `DRIFT` or a momentum drift above `allowed`."""
         refuse_open(course, DRIFT, self._remedy)
         refuse_open_momentum(course, allowed(self.rtol), self._remedy)
 
@@ -278,7 +278,7 @@ class StepObserver(Integrator):
         with self._told(course):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
-    def _take_step(self, course: ObservedCourse, end):
+    def _take_step(self, course: ObservedState, end):
         """One step of the method, not beyond a corner of a table, nor further than a body can be passed."""
         stop = self._limits.stop(course.time, course.x, course.v, end)
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
@@ -297,7 +297,7 @@ class StepObserver(Integrator):
         course.step, course.reached, course.nsteps = reached - course.reached, reached, course.nsteps + 1
         course.short = course.short + 1 if course.step * MAX_STEPS_PER_ROW < end - course.time else 0
         if course.short > PATIENCE:
-            raise NoEnd(
+            raise IntegrationError(
                 f"the steps at t = {course.time:.6g} s are {course.step:.3g} s, more than {MAX_STEPS_PER_ROW:g} to the "
                 f"next row: raise rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"
             )
@@ -378,7 +378,7 @@ class StepObserver(Integrator):
             system = self.system
             force = np.where(system.supported, 0.0, system.force(course.time, course.x, course.v))
             row = int(np.argmax(np.linalg.norm(force, axis=1)))
-            raise NoEnd(
+            raise IntegrationError(
                 f"{self.method} stopped at t = {course.reached:.6g} s with steps of {course.step:.3g} s: "
                 f"{str(stop).rstrip('.')}; the largest force that moves anything is at {system.row_name(row)}: raise "
                 f"rtol = {self.rtol:g}, or lower the stiffness that asks for such steps"

@@ -14,8 +14,8 @@ import numpy as np
 from ...errors import InputError
 from ...net.skeleton import COLUMNS, THICKNESS
 from ..base import CONTACT_COLUMNS, OWN, Family
+from .body_body_detection import PARTS, SIDE, SIDES
 from .pair import lever
-from .pressing import PARTS, SIDE, SIDES
 
 PER_PART, MORE = 3, 1024
 """Contacts that a part of a skeleton has at most on a convex body; room for more where one is not convex."""
@@ -65,7 +65,7 @@ def families(net, law_of):
 
 
 def _penalty(net, depths, group):
-    from .apart import kernels, near
+    from .body_body_penalty import kernels, near
 
     force, energy, stiffness, bound = kernels(*depths)
     return Family(
@@ -82,7 +82,7 @@ def _penalty(net, depths, group):
 
 
 def _friction(net, depths, group):
-    from .sliding import kernels
+    from .body_body_friction import kernels
 
     force, stiffness, damping, rubbing = kernels(*depths)
     shared = _shared(net, group)
@@ -132,7 +132,7 @@ def _pair(net, first, second, law):
 
 
 def _side(body, spins, law, parts, begin, more):
-    """Numbers of one body of a pair, see `refweb.effects.contact.pressing`, the other being ``more`` thick."""
+    """Data of one body of a pair for `refweb.effects.contact.body_body_detection`; the other is ``more`` thick."""
     (radius, core, round_, *field), (stiffness, *losses) = body.shape.touched(more), law
     mobility = body.mobility[np.triu_indices(3)] if spins == 2 else (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     own = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, _lever(body, spins), body.extent]

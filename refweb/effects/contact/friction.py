@@ -1,7 +1,7 @@
 """Losses of contact, by damping and by friction, as compiled kernels.
 
-At a contact, see `refweb.effects.contact.places`, let g = ∂δ/∂x, N₀ = |g| k W δ^p be the push of the penalty, n =
-−g/|g| the normal, u the velocity of the line's point relative to the body's, with the rate of depth δ̇ = g·u and the
+At a contact, see `refweb.effects.contact.contact_points`, let g = ∂δ/∂x, N₀ = |g| k W δ^p be the push of the penalty, n
+= −g/|g| the normal, u the velocity of the line's point relative to the body's, with the rate of depth δ̇ = g·u and the
 slip u_t = u − (n·u) n, and q = u_t/√(|u_t|² + v_s²). By Hunt and Crossley [1]_ and by Coulomb, regularised,
 
     N = N₀ (1 + max(d δ̇, −1)) ≥ 0,        F = N₀ max(d δ̇, −1) n − μ N q,
@@ -10,7 +10,7 @@ F being what is added here to the penalty. F acts on the line at the contact and
 −y × F about its centre, y from the centre to the line's point, so that their momenta and angular momenta are kept; a
 ring turns about its normal only, other bodies as `refweb.net.rotation` says. The power F·u is not positive. With the
 matrices A = ∂F/∂y and B = ∂F/∂u the tangents follow from dF = A dy + B du + F dW/W, where dy, du and dW have a part of
-the contact's place as it moves. How explicit kicks solve for F is in `refweb.effects.kicks`.
+the contact's place as it moves. How explicit kicks solve for F is in `refweb.effects.contact_solver`.
 
 References
 ----------
@@ -30,11 +30,11 @@ from ...kernels import BOUND, FORCE, STIFFNESS, kernel
 from ...net.rotation import times, times_transposed, to_quaternion
 from ..base import FELT
 from ..vectors import cross, dot
+from .contact_points import hessian_times, place_moves, places, window
 from .nearest_point import lightness, share
 from .pair import lever_of, pair_of, pairing
 from .penalty import SHALLOW, foresight, rubbed_by, slope_of_power, thickness, turn_block
-from .places import hessian_times, place_moves, places, window
-from .tumbling import add_push, add_rotation, add_velocities, set_arms
+from .rotational_stiffness import add_push, add_rotation, add_velocities, set_arms
 
 
 class Slip(NamedTuple):
@@ -265,7 +265,7 @@ def kernels(depth, pieces, nodes, functions, spins):
     """
     rows, paired = nodes + (2 if spins else 1), pairing(spins)
     _, _, contacts, touch_of, (most, columns) = places(depth, spins)
-    foreseen = foresight(depth, spins)
+    reject_step = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -337,7 +337,7 @@ def kernels(depth, pieces, nodes, functions, spins):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep = foreseen(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
+            deep = reject_step(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
             if deep > 0.0:
                 pair = pair_of(data, c, nodes)
                 most = SHALLOW * pair.damping * speed * (1.0 + pair.friction) + pair.friction

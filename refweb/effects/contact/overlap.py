@@ -9,11 +9,12 @@ The push k δ^p stores k δ^(p + 1)/(p + 1). A body that brings the energy E is 
 push F is held there by k = F/δ^p, whatever else gives way. So the stiffness that would do follows from an overlap that
 was found: it falls with k^(−1/(p + 1)) where a body comes with its energy, with k^(−1/p) where it is pushed.
 
-The window W of a contact between the ends of an element, see `refweb.effects.contact.places`, makes it softer near
-these, and lets a body in deeper there: it rolls into the ends as into hollows. Of a body that a force N presses by δ
-into the middle of a straight chain of elements of length L, with the radius r of its surface along the chain, energies
-along the way differ by 0.145 N (δ² L²/r)^⅓, for all δ/L from 5e-4 to 0.05 and r/L from 0.05 to 5 within a quarter. So
-contact pushes along a line, forth and back, by `ALONG` (δ²/(L r))^⅓ of each push on average. Other laws, over this:
+The window W of a contact between the ends of an element, see `refweb.effects.contact.contact_points`, makes it softer
+near these, and lets a body in deeper there: it rolls into the ends as into hollows. Of a body that a force N presses by
+δ into the middle of a straight chain of elements of length L, with the radius r of its surface along the chain,
+energies along the way differ by 0.145 N (δ² L²/r)^⅓, for all δ/L from 5e-4 to 0.05 and r/L from 0.05 to 5 within a
+quarter. So contact pushes along a line, forth and back, by `ALONG` (δ²/(L r))^⅓ of each push on average. Other laws,
+over this:
 
 =====================================================================  ==================================
 laws, at r = L/4                                                       δ/L = 5e-4, 5e-3, 5e-2
@@ -33,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, SolverError, TooSoft
+from ...errors import InputError, PenetrationError, SolverError
 from ...net.net import AXIAL_STIFFNESS
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
@@ -72,11 +73,11 @@ def rounded_up(value):
 
 
 def too_soft(deepest, where, most, names):
-    """The `TooSoft` of a contact deeper than ``most`` [m], whose stiffness was chosen for bodies of some names."""
+    """The `PenetrationError` of a contact deeper than ``most`` [m], whose stiffness was chosen for some bodies."""
     stiffer = rounded_up(max(deepest.enough, STIFFER * deepest.stiffness))
-    return TooSoft(
-        f"{where} with stiffness = {deepest.stiffness:g}, {most:.3g} m are allowed; repeated with "
-        f"stiffness = {stiffer:g}",
+    return PenetrationError(
+        f"{where} with stiffness = {deepest.stiffness:g}, {most:.3g} m are allowed; repeated with stiffness = "
+        f"{stiffer:g}",
         dict.fromkeys(names, stiffer),
     )
 

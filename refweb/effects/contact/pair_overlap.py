@@ -6,7 +6,7 @@ at one. In a step two bodies come nearer by at most its length times the speeds 
 deepest overlap of all steps and that way together are less than the least distance from a middle to its surface, it is
 certain that nothing has passed. Explicit steps by the bound are so short that this way is 0.2 of that distance times
 ``safety``; for explicit steps of a given size that and the largest speed of the run tell. Steps of CVODE and IDA are
-followed one by one, see `refweb.dynamics.integrators.followed_pairs`.
+followed one by one, see `refweb.dynamics.integrators.body_body_ccd`.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ class PairOverlaps:
         self._way = (lambda pair: WAY * safety * pair.thickness) if safety > 0.0 else (lambda pair: 2.0 * step * speed)
 
     def note_met(self, met):
-        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.Course.crossings`."""
+        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
         self._met = met
 
     def refuse(self):

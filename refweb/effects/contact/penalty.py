@@ -1,14 +1,14 @@
 """Penalty of contact with a body of any shape, as compiled kernels.
 
-Each contact, see `refweb.effects.contact.places`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where that is
-largest or an end of its element, so that the force is that of a fixed place. With the shares N of nodes, −1 of the
-body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the place, and y' = dy/dξ of the line,
+Each contact, see `refweb.effects.contact.contact_points`, has the energy k/(p + 1) W δ^(p + 1). Its place ξ is where
+that is largest or an end of its element, so that the force is that of a fixed place. With the shares N of nodes, −1 of
+the body, g = ∂δ/∂x and the matrix H = ∂²δ/∂x² at the place, and y' = dy/dξ of the line,
 
     stiffness of (a, b)    k W N_a N_b (p δ^(p−1) g⊗g + δ^p H) + c_a⊗∂ξ/∂x_b,
     c_a                    k δ^(p−1) [(W' δ + p W δ') N_a g + W δ (N_a H y' + N_a' g)].
 
 A body that turns feels the moment y × F of its push F about its centre, y from there to the line's point; what that
-adds to the stiffness is in `refweb.effects.contact.tumbling`.
+adds to the stiffness is in `refweb.effects.contact.rotational_stiffness`.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ...net.rotation import times_transposed, to_quaternion
 from ..base import FELT
 from ..vectors import cross, dot
+from .contact_points import hessian_times, place_moves, places, window
 from .nearest_point import lightness, point, share
 from .pair import lever_of, pair_of, pairing, power_of_depth
-from .places import hessian_times, place_moves, places, window
-from .tumbling import add_moments, add_push, add_rotation, set_arms
+from .rotational_stiffness import add_moments, add_push, add_rotation, set_arms
 
 SHALLOW = 0.05
 """Share of the depth and of the rate of depth that a contact may come to which losses reckon with before it is there: a
@@ -53,7 +53,7 @@ def push_of(touch):
 
 @kernel(forceinline=True)
 def rubbed_by(touch):
-    """k W δ^p that losses go by [N], see `refweb.effects.contact.several`."""
+    """k W δ^p that losses go by [N], see `refweb.effects.contact.nonconvex_contacts`."""
     pair = touch.pair
     faded = touch.share * pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
     return faded * power_of_depth(pair.exponent, touch.spot.depth)
@@ -104,7 +104,7 @@ def foresight(depth, spins=0):
     within, deepest, *_ = places(depth, spins)
 
     @kernel()
-    def foreseen(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
+    def reject_step(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
         own, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
         place, deep = deepest(x, cells, data, c, nodes, functions)
         first = within(x, cells, data, c, nodes, functions, 0.0).depth
@@ -126,7 +126,7 @@ def foresight(depth, spins=0):
             more = min(SHALLOW * more, deep if deep > 0.0 else math.inf)
         return Foreseen(max(deep, 0.0) + more, length)
 
-    return foreseen
+    return reject_step
 
 
 @kernel(forceinline=True)
@@ -152,14 +152,14 @@ def add_stiffness(blocks, touch, definite, nodes, functions, z):
 
 
 @kernel(forceinline=True)
-def add_row_sums(rates, foreseen, speed, mass, cells, data, c, nodes, spins):
+def add_row_sums(rates, reject_step, speed, mass, cells, data, c, nodes, spins):
     """Add the row sums of the stiffness of an element's contacts; nothing passes through between two steps.
 
     Half the bound are steps of a tenth of the body's thickness. A body that turns has a rotation among its unknowns, of
     the lever that its light ends make of its moment of inertia; it is scaled as the body is.
     """
     scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
-    deep, length, pair = foreseen.depth, foreseen.length, pair_of(data, c, nodes)
+    deep, length, pair = reject_step.depth, reject_step.length, pair_of(data, c, nodes)
     steep = scale * pair.stiffness * slope_of_power(pair.exponent, deep)
     delta = lightness(mass, cells, c, nodes)
     b, thick, own = cells[c, nodes], thickness(pair.shape), SPREAD * steep
@@ -199,7 +199,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     """
     arity, paired = nodes + 1 + spins, pairing(spins)
     _, _, contacts, touch_of, (most, columns) = places(depth, spins)
-    foreseen = foresight(depth, spins)
+    reject_step = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -262,7 +262,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            ahead = foreseen(True, reach, speed, x, mass, cells, data, c, nodes, functions)
+            ahead = reject_step(True, reach, speed, x, mass, cells, data, c, nodes, functions)
             if ahead.depth > 0.0:
                 add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins)
 

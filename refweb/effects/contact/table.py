@@ -2,7 +2,7 @@
 
 The kernels of spheres alone are in `refweb.effects.contact.sphere`; other shapes, which touch a line wherever it lies
 on them, and other exponents are in `refweb.effects.contact.penalty`, damping and friction in
-`refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.kicks`. Bodies
+`refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.contact_solver`. Bodies
 whose kernels are the same make one family.
 """
 
@@ -17,9 +17,9 @@ from ...errors import InputError
 from ...messages import nearest, shown
 from ...tables import Table, boolean, field, real, table
 from ..base import CONTACT_COLUMNS, OWN, Family
+from .line_body_ccd import passing
 from .nearest_point import in_sphere, near
 from .pair import AWAY, pair_data
-from .passing import passing
 
 KEYS = "stiffness", "exponent", "damping", "friction", "slip_velocity"
 """Keys of the law of a contact."""
@@ -204,7 +204,7 @@ class Contact(Table):
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         nodes = along.shape[1]
 
-        def sever(numbers):
+        def disable_cells(numbers):
             numbers[:, AWAY : AWAY + 3 * nodes] += np.tile(OUT_OF_REACH, nodes)
 
         return dict(
@@ -216,7 +216,7 @@ class Contact(Table):
             cells=np.ascontiguousarray(np.vstack(cells), dtype=np.int32),
             data=np.ascontiguousarray(np.vstack(data)),
             elements=np.tile(np.arange(len(along)), len(bodies)),
-            sever=sever,
+            disable_cells=disable_cells,
         )
 
     def _penalty(self, net, element, depth, spins, bodies):
@@ -228,8 +228,8 @@ class Contact(Table):
             pairs["data"] = np.ascontiguousarray(pairs["data"][:, : AWAY + 3 * element[1]])
             (force, energy, stiffness, bound), within = kernels(*element), in_sphere
         else:
+            from .contact_points import in_reach
             from .penalty import kernels
-            from .places import in_reach
 
             (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_reach(depth, spins)
         return Family(
@@ -252,12 +252,12 @@ class Contact(Table):
         if net.order == 1:  # explicit steps take no other elements
             nodes = pairs["cells"][:, :2]
             if np.isin(nodes, net.carried).any():
-                from ..carried_nodes import columns
-                from . import carrying as kicks
+                from ..attached_nodes import columns
+                from . import attached_node_friction as kicks
 
                 pairs["data"] = np.hstack([pairs["data"], columns(net, nodes)])
             else:
-                from . import rubbing as kicks
+                from . import line_body_friction as kicks
             rubbing = kicks.kernels(depth, net.subdivide, element[2], spins)
         return Family(
             **pairs,

@@ -1,6 +1,6 @@
 """Drag of a fluid that is at rest or blows steadily, on lines and on free bodies.
 
-The force is in `refweb.effects.drag.force`, and how explicit steps solve for it in `refweb.effects.drag.kick`.
+The force is in `refweb.effects.drag.force`, and how explicit steps solve for it in `refweb.effects.drag.implicit_drag`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...net.net import REFERENCE
 from ...tables import Several, Table, field, real, table, vector
 from ..base import Family, without
 from .force import kernels
-from .kick import rubbing
+from .implicit_drag import rubbing
 
 SPHERE = 0.47
 """Coefficient of a sphere, at Reynolds numbers from 10³ to 3·10⁵."""
@@ -158,8 +158,8 @@ class Drag(Table):
     def _family(self, net, cells, data, elements=None):
         blows, kick = any(self.wind), rubbing
         if np.isin(cells[:, 0], net.carried).any():
-            from ..carried_nodes import columns
-            from .carrying import carrying as kick
+            from ..attached_nodes import columns
+            from .attached_node_drag import carrying as kick
 
             data = np.hstack([data, columns(net, cells[:, :1])])
         force, stiffness, damping, bound = kernels(cells.shape[1])
@@ -178,5 +178,5 @@ class Drag(Table):
             symmetric=False,
             at_rest=blows,
             elements=elements,
-            sever=without(slice(2)),
+            disable_cells=without(slice(2)),
         )

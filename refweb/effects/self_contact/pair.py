@@ -91,7 +91,7 @@ def apart(place, touch):
 
 @kernel(forceinline=True)
 def angle_factor(n, first, last, touch):
-    """(f, the product of the natural lengths), n = u × w, see `refweb.effects.self_contact.press`."""
+    """(f, the product of the natural lengths), n = u × w, see `refweb.effects.self_contact.line_line_penalty`."""
     area = first * last
     inverse = 1.0 / area
     return math.sqrt(inverse * (dot(n, n) * inverse + touch * touch)), area

@@ -96,7 +96,7 @@ def sorted_by_box(low, width, count, room):
 
 
 @kernel(forceinline=True)
-def strangers(a, b, cells, data):
+def nonadjacent(a, b, cells, data):
     """Whether two elements share no node, and are not near along the net."""
     i, j, k, m = cells[a, 0], cells[a, 1], cells[b, 0], cells[b, 1]
     if i == k or i == m or j == k or j == m:
@@ -159,7 +159,7 @@ def fill(reach, count, start, order, rows, cells, data, found):
                     if not boxes_meet(reach, m, n, rows):
                         continue
                     a, b = min(order[m], order[n]), max(order[m], order[n])
-                    if strangers(a, b, cells, data) and segments_meet(reach, m, n, rows):
+                    if nonadjacent(a, b, cells, data) and segments_meet(reach, m, n, rows):
                         if amount < found.shape[0]:
                             found[amount, 0], found[amount, 1] = a, b
                         amount += 1

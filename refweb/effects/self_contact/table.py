@@ -32,11 +32,11 @@ class SelfContact(Table):
 
     Lines are round, and touch where their centre lines are less than two radii apart. Two elements push each other over
     the length on which they do, as a smooth function of their four nodes whatever their angle, see
-    `refweb.effects.self_contact.press`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³) times the
-    mean of their stretches, length over natural length. That is k r at half the distance of touch, where it is
-    largest: what is pushed harder would pass, and is refused. Elements that share a node do not push each other, nor do
-    those that are within two radii of each other along the net at any time of the run, as reels and heat change natural
-    lengths.
+    `refweb.effects.self_contact.line_line_penalty`. Lines that cross h apart push with k h (4 r² − h²)^(3/2)/(√27 r³)
+    times the mean of their stretches, length over natural length. That is k r at half the distance of touch, where it
+    is largest: what is pushed harder would pass, and is refused. Elements that share a node do not push each other, nor
+    do those that are within two radii of each other along the net at any time of the run, as reels and heat change
+    natural lengths.
 
     Every pair of lines is followed from the start of a run on, and ``passage`` of ``run.json`` says "certified" where
     no two centre lines have met: before each drift of an explicit step, which is cut where two would meet, and in steps
@@ -99,13 +99,13 @@ class SelfContact(Table):
                 f"radius = {self.radius:g} needs [cable] order = 1, not {net.order}: lines touch as straight elements; "
                 f"use subdivide = {net.order * net.subdivide}, which has the same nodes"
             )
-        from . import crossing, press
+        from . import line_line_ccd, line_line_penalty
 
         self._refuse_too_large(net)
         cells, data = self._elements(net, near_along(net, 2.0 * self.radius))
         self._refuse_overlap(net, *found(0.0, np.zeros_like(net.points), cells, data))
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
-        common = dict(internal=True, sever=without(SCALE), finder=None, near=near)
+        common = dict(internal=True, disable_cells=without(SCALE), finder=None, near=near)
         if chosen is not None and len(chosen) <= LISTED:
             rows, numbers = paired(chosen, cells, data)
             common |= dict(cells=rows, data=numbers, elements=chosen)
@@ -118,23 +118,32 @@ class SelfContact(Table):
                 )
             common |= dict(cells=cells, data=data, elements=np.arange(len(cells)), near=None, finder=found)
             all_listed = False
-        beside = crossing.neighbours(net, data[:, APART:], 2.0 * self.radius)
-        kernels = crossing.meets, crossing.watch, crossing.soon
+        beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
+        kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon
         follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)
         push = Family(
-            crossing=follows, name="self_contact", force=press.force, energy=press.energy, bound=press.bound,
-            stiffness=press.stiffness if all_listed else None, book="self_contact_energy", observed=1, **common,
-        )  # fmt: skip
+            crossing=follows,
+            name="self_contact",
+            force=line_line_penalty.force,
+            energy=line_line_penalty.energy,
+            bound=line_line_penalty.bound,
+            stiffness=line_line_penalty.stiffness if all_listed else None,
+            book="self_contact_energy",
+            observed=1,
+            **common,
+        )
         families = [push]
         if self.damping > 0.0:
-            from . import losses
+            from . import line_line_damping
 
-            families.append(self._lossy(losses, all_listed, damping_bound=losses.damping_bound, **common))
+            families.append(
+                self._lossy(line_line_damping, all_listed, damping_bound=line_line_damping.damping_bound, **common)
+            )
         if self.friction > 0.0:
-            from . import slipping
+            from . import line_line_friction
 
-            own = dict(rubbing=slipping.KICKS, twists=not self.rolling)
-            families.append(self._lossy(slipping, all_listed, **own, **common))
+            own = dict(rubbing=line_line_friction.KICKS, twists=not self.rolling)
+            families.append(self._lossy(line_line_friction, all_listed, **own, **common))
         return families if len(families) > 1 else push
 
     @staticmethod

@@ -42,7 +42,8 @@ class Observable:
     at : str
         What ``where`` of its value is the number of.
     booked : bool
-        Whether dynamics finds it in the energy book, as `refweb.results.observables.book.Booked`, and not by a probe.
+        Whether dynamics finds it in the energy book, as `refweb.results.observables.balances.Booked`, and not by a
+        probe.
     """
 
     unit = "1"

@@ -19,8 +19,8 @@ from scipy.sparse.linalg import splu
 
 import refweb
 from refweb.__main__ import main
-from refweb.dynamics.integrators import simpson_book, sundials
-from refweb.dynamics.integrators.central_difference import CentralDifference, OpenBook
+from refweb.dynamics.integrators import simpson_balance, sundials
+from refweb.dynamics.integrators.central_difference import CentralDifference, EnergyDriftError
 from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.ida import Ida
 from refweb.dynamics.simulation import Simulation
@@ -490,7 +490,7 @@ def test_an_open_book_is_repeated_with_a_tenth_of_the_tolerance(tmp_path, monkey
     drifts = drift_at(1e-4), drift_at(1e-5)
     assert drifts[1] < 0.7 * drifts[0]
     expected = refweb.run(scene(ball(), rtol=1e-5))
-    monkeypatch.setattr(simpson_book, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
+    monkeypatch.setattr(simpson_balance, "DRIFT", np.sqrt(drifts[0] * drifts[1]))
     kept, written = refweb.run(scene(ball(), rtol=1e-4)), refweb.run(scene(ball(), rtol=1e-4), out=tmp_path / "out")
     for solution in (kept, written):
         assert solution.results == expected.results and solution.solver == expected.solver
@@ -510,7 +510,7 @@ def test_a_corrupted_book_is_never_returned(tmp_path, monkeypatch, linear_solver
         yp[self.unknowns :] += 5.0 * y[self.unknowns :]
 
     monkeypatch.setattr(Cvode, "_right_side", corrupted)
-    with pytest.raises(OpenBook, match="energy drift .* limit 0.01: use a smaller rtol than 1e-06"):
+    with pytest.raises(EnergyDriftError, match="energy drift .* limit 0.01: use a smaller rtol than 1e-06"):
         refweb.run(scene(ball(), rtol=1e-4, linear_solver=linear_solver), out=tmp_path / "out")
     summary = json.loads((tmp_path / "out" / "run.json").read_text(encoding="utf-8"))
     assert summary["status"] == "failed" and summary["results"] == {}

@@ -110,7 +110,7 @@ def test_what_is_near_is_what_is_near():
 
 def test_far_from_a_body_few_lines_are_looked_at():
     """A ball that is a tenth as wide as the web: what stands in the lists at any step is a part of all lines."""
-    from refweb.dynamics.integrators import nearby
+    from refweb.dynamics.integrators import neighbour_list
 
     solver = solver_of(case(BALL), False)
     course, model = solver.start(), solver._model
@@ -119,14 +119,14 @@ def test_far_from_a_body_few_lines_are_looked_at():
     everything = len(lists.cells[1])
     assert everything == 2 * 8 * 7 and skin["depth"] == np.inf  # whoever comes next looks at all
     family = solver.system.families[1]
-    swap, arrays = nearby.swap_of(family.near), (lists.cells, lists.data, lists.outs, lists.stored)
+    swap, arrays = neighbour_list.swap_of(family.near), (lists.cells, lists.data, lists.outs, lists.stored)
     swap(1, 0, 0.05, course.x, *arrays)
     chosen = lists.cells[-1][:, 0]
     assert 0 < len(chosen) < 0.5 * everything
     np.testing.assert_array_equal(lists.cells[1], family.cells[chosen])
     np.testing.assert_array_equal(lists.data[1], family.data[chosen])
     lists.outs[1][:], skin["depth"] = 1.0, 0.05
-    nearby.show_near(model.nearby, lists)
+    neighbour_list.show_near(model.nearby, lists)
     np.testing.assert_array_equal(np.flatnonzero(lists.outs[-1][:, 0]), chosen)
-    nearby.look_at_all(solver.system, model)
+    neighbour_list.look_at_all(solver.system, model)
     assert len(lists.cells[1]) == len(lists.outs[1]) == len(lists.stored[1]) == everything

@@ -8,7 +8,7 @@ from refweb.dynamics.integrators.cvode import Cvode
 from refweb.dynamics.integrators.event_search import search
 from refweb.dynamics.integrators.events import Event, event_rows
 from refweb.dynamics.integrators.ida import Ida
-from refweb.dynamics.integrators.simpson_book import Booked, Jump, Piece, Rates, Sample
+from refweb.dynamics.integrators.simpson_balance import Booked, Jump, Piece, Rates, Sample
 from refweb.dynamics.integrators.step_limits import TRAVEL, StepLimits
 
 BEGIN, END = 0.3, 0.7

@@ -1,0 +1,82 @@
+"""Whether bodies have come to the middle of each other in a step of any method, on its interpolant.
+
+Pieces of steps are taken as `refweb.dynamics.integrators.line_line_ccd` takes them. In a piece two bodies come nearer
+by no more than their places do, and what points of either move by as it turns. Where that and their depth at its start
+together are less than the least distance from a middle to its surface, or less than what the balls around both are
+apart, neither passes the other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .crossings import PAIRS
+from .line_line_ccd import Followed
+
+TRAVEL = 0.2
+"""Largest share of that distance that bodies may come nearer by in a step, or half of what the balls are apart."""
+
+
+class FollowedPairs(Followed):
+    """Follows bodies that push each other.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    """
+
+    def __init__(self, system):
+        self._families, self._net = [family for family in system.families if family.pairs], system.net
+
+    def soon(self, x, v):
+        """Time in which no body comes much nearer to another from displacement x and velocity v [s]."""
+        time = np.inf
+        for pair in (pair for family in self._families for pair in family.pairs):
+            one, other = pair
+            speed = np.linalg.norm(v[one.row] - v[other.row]) + sum(
+                body.extent * np.linalg.norm(body.turning(x, v)) for body in pair if body.turn is not None
+            )
+            if speed > 0.0:
+                time = min(time, max(TRAVEL * _thickness(pair), 0.5 * self._apart(pair, x)) / speed)
+        return time
+
+    def look(self, course, piece, at):
+        """Note in a course the first pair that may have met in a piece of a step."""
+        for family in self._families:
+            self._note(course, piece, at, PAIRS, family)
+
+    def _room(self, bend):
+        return bend
+
+    def _met(self, looked_at, x, way, room):
+        family, still = looked_at, np.zeros_like(x)
+        deep = np.zeros((len(family.cells), family.observed))
+        family.force(0.0, x, still, np.zeros_like(x), family.cells, family.data, deep)
+        for pair, (depth, *_) in zip(family.pairs, deep, strict=True):
+            nearer = self._nearer(pair, way) + self._nearer(pair, room)
+            if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):
+                one, other = pair
+                return np.array([one.row, other.row, -1, -1])
+        return None
+
+    def _nearer(self, pair, way):
+        """By how much two bodies come nearer on a way, at most [m]."""
+        one, other = pair
+        turned = sum(
+            2.0 * body.extent * np.hypot(np.linalg.norm(way[body.spin]), way[body.turn, 0])
+            for body in pair
+            if body.turn is not None
+        )
+        return float(np.linalg.norm(way[one.row] - way[other.row]) + turned)
+
+    def _apart(self, pair, x):
+        """What the balls around two bodies are apart [m], below 0 where they overlap."""
+        one, other = pair
+        places = [self._net.points[body.row] + x[body.row] for body in pair]
+        return float(np.linalg.norm(places[0] - places[1])) - one.extent - other.extent
+
+
+def _thickness(pair):
+    """Least distance from the middle of either to its surface [m]."""
+    return min(body.thickness for body in pair)

@@ -1,0 +1,368 @@
+"""What keeps lines from passing: each drift of an explicit step is looked at before it is taken.
+
+In a drift rows move in straight lines, behind the kick that gives them their velocities. Lines whose overlap and the
+way by which two rows may come nearer are together less than the distance of touch cannot meet. Where they are not, the
+pairs of lines are looked at one by one, see `refweb.effects.self_contact.line_line_ccd`: a step in which two would meet
+is not taken but cut to `SHORTER` of it, until the next row or corner of a table. Where less than `LEAST` of the step
+that is stable is left, the run ends. Of neighbours along the net, which do not push each other, it is told when the
+first two meet.
+
+A look finds how far rows may go until another is due: as long as the ways of drifts are less together, none is taken.
+
+A step of higher order has several drifts, and cannot be taken back behind the first. It is looked at before as if it
+were one of order 2, and cut likewise; what comes through in one of its drifts nevertheless is told of.
+
+Bodies keep lines out of their middle in the same way, see `refweb.effects.contact.line_body_ccd`: the depth of all
+contacts and the way of a drift are together less than the depth there, or lines near bodies are looked at one by one. A
+line that is in the core of a body already is no matter of the step, and told of. Where twice the way of the last drift
+leaves room, the next is not looked at before, which costs a look at all velocities, but behind it: its way is known for
+other reasons. What has come further in it is told of.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kernels import (
+    CCD_NEIGHBOURS,
+    INDICES,
+    INTEGERS,
+    MATRIX,
+    MEETS,
+    VECTOR,
+    Arrays,
+    Functions,
+    IndexTable,
+    Integers,
+    IntegerTable,
+    MatrixTable,
+    MeetsTable,
+    Record,
+    Vector,
+    VectorTable,
+    WatchTable,
+    kernel,
+)
+from ...net.rotation_bounds import beside_places
+from .crossings import APART, BESIDE, THROUGH, note_met
+from .neighbour_list import WAY, goes_freely, near_of
+from .vector_spread import spread_of
+
+if TYPE_CHECKING:
+    from .neighbour_list import NeighbourList
+    from .records import Families, Model, Running
+
+SHORTER = 0.25
+"""Share of a step in which lines would meet that is tried next."""
+LEAST = 1e-3
+"""Share of the stable step below which none is tried."""
+CALM = 2.0
+"""Way of a drift that is not looked at before, over that of the last, at most; above, it is told of."""
+TOLD, KEPT_APART, FORESEEN = 0, 1, 2
+"""Where lines would pass, they are told of, the drift is not taken, or the step is not begun and nothing is told of."""
+FEW = 16.0
+"""Number of drifts that what is open does for, below which their ways are looked at more closely."""
+PAST, DUE = -3, -1
+"""Numbers behind the turns of neighbours: way that rows have gone [m], and that of the next turn; between them is the
+way up to which some are chosen."""
+
+
+class Ccd(Record):
+    """Lines that push each other.
+
+    Attributes
+    ----------
+    families, places : ndarray of int
+        The number of the family, none without; its place among those that act nearby.
+    meets, watches : table
+        Its kernels, see `refweb.effects.base.Crossing`.
+    rows, data, due, chosen : table
+        Neighbours, and when their turn comes.
+    touch : float
+        Distance at which lines touch [m].
+    met : ndarray of int, shape (4,)
+        Rows of the last two lines that would have met.
+    left : ndarray, shape (2,)
+        Way that rows may go until lines are looked at, and that which they have gone since they were [m].
+    """
+
+    families: Integers
+    places: Integers
+    meets: MeetsTable
+    watches: WatchTable
+    rows: IndexTable
+    data: MatrixTable
+    due: VectorTable
+    chosen: IntegerTable
+    touch: float
+    met: Integers
+    left: Vector
+
+    @classmethod
+    def of(cls, system):
+        """That of a system."""
+        found = [i for i, family in enumerate(system.families) if family.crossing is not None]
+        own, near = [system.families[i].crossing for i in found], near_of(system)
+        return cls(
+            families=np.array(found, dtype=np.int64),
+            places=np.array([near.index(i) for i in found], dtype=np.int64),
+            meets=Functions(MEETS, [one.meets for one in own]),
+            watches=Functions(CCD_NEIGHBOURS, [one.watch for one in own]),
+            rows=Arrays(INDICES, [one.rows for one in own]),
+            data=Arrays(MATRIX, [one.data for one in own]),
+            due=Arrays(VECTOR, [np.zeros(len(one.rows) + 3) for one in own]),
+            chosen=Arrays(INTEGERS, [np.zeros(len(one.rows) + 1, dtype=np.int64) for one in own]),
+            touch=max((one.touch for one in own), default=0.0),
+            met=np.zeros(4, dtype=np.int64),
+            left=np.zeros(2),
+        )
+
+
+class BodyCcd(Record):
+    """Bodies that push lines.
+
+    Attributes
+    ----------
+    families, places : ndarray of int
+        As in `Ccd`.
+    meets : table
+        Kernels of `refweb.effects.contact.line_body_ccd`.
+    most : ndarray
+        Depth that nothing comes to of each family, at least [m].
+    shown : ndarray
+        Largest depth over what cells show, infinite where that is not known.
+    met : ndarray of int, shape (4,)
+        Nodes of the last line that would have come to the middle of a body, its row, and whether it was in the core.
+    left : ndarray, shape (1,)
+        Way that is open to a drift which is not looked at before [m], 0 where it is; none where nothing is pushed.
+    """
+
+    families: Integers
+    places: Integers
+    meets: MeetsTable
+    most: Vector
+    shown: Vector
+    met: Integers
+    left: Vector
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        found = [i for i, family in enumerate(system.families) if family.passing is not None]
+        own, near, limits = [system.families[i] for i in found], near_of(system), np.zeros((0, 2))
+        if found:
+            from ...effects.contact.line_body_ccd import limits_of
+
+            limits = np.array([limits_of(family, system.net.bodies) for family in own])
+        return cls(
+            families=np.array(found, dtype=np.int64),
+            places=np.array([near.index(i) for i in found], dtype=np.int64),
+            meets=Functions(MEETS, [family.passing for family in own]),
+            most=np.ascontiguousarray(limits[:, 0]),
+            shown=np.ascontiguousarray(limits[:, 1]),
+            met=np.ones(4, dtype=np.int64),
+            left=np.zeros(1 if found else 0),
+        )
+
+
+@kernel(leaf=True, forceinline=True)
+def _larger(a, b):
+    return b if b > a else a
+
+
+@kernel(leaf=True, fastmath={"contract", "nnan", "nsz"})
+def largest_of(kick, v, f, inverse, share):
+    """Largest component of velocities, by a ``share`` of 0 or 1, with what a kick adds to them: four maxima at once."""
+    a = b = c = d = 0.0
+    whole = v.size // 4 * 4
+    for q in range(0, whole, 4):
+        m, n, o, p = np.uint64(q), np.uint64(q + 1), np.uint64(q + 2), np.uint64(q + 3)
+        a = _larger(a, abs(share * v[m] + kick * inverse[m] * f[m]))
+        b = _larger(b, abs(share * v[n] + kick * inverse[n] * f[n]))
+        c = _larger(c, abs(share * v[o] + kick * inverse[o] * f[o]))
+        d = _larger(d, abs(share * v[p] + kick * inverse[p] * f[p]))
+    for q in range(whole, v.size):
+        a = _larger(a, abs(share * v[np.uint64(q)] + kick * inverse[np.uint64(q)] * f[np.uint64(q)]))
+    return _larger(_larger(a, b), _larger(c, d))
+
+
+@kernel(apart=())
+def look_anew(guard: Ccd) -> None:
+    """Look at all lines when they come next: rows may be anywhere."""
+    guard.left[:] = 0.0
+    for m in range(guard.families.size):
+        guard.due[m][:] = 0.0
+
+
+@kernel(leaf=True)
+def way_among(drift, kick, v, f, inverse):
+    """Way by which two rows may come nearer to each other in a drift behind a kick, by how unlike velocities are."""
+    return abs(drift) * (spread_of(v.reshape(-1, 3)) + WAY * largest_of(kick, v, f, inverse, 0.0))
+
+
+@kernel(leaf=True, apart=("guard",))
+def open_ahead(kick: float, drift: float, model: Model, running: Running) -> bool:
+    """Whether a drift behind a kick leads no further than the last look found open; rows are seen as going it then.
+
+    The largest component of a velocity is written to the skin of what is near.
+    """
+    left, skin, size = model.guard.left, model.nearby.skin[0], 3 * model.inertia.linear
+    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
+    skin.fastest = largest_of(kick, v, f, inverse, 1.0)
+    way = WAY * abs(drift) * skin.fastest
+    if FEW * way > left[0]:
+        way = min(way, way_among(drift, kick, v, f, inverse))
+    if not way < left[0]:
+        return False
+    left[0] -= way
+    left[1] += way
+    return True
+
+
+@kernel(forceinline=True)
+def near_cells(way, i, place, model):
+    """(Cells, data) of a family that may touch on a way [m]: those that are looked at, or all."""
+    skin, families = model.nearby.skin[0], model.families
+    if way > skin.depth - skin.used:
+        whole = len(families.data) - model.nearby.families.size + place  # see `refweb.dynamics.integrators.records`
+        return families.cells[whole], families.data[whole]
+    return families.cells[i], families.data[i]
+
+
+@kernel(leaf=True, forceinline=True)
+def deepest_of(shown):
+    """Largest of what a family shows, 0 where that is nothing."""
+    deep = 0.0
+    for c in range(shown.shape[0]):
+        deep = max(deep, shown[c, 0])
+    return deep
+
+
+@kernel(leaf=True, apart=("walls",))
+def calm(walls: BodyCcd, nearby: NeighbourList, families: Families) -> bool:
+    """Whether a drift behind another need not be looked at before, for bodies alone that do not turn."""
+    skin, left = nearby.skin[0], math.inf
+    for m in range(walls.families.size):
+        deep = deepest_of(families.outs[walls.families[m]])
+        left = min(left, walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0))
+    walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
+    return walls.left[0] > 0.0
+
+
+@kernel(apart=("walls",))
+def look_back_at_bodies(time: float, model: Model, running: Running) -> None:
+    """Note lines that may have come to the middle of a body in a drift that was not looked at before, from its end."""
+    walls, x, v, f, skin = model.walls, running.x, running.v, running.f, model.nearby.skin[0]
+    for m in range(walls.families.size):
+        cells, data = near_cells(math.inf, walls.families[m], walls.places[m], model)
+        if walls.meets[m](skin.last, 0.0, 0.0, 0.0, x, v, f, model.inertia.inverse, cells, data, walls.met):
+            note_met(THROUGH, time, walls.met, running.crossings)
+
+
+@kernel(leaf=True, forceinline=True)
+def look_back_at_drift(time, model, running):
+    """Look back at the drift from a time on where it was not looked at before, and led further than it might."""
+    if model.walls.left.size:
+        if not (model.walls.left[0] == 0.0 or model.nearby.skin[0].last < model.walls.left[0]):
+            look_back_at_bodies(time, model, running)
+
+
+@kernel(leaf=True, forceinline=True)
+def passes(time, kick, drift, stages, model, running):
+    """Whether the last drift of a step, behind a kick and some ``stages``, is not to be taken, see `comes_through`.
+
+    What a look finds open does for drifts in which rows go as their velocities say.
+    """
+    if goes_freely(model):
+        if open_ahead(kick, drift, model, running):
+            return False
+    elif stages + model.guard.families.size + model.inertia.turns.moment.size == 0:
+        if calm(model.walls, model.nearby, model.families):
+            return False
+    return comes_through(time, kick, drift, TOLD if stages else KEPT_APART, model, running)
+
+
+@kernel(forceinline=True)
+def reject_step(time, h, model, running):
+    """Whether a step of several drifts, of size h, is not to be begun."""
+    if model.guard.families.size + model.walls.families.size == 0:
+        return False
+    return comes_through(time, 0.5 * h, h, FORESEEN, model, running)
+
+
+@kernel(apart=("guarded",))
+def comes_through(time: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
+    """Whether lines would pass in a drift behind a kick, from a time on: each other, or the middle of a body.
+
+    What is ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
+    """
+    touch, size, left = model.guard.touch, 3 * model.inertia.linear, model.guard.left
+    v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
+    way = WAY * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
+    if touch > 0.0 and FEW * way > touch:
+        way = min(way, way_among(drift, kick, v, f, inverse))
+    if not way < math.inf:
+        return False
+    came = passes_lines(time, way, kick, drift, then, model, running) if touch > 0.0 else False
+    if model.walls.families.size:
+        came = passes_bodies(time, way, kick, drift, then, model, running) or came
+    if came:
+        running.clock[0].held, left[0] = 1, 0.0
+    return came
+
+
+@kernel(apart=("guard",))
+def passes_lines(time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
+    """Whether lines that push each other would meet; where the drift is taken, it is found what is open behind it."""
+    guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
+    inverse, left = model.inertia.inverse, math.inf
+    for m in range(guard.families.size):
+        i, due = guard.families[m], guard.due[m]
+        room = guard.touch - deepest_of(families.outs[i]) - way
+        if not room > 0.0:
+            cells, data = near_cells(way - guard.touch, i, guard.places[m], model)
+            if guard.meets[m](0.0, way, kick, drift, x, v, f, inverse, cells, data, guard.met):
+                came = then != TOLD
+                if then == TOLD:
+                    note_met(APART, time, guard.met, running.crossings)
+        due[PAST] += guard.left[1]
+        if came or then == FORESEEN:
+            continue
+        if guard.watches[m](
+            0.0, way, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], due, guard.chosen[m], guard.met
+        ):  # fmt: skip
+            note_met(BESIDE, time, guard.met, running.crossings)
+        left = min(left, room, due[DUE] - due[PAST])
+    guard.left[0], guard.left[1] = 0.0 if then == FORESEEN else left, 0.0
+    return came
+
+
+@kernel(apart=("walls",))
+def passes_bodies(
+    time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running
+) -> bool:
+    """Whether lines would come as deep in a body as its middle."""
+    walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
+    inverse, room = model.inertia.inverse, 0.0
+    if model.inertia.turns.moment.size:
+        room = beside_places(kick, drift, x, v, f, inverse, model.inertia.turns)
+    walls.met[3] = 1
+    for m in range(walls.families.size):
+        i = walls.families[m]
+        deep = deepest_of(families.outs[i])
+        left = walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0) - way - room
+        if model.guard.families.size:
+            model.guard.left[0] = 0.0 if model.inertia.turns.moment.size else min(model.guard.left[0], left)
+        if left > 0.0:
+            continue
+        cells, data = near_cells(way + room, i, walls.places[m], model)
+        if walls.meets[m](room, way, kick, drift, x, v, f, inverse, cells, data, walls.met):
+            if then != TOLD and walls.met[3] == 0:
+                came = True
+                break
+            if then != FORESEEN:
+                note_met(THROUGH, time, walls.met, running.crossings)
+    return came

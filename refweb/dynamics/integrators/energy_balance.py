@@ -1,0 +1,200 @@
+"""The book of energies: what came in as work has to be there as energy, or the run is refused.
+
+A flag of success is not believed: at every history row ``|ΔE − work|`` is held against the largest energy of the run.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import EnergyDriftError
+from ...kernels import (
+    ENERGY,
+    EnergyTable,
+    IndexTable,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Vector,
+    VectorTable,
+    among,
+    kernel,
+    sum_of,
+)
+from ...net.net import AXIAL_STIFFNESS, LENGTH
+from ...net.rotation import RigidRotations, more_kinetic
+
+if TYPE_CHECKING:
+    from .records import Families, Reels
+
+DRIFT = 1e-2
+"""Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
+CLOSING = 0.9
+"""Factor by which a drift above `DRIFT` has to fall from row to row, over the largest energy until then, for the run to
+go on: where a load rises from zero on a web at rest, the first rows hold a few steps' errors against next to nothing.
+"""
+
+
+def least_energy(net):
+    """The energy that a drift is held against at least [J]: what strains of a few roundings are worth, over `DRIFT`.
+
+    A web at rest whose lines have exactly their natural length moves by its rounding alone, and books nothing else.
+    """
+    lines = net.line_data
+    return float(0.5 * (lines[:, AXIAL_STIFFNESS] * lines[:, LENGTH]).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
+
+
+def refuse_open(course, limit, remedy):
+    """Refuse a whole run whose energy drift exceeds a limit; `EnergyDriftError`."""
+    if not course.drift <= limit:
+        drift = f"energy drift {course.drift:.3g} of the largest energy of the run"
+        raise EnergyDriftError(f"{drift}, limit {limit:g}: {remedy}", course.drift)
+
+
+@kernel(leaf=True, apart=())
+def book_energies(
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    mass: Vector,
+    turns: RigidRotations,
+    cells: IndexTable,
+    data: MatrixTable,
+    energies: EnergyTable,
+    energy_outs: VectorTable,
+    book: Vector,
+    working: Integers,
+    total: Vector,
+) -> None:
+    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
+
+    ``book`` holds the work of each family and, last, that of all motion; ``working`` says of each family whether that
+    counts as work (1), or as its energy, which is lost (−1), or neither (0).
+    """
+    count = len(energies)
+    total[count], total[count + 1] = 0.0, book[count]
+    for i in range(count):
+        energies[i](t, x, cells[i], data[i], energy_outs[i])
+        total[i] = sum_of(energy_outs[i])
+        if working[i] > 0:
+            total[count + 1] += book[i]
+        elif working[i] < 0:
+            total[i] = -book[i]
+    for r in range(x.shape[0]):
+        total[count] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+    if turns.moment.size:
+        total[count] += more_kinetic(x, v, turns)
+
+
+@kernel(ENERGY)
+def no_energy(t, x, cells, data, out):
+    out[:] = 0.0
+
+
+@kernel(forceinline=True)
+def begin_powers(t, x, v, extra, families, solved, known, power):
+    """Write the power of each family that is booked by it [W]; where it is ``known``, not of those that kicks solve."""
+    for n in range(families.powers.shape[0]):
+        i, column = families.powers[n, 0], families.powers[n, 1]
+        if known and among(solved, i):
+            continue
+        families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
+        power[i] = sum_of(families.outs[i][:, column])
+
+
+@kernel(leaf=True, forceinline=True)
+def act(i, t, x, v, f, families):
+    """Add the force of a family, by its number, to f."""
+    cells, data, out = families.cells[i], families.data[i], families.outs[i]
+    families.forces[i](t, x, v, f, cells, data, out)
+
+
+@kernel(leaf=True, apart=("powers",))
+def book_powers(
+    t: float, h: float, x: Matrix, v: Matrix, extra: Matrix, power: Vector, work: Vector, families: Families
+) -> None:
+    """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
+    powers = families.powers
+    for n in range(powers.shape[0]):
+        i, column = powers[n, 0], powers[n, 1]
+        if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
+            act(i, t, x, v, extra, families)
+        gained = sum_of(families.outs[i][:, column])
+        work[i] += 0.5 * h * (power[i] + gained)
+        power[i] = gained
+
+
+@kernel(apart=("stages",))
+def book_potential(sign: float, t: float, x: Matrix, families: Families, work: Vector) -> None:
+    """Add the potential at time t of each family that is booked, times a sign, to its work [J].
+
+    With + before a drift of a step of higher order and − behind it this is the work of dead loads. Such a potential is
+    linear in time between corners of tables. Where time, as a coordinate, goes with the drifts, what the kicks give the
+    momentum that belongs to it is lost in these sums when t goes with the kicks: the book closes as the energy of a
+    scene without loads does, to the order of the method and without a drift that grows.
+    """
+    for n in range(families.powers.shape[0]):
+        i = families.powers[n, 0]
+        families.energies[i](t, x, families.cells[i], families.data[i], families.stored[i])
+        work[i] += sign * sum_of(families.stored[i])
+
+
+@kernel(leaf=True)
+def own_energy(total, working):
+    """Sum of the energies in ``total`` that are no potential of work, and of the kinetic energy [J]."""
+    energy = 0.0
+    for i in range(working.size):
+        if working[i] <= 0:
+            energy += total[i]
+    return energy + total[working.size]
+
+
+@kernel(leaf=True, forceinline=True)
+def note_motion(driven, mass, x, v, f, before):
+    """Note position, force and kinetic energy of the rows whose motion is prescribed, ahead of a step."""
+    for d in range(driven.size):
+        r = driven[d]
+        before[d, 6] = 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2)
+        for k in range(3):
+            before[d, k], before[d, 3 + k] = x[r, k], f[r, k]
+
+
+@kernel(leaf=True, forceinline=True)
+def book_motion(driven, mass, x, v, f, before, work):
+    """Add the work of prescribed motion in a step: what the kinetic energy gained and the forces took."""
+    last = work.size - 1
+    for d in range(driven.size):
+        r = driven[d]
+        work[last] += 0.5 * mass[r] * (v[r, 0] ** 2 + v[r, 1] ** 2 + v[r, 2] ** 2) - before[d, 6]
+        for k in range(3):
+            work[last] -= 0.5 * (before[d, 3 + k] + f[r, k]) * (x[r, k] - before[d, k])
+
+
+@kernel(leaf=True, apart=("lengths",))
+def book_lengths(t: float, x: Matrix, reels: Reels, was: Vector, length_force: Matrix, work: Vector) -> None:
+    """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
+    reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
+    for c in range(reels.lengths.size):
+        work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
+        length_force[0, c] = length_force[1, c]
+
+
+@kernel(leaf=True)
+def drifts_away(clock, energy, stored, work, limit):
+    """Note energy, largest energy and drift of a row; whether the run is not to go on.
+
+    It is not where a number is not finite, or the drift exceeds ``limit`` and does not fall, see `CLOSING`.
+    """
+    clock.largest = max(clock.largest, stored)
+    drift = abs(energy - work - clock.energy)
+    clock.worst = max(clock.worst, drift)
+    if not math.isfinite(drift):
+        return True
+    if clock.nsteps == 0 or not clock.largest > clock.least:
+        return False
+    share, before = drift / clock.largest, clock.share
+    clock.share = share
+    return share > limit and share > CLOSING * before

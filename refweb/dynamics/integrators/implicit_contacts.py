@@ -1,0 +1,136 @@
+"""Families whose kicks an explicit step solves for: their record, and what is done for all of them in turn.
+
+Losses of contact act where its push does, and that push has just been found: of lines with a body only those that show
+a depth there are looked at.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ... import kernels as k
+from ...effects.base import CELL
+from ...kernels import (
+    INTEGERS,
+    MATRIX,
+    Arrays,
+    Functions,
+    GiveTable,
+    Integers,
+    IntegerTable,
+    KeptTable,
+    MatrixTable,
+    MeetTable,
+    Record,
+    SweepTable,
+    kernel,
+)
+from .neighbour_list import near_of, rows_of
+
+
+class ImplicitContacts(Record):
+    """Families whose kicks are solved for.
+
+    Attributes
+    ----------
+    families : ndarray of int
+        Their numbers; ``last`` are the places among these where runs of families with one sweep end.
+    meets, recalls, sweeps, gives, memories : table
+        Their kernels, see `refweb.effects.base.ImplicitContactKernels`, and what is remembered of the step before,
+        within a row.
+    shown, told : ndarray of int, List
+        Which ``outs`` of `refweb.dynamics.integrators.records.Families` has depths, −1 for those that have none, and
+        for each cell the row in it.
+    pieces : int
+        Number of cells of a line, which are looked at together.
+    width : int
+        Number of columns of what touches.
+    """
+
+    families: Integers
+    meets: MeetTable
+    recalls: KeptTable
+    sweeps: SweepTable
+    gives: GiveTable
+    memories: MatrixTable
+    last: Integers
+    shown: Integers
+    told: IntegerTable
+    pieces: int
+    width: int
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
+        rubbing = [system.families[i] for i in families]
+        own = [family.rubbing for family in rubbing]
+        last = [i for i, one in enumerate(own) if i + 1 == len(own) or own[i + 1].sweep is not one.sweep]
+        depths = [depths_of(system, family) for family in rubbing]
+        return cls(
+            families=np.array(families, dtype=np.int64),
+            meets=Functions(k.DETECT, [one.meet for one in own]),
+            recalls=Functions(k.WARM_START, [one.recall for one in own]),
+            sweeps=Functions(k.GAUSS_SEIDEL, [one.sweep for one in own]),
+            gives=Functions(k.COMMIT, [one.give for one in own]),
+            last=np.array(last, dtype=np.int64),
+            memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
+            shown=np.array([shown for shown, _ in depths], dtype=np.int64),
+            told=Arrays(INTEGERS, [told for _, told in depths]),
+            pieces=system.net.subdivide,
+            width=max((one.width for one in own), default=0),
+        )
+
+
+def depths_of(system, family):
+    """(``shown``, ``told``) of a family, see `Rubbed`: of the push of the same lines on the same bodies."""
+    near = near_of(system)
+    for i in near if family.contact else ():
+        push = system.families[i]
+        if push.contact:
+            own, its = (one.elements * system.rows + one.cells[:, system.net.along.size] for one in (family, push))
+            order = np.argsort(its)
+            place = order[np.minimum(np.searchsorted(its, own, sorter=order), len(its) - 1)]
+            if (its[place] == own).all():
+                return len(system.families) + near.index(i), place
+    return -1, np.zeros(0, dtype=np.int64)
+
+
+@kernel()
+def lines_in_touch(shown, told, pieces):
+    """Numbers of the cells of lines that show a depth."""
+    chosen, count = np.empty(told.size, dtype=np.int64), 0
+    for first in range(0, told.size, pieces):
+        apart = True
+        for c in range(first, first + pieces):
+            apart = apart and shown[told[c], 0] <= 0.0
+        if not apart:  # what is not a number touches
+            for c in range(first, first + pieces):
+                chosen[count] = c
+                count += 1
+    return chosen[:count]
+
+
+@kernel()
+def meet_all(h, x, v, inverse, families, implicit_contacts, touches, ends):
+    """Write all that touches, and to ``ends`` the rows that each family's end at; ``touches``, or a larger one."""
+    while True:
+        count = 0
+        for m in range(implicit_contacts.families.size):
+            i, begin = implicit_contacts.families[m], count
+            if implicit_contacts.shown[m] < 0:
+                count = implicit_contacts.meets[m](
+                    h, x, v, inverse, families.cells[i], families.data[i], touches, count
+                )
+            else:
+                chosen = lines_in_touch(
+                    families.outs[implicit_contacts.shown[m]], implicit_contacts.told[m], implicit_contacts.pieces
+                )
+                some, some_data = rows_of(chosen, families.cells[i], families.data[i])
+                count = implicit_contacts.meets[m](h, x, v, inverse, some, some_data, touches, count)
+                for n in range(begin, min(count, touches.shape[0])):
+                    touches[n, CELL] = chosen[int(touches[n, CELL])]
+            ends[m] = count
+        if count <= touches.shape[0]:
+            return touches
+        touches = np.empty((2 * count, implicit_contacts.width))

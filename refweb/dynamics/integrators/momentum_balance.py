@@ -1,0 +1,306 @@
+"""The book of momentum: what acts from outside has to be there as momentum, or the run is refused.
+
+At every history row the momentum of what is free is held against that at the start, the impulse of the supports and
+that of all else that acts from outside. Dead loads and gravity have it in closed form, whatever the steps do: their
+factors are piecewise linear, with an exact antiderivative; damping in proportion to mass gives −rate Σ m Δx. So a load
+that steps have passed over, or given twice, shows. What has no such formula, follower loads and the forces of inertia
+in a frame that turns, is *integrated along the steps* with the weights that these give it, and so is the force of
+supports and of bodies that are fixed: there the book holds the method against its own forces alone.
+
+Where nothing is supported and all forces are internal or without a moment about the centre of mass, such as gravity,
+the angular momentum about that is booked as well, with that of bodies which turn. A ring keeps its plane, which takes
+moments: where there are rings it is the part along their normal, and nothing where their normals differ. Friction of
+lines that do not roll leaves moments to their twist: where there is any, angular momentum is not booked.
+
+Central differences and splittings close the book to rounding: each kick gives what the forces are worth, and the
+trapezoidal rule of the kicks is exact for linear factors. Damping sees the mean of the velocities at the ends of steps
+and positions move by those in their middles; with equal steps h the sums differ by ¼ h² (a(end) − a(start)), a being
+accelerations, which is booked. Methods of somebody's own steps keep their equations to their tolerances, and the
+impulse of supports is Simpson's: they close it within `allowed`.
+
+The book does not see what gives no impulse to all of the web, though it moves parts of it: natural lengths that reels
+and temperature change, pressure inside of a closed line. Nor does it see [[motion]], whose impulse is that of supports.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import EnergyDriftError
+from ...kernels import (
+    IMPULSE,
+    INDICES,
+    MATRIX,
+    Arrays,
+    Functions,
+    ImpulseTable,
+    IndexTable,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Record,
+    Vector,
+    kernel,
+)
+from ...net.net import AXIAL_STIFFNESS
+
+if TYPE_CHECKING:
+    from .records import Families
+
+CLOSURE = 1e-6
+"""Largest momentum that an explicit run may miss, over the largest of the run: 1e4 roundings in each of 1e6 steps, of
+any sign. A web whose momentum is below this share of what its stiffness makes of roundings is at rest."""
+ROUNDINGS = 8.0 * np.finfo(float).eps
+"""Force that each line may have too much by rounding, over its EA."""
+
+
+def allowed(rtol):
+    """Largest share of its momentum that a method of order 2 with a relative tolerance may miss.
+
+    Its errors go with the tolerance to the power 2/3, and momentum is a sum of velocities, whose errors mostly cancel.
+    """
+    return max(CLOSURE, rtol ** (2.0 / 3.0))
+
+
+class MomentumBalance(Record):
+    """What the book holds of a run.
+
+    Attributes
+    ----------
+    first : ndarray, shape (2, 3)
+        Momentum [N s], and angular momentum along the axes of `Outside.axes` [N m s], at the start.
+    given : ndarray, shape (3,)
+        What the formulas of impulses had at the start [N s].
+    pushed : ndarray, shape (3,)
+        Impulse of what is integrated along the steps [N s].
+    left, largest : ndarray, shape (2,)
+        Of momentum [N s] and angular momentum [N m s], over all rows: the largest that is left when all is subtracted
+        that is known to have come in, and the largest that parts of the system have, whatever their direction.
+    """
+
+    first: Matrix
+    given: Vector
+    pushed: Vector
+    left: Vector
+    largest: Vector
+
+    @classmethod
+    def empty(cls):
+        """That of a run which has not begun."""
+        return cls(np.zeros((2, 3)), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
+
+    @property
+    def drifts(self):
+        """What is left over the largest, of momentum and of angular momentum [1]; 0 where there is none."""
+        return np.divide(self.left, self.largest, out=np.zeros(2), where=self.largest > 0.0)
+
+
+class Outside(Record):
+    """What acts from outside, as the book sees it.
+
+    Attributes
+    ----------
+    impulses, cells, data : table
+        Kernel of the impulse of each family that has one, and its numbers.
+    damped : ndarray of int
+        Those of them that depend on velocity.
+    pushing : ndarray of int
+        Families that are integrated along the steps.
+    places : ndarray, shape (linear rows, 3)
+        Reference positions [m], about their mean.
+    mass : ndarray, shape (linear rows,)
+        Lumped mass [kg].
+    axes : ndarray, shape (axes, 3)
+        Unit vectors along which angular momentum is kept.
+    rounding : float
+        Force that roundings are worth [N].
+    """
+
+    impulses: ImpulseTable
+    cells: IndexTable
+    data: MatrixTable
+    damped: Integers
+    pushing: Integers
+    places: Matrix
+    mass: Vector
+    axes: Matrix
+    rounding: float
+
+    @classmethod
+    def of(cls, system):
+        """That of a system."""
+        net, linear = system.net, system.rows - system.net.spins
+        outer = [(i, family) for i, family in enumerate(system.families) if not family.internal]
+        known = [family for _, family in outer if family.impulse is not None]
+        damped = [i for i, family in enumerate(known) if family.damping is not None]
+        pushing = [i for i, family in outer if family.impulse is None]
+        return cls(
+            impulses=Functions(IMPULSE, [family.impulse for family in known]),
+            cells=Arrays(INDICES, [family.cells for family in known]),
+            data=Arrays(MATRIX, [family.data for family in known]),
+            damped=np.array(damped, dtype=np.int64),
+            pushing=np.array(pushing, dtype=np.int64),
+            places=net.points[:linear] - net.points[:linear].mean(axis=0),
+            mass=net.mass[:linear],
+            axes=kept_axes(system),
+            rounding=float(ROUNDINGS * net.line_data[:, AXIAL_STIFFNESS].sum()),
+        )
+
+
+def kept_axes(system):
+    """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
+    kept = all(f.moment_free or (f.internal and not f.twists) for f in system.families)
+    if system.held.any() or not kept:
+        return np.zeros((0, 3))
+    normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)
+    if not len(normals):
+        return np.eye(3)
+    return normals[:1] if np.abs(np.cross(normals, normals[0])).max() <= ROUNDINGS else np.zeros((0, 3))
+
+
+@kernel(leaf=True, apart=())
+def impulse_until(t: float, x: Matrix, outside: Outside, total: Vector) -> None:
+    """Write the impulse of all that has a formula, but for a constant, to ``total (3,)``."""
+    total[:] = 0.0
+    for i in range(len(outside.impulses)):
+        outside.impulses[i](t, x, outside.cells[i], outside.data[i], total)
+
+
+@kernel(apart=("damped",))
+def add_half_steps(by: float, outside: Outside, inverse: Matrix, f: Matrix, pushed: Vector) -> None:
+    """Add the impulse of damping over displacements of ``by`` times the accelerations."""
+    ahead, total = np.empty_like(f), np.zeros(3)
+    for r in range(f.shape[0]):
+        for k in range(3):
+            ahead[r, k] = by * inverse[r, k] * f[r, k]
+    for i in outside.damped:
+        outside.impulses[i](0.0, ahead, outside.cells[i], outside.data[i], total)
+    for k in range(3):
+        pushed[k] += total[k]
+
+
+@kernel(apart=("pushing",))
+def set_push(t: float, x: Matrix, v: Matrix, outside: Outside, families: Families, extra: Matrix, push: Vector) -> None:
+    """Write the force of what is integrated along the steps to ``push (3,)``; ``extra`` takes that on every row."""
+    extra[:], push[:] = 0.0, 0.0
+    for i in outside.pushing:
+        families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
+    for r in range(outside.mass.size):
+        for k in range(3):
+            push[k] += extra[r, k]
+
+
+@kernel(apart=("pushing",))
+def push_on(
+    t: float,
+    before: float,
+    behind: float,
+    x: Matrix,
+    v: Matrix,
+    outside: Outside,
+    families: Families,
+    extra: Matrix,
+    push: Vector,
+    pushed: Vector,
+) -> None:
+    """Integrate over two kicks: a time with the push ahead of a drift, and one with that behind it, at time t."""
+    for k in range(3):
+        pushed[k] += before * push[k]
+    set_push(t, x, v, outside, families, extra, push)
+    for k in range(3):
+        pushed[k] += behind * push[k]
+
+
+@kernel(apart=("angular",))
+def turning(x: Matrix, p: Matrix, outside: Outside, turned: Vector) -> tuple[float, float]:
+    """Write the angular momentum about the centre of mass along the axes; the sum of its parts' sizes [N m s].
+
+    What moves with the centre of mass is left out of momenta ``p``, since it has no part in the sum.
+    """
+    places, mass, axes = outside.places, outside.mass, outside.axes
+    total, size, far = 0.0, 0.0, 0.0
+    centre, whole, way, own = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    for r in range(mass.size):
+        total += mass[r]
+        for k in range(3):
+            centre[k] += mass[r] * (places[r, k] + x[r, k])
+            whole[k] += p[r, k]
+    turned[:] = 0.0
+    for r in range(p.shape[0]):
+        if r < mass.size:
+            for k in range(3):
+                way[k] = places[r, k] + x[r, k] - centre[k] / total
+                own[k] = p[r, k] - mass[r] / total * whole[k]
+            a0, a1, a2 = way[1] * own[2] - way[2] * own[1], way[2] * own[0] - way[0] * own[2], 0.0
+            a2 = way[0] * own[1] - way[1] * own[0]
+            reach = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+            far = max(far, reach)
+            size += reach * math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+        else:
+            a0, a1, a2 = p[r, 0], p[r, 1], p[r, 2]
+            size += math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+        for n in range(axes.shape[0]):
+            turned[n] += axes[n, 0] * a0 + axes[n, 1] * a1 + axes[n, 2] * a2
+    return size, far
+
+
+@kernel(apart=())
+def open_balance(x: Matrix, p: Matrix, outside: Outside, ledger: MomentumBalance) -> None:
+    """Note momentum, angular momentum and impulses at t = 0; ``p`` is M v of all rows that are free."""
+    impulse_until(0.0, x, outside, ledger.given)
+    for r in range(outside.mass.size):
+        for k in range(3):
+            ledger.first[0, k] += p[r, k]
+    if outside.axes.shape[0]:
+        turning(x, p, outside, ledger.first[1])
+
+
+@kernel(apart=())
+def note_momentum(
+    t: float,
+    x: Matrix,
+    p: Matrix,
+    support: Vector,
+    outside: Outside,
+    ledger: MomentumBalance,
+    least: float,
+    row: Vector,
+) -> None:
+    """Hold the momenta ``p`` of a row against the book, and write momentum and impulses to ``row (9,)``.
+
+    ``support`` is the impulse of the supports, ``least`` the momentum that a drift is held against at least.
+    """
+    now, size = np.zeros(3), least + outside.rounding * t / CLOSURE
+    moving = size
+    impulse_until(t, x, outside, row[6:])
+    for r in range(outside.mass.size):
+        for k in range(3):
+            now[k] += p[r, k]
+            moving += abs(p[r, k])
+    left = 0.0
+    for k in range(3):
+        row[k], row[3 + k] = now[k], support[k]
+        row[6 + k] += ledger.pushed[k] - ledger.given[k]
+        moving += abs(row[3 + k]) + abs(row[6 + k])
+        left = max(left, abs(now[k] - ledger.first[0, k] - row[3 + k] - row[6 + k]))
+    ledger.left[0], ledger.largest[0] = max(ledger.left[0], left), max(ledger.largest[0], moving)
+    if outside.axes.shape[0]:
+        whole, far = turning(x, p, outside, now)
+        left = 0.0
+        for n in range(outside.axes.shape[0]):
+            left = max(left, abs(now[n] - ledger.first[1, n]))
+        ledger.left[1], ledger.largest[1] = max(ledger.left[1], left), max(ledger.largest[1], whole + far * size)
+
+
+def refuse_open_momentum(course, limit, remedy):
+    """Refuse a whole run whose momentum or angular momentum drifts by more than a limit; `EnergyDriftError`."""
+    for name, drift in zip(("momentum", "angular momentum"), course.ledger.drifts.tolist(), strict=True):
+        if not drift <= limit:
+            raise EnergyDriftError(
+                f"{name} drift {drift:.3g} of the largest {name} of the run, limit {limit:g}: what supports and loads "
+                f"gave does not add up to it; {remedy}",
+                drift,
+            )

@@ -1,0 +1,381 @@
+"""Contact of what is near: lines that a body cannot reach yet are not looked at in every step.
+
+A list of the lines within a skin of a body holds until something may have come as far as the skin is deep: in a step
+nothing moves by more than the fastest row, and a line comes nearer to a body by no more than twice that. So nothing is
+missed, and the numbers are those of all lines to the last bit, since lines that do not touch add nothing to any sum.
+
+Where cells are pairs of elements that are found, ways of fast rows are those relative to each other, for a net that is
+thrown flies as a whole, and a list that is used up is held against where rows really went before another is made: waves
+come and go. Its skin is not deeper than `WIDEST` of an element, where every element would be near another, and is to
+last for fewer steps, down to `FEWEST`, where to look at its pairs takes longer than to find them.
+
+A list is deep enough for the `LASTS` steps ahead, and for the bound on the steps of the next row where that reaches no
+more than `LONGEST` of them. So it is made once in some rows, by a look at all lines.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from numba import from_dtype, types
+
+from ...compiled.tables import ArraysType
+from ...kernels import (
+    INDICES,
+    MATRIX,
+    VECTOR,
+    Arrays,
+    Functions,
+    IndexTable,
+    Integers,
+    Matrix,
+    MatrixTable,
+    Record,
+    copy_rows,
+    kernel,
+)
+from ...net.rotation_bounds import fastest_surface
+from .vector_spread import spread_of, spread_since
+
+if TYPE_CHECKING:
+    from .records import Families, Model
+
+LASTS = 64.0
+"""Number of steps that a list is to last at the speed of its first."""
+LONGEST = 256.0
+"""The same where a bound on the next row's steps asks for a deeper skin."""
+WIDEST, MANY, FEWEST = 0.5, 512.0, 6.0
+"""Depth of a skin around pairs over the mean length of elements, at most; number of steps that it is to last, at most
+and at least."""
+PRICE = 64.0
+"""Time that it takes to find the pairs of an element, over that to look at one."""
+KEPT_UP_TO = 0.7
+"""Share of a skin around pairs that may be used up where a list is kept."""
+COVERED = 3
+"""Number of steps whose ways are known before a list is made: peaks are looked for in that many."""
+WAY = 2.0 * math.sqrt(3.0)
+"""Way by which two rows come nearer to each other, over that of the largest component, at most."""
+SHARE = 0.999
+"""Share of a skin that may be used up: the rest is for rounding."""
+SIGN = np.int64(0x7FFFFFFFFFFFFFFF)
+"""All bits of a number but its sign: those of numbers ≥ 0 are in the order of these, and many are compared at once."""
+
+SKIN = np.dtype(
+    {
+        "names": [
+            "depth",
+            "used",
+            "last",
+            "before",
+            "earlier",
+            "wished",
+            "lasts",
+            "longest",
+            "steps",
+            "unknown",
+            "top",
+            "fastest",
+            "widest",
+        ],
+        "formats": [*(8 * [float]), np.int64, np.int64, np.int64, float, float],
+        "offsets": [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 80, 88],
+    }
+)
+"""Depth of the skin [m], infinite where all lines are looked at; how much of it may be used up; by how much lines and
+bodies may have come nearer in the last step and the two before; depth that a bound on the next steps asks for; number
+of steps that a list of pairs is to last; the longest of all ways of a step [m]; number of steps of which that is known,
+and above which a list is made, 0 from the start of a run on; the largest component of a velocity, as a whole number and
+as what it is [m/s]; largest depth around pairs [m], infinite where none are found."""
+NOWHERE = np.zeros((0, 3))
+"""Displacements where none are looked at."""
+SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR)))
+"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the
+tables of `refweb.dynamics.integrators.records.Families`, for those within a skin, or for all where it has no bound."""
+SwapTable = Annotated[Functions, SWAP]
+SkinArray = Annotated[np.ndarray, types.Array(from_dtype(SKIN), 1, "C")]
+
+
+class NeighbourList(Record):
+    """Families whose cells act only near something.
+
+    Attributes
+    ----------
+    swaps : table
+        Kernel of each that swaps its cells, see `swap_of`.
+    families : ndarray of int
+        Their numbers.
+    skin : ndarray of `SKIN`, shape (1,)
+        How long what is chosen will do.
+    at : ndarray, shape (rows, 3)
+        Displacement at which pairs were found [m]; no rows where none are found.
+    cells, data : table
+        Space for the cells and numbers of each.
+    """
+
+    swaps: SwapTable
+    families: Integers
+    skin: SkinArray
+    at: Matrix
+    cells: IndexTable
+    data: MatrixTable
+
+    @classmethod
+    def of(cls, system):
+        """Those of a system."""
+        near, skin = near_of(system), np.zeros(1, dtype=SKIN)
+        skin["depth"], skin["lasts"] = np.inf, MANY
+        swaps = Functions(SWAP, [swap_for(system.families[i]) for i in near])
+        pairs = any(family.finder is not None for family in system.families)
+        at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
+        skin["widest"] = WIDEST * float(system.net.natural_length.mean()) if pairs else np.inf
+        cells, data = [system.families[i].cells for i in near], [system.families[i].data for i in near]
+        return cls(swaps, np.array(near, dtype=np.int64), skin, at, Arrays(INDICES, cells), Arrays(MATRIX, data))
+
+    def without(self):
+        """That of no families."""
+        return replace(self, families=self.families[:0])
+
+
+def near_of(system):
+    """Numbers of the families of a system whose cells act only near something."""
+    return [i for i, family in enumerate(system.families) if family.near is not None or family.finder is not None]
+
+
+def swap_for(family):
+    """The kernel that swaps the cells of a family."""
+    return swap_of(family.near) if family.finder is None else swap_pairs_of(family.finder)
+
+
+@kernel()
+def rows_of(chosen, cells, data):
+    """Some rows of cells and of data."""
+    some, some_data = np.empty((chosen.size, cells.shape[1]), dtype=np.int32), np.empty((chosen.size, data.shape[1]))
+    for n in range(chosen.size):
+        for k in range(cells.shape[1]):
+            some[n, k] = cells[chosen[n], k]
+        for k in range(data.shape[1]):
+            some_data[n, k] = data[chosen[n], k]
+    return some, some_data
+
+
+@functools.cache
+def swap_of(near):
+    """The kernel that swaps the cells of a family, found by its kernel ``near``, of signature `SWAP`.
+
+    Loops call it by its address: machine code that is called by name is optimized again in each kernel above, and
+    lists that are written to are long.
+    """
+
+    @kernel(SWAP)
+    def swap(i, m, depth, x, cells, data, outs, stored):
+        more = len(cells) - len(data)
+        whole, numbers = len(data) - more + m, len(data) + m
+        all_cells, all_data, shown = cells[whole], data[whole], outs[whole]
+        if depth == math.inf:
+            cells[i], data[i], outs[i], stored[i] = all_cells, all_data, shown, stored[whole]
+            cells[numbers] = np.empty((0, 1), dtype=np.int32)
+            return
+        found = np.empty(all_cells.shape[0], dtype=np.int64)
+        count = near(depth, x, all_cells, all_data, found)
+        some, some_data = rows_of(found[:count], all_cells, all_data)
+        chosen = np.empty((count, 1), dtype=np.int32)
+        for n in range(count):
+            chosen[n, 0] = found[n]
+        shown[:] = 0.0
+        cells[i], data[i], cells[numbers] = some, some_data, chosen
+        outs[i], stored[i] = np.zeros((count, shown.shape[1])), np.zeros(count)
+
+    return swap
+
+
+@functools.cache
+def swap_pairs_of(pairs):
+    """As `swap_of`, of a family whose cells are elements: they are swapped for the pairs that ``pairs`` finds."""
+
+    @kernel(SWAP)
+    def swap(i, m, depth, x, cells, data, outs, stored):
+        more = len(cells) - len(data)
+        whole, numbers = len(data) - more + m, len(data) + m
+        shown = outs[whole]
+        if depth == math.inf:
+            cells[i], data[i], outs[i], stored[i] = cells[whole], data[whole], shown, stored[whole]
+            cells[numbers] = np.empty((0, 1), dtype=np.int32)
+            return
+        found, rows, values = pairs(depth, x, cells[whole], data[whole])
+        shown[:] = 0.0
+        cells[i], data[i], cells[numbers] = rows, values, found.astype(np.int32)
+        outs[i], stored[i] = np.zeros((rows.shape[0], shown.shape[1])), np.zeros(rows.shape[0])
+
+    return swap
+
+
+@kernel(apart=("near",))
+def take(x: Matrix, nearby: NeighbourList, families: Families) -> None:
+    """Swap the cells of all families for those within the skin at displacement x."""
+    depth = nearby.skin[0].depth
+    for m in range(nearby.families.size):
+        i = nearby.families[m]
+        nearby.swaps[m](i, m, depth, x, families.cells, families.data, families.outs, families.stored)
+
+
+@kernel(leaf=True, apart=("near",))
+def show_near(nearby: NeighbourList, families: Families) -> None:
+    """Write what the chosen cells show where it is looked for, among that of all cells.
+
+    What an element shows is the largest value of its pairs, or the smallest where these are below 0.
+    """
+    if not nearby.skin[0].depth < math.inf:
+        return
+    size, whole = nearby.families.size, len(families.data)
+    for m in range(size):
+        own, shown = families.outs[nearby.families[m]], families.outs[whole - size + m]
+        chosen = families.cells[whole + m]
+        if chosen.shape[1] == 1:
+            for n in range(chosen.shape[0]):
+                for k in range(own.shape[1]):
+                    shown[chosen[n, 0], k] = own[n, k]
+            continue
+        for e in range(shown.shape[0]):
+            for k in range(shown.shape[1]):
+                shown[e, k] = 0.0
+        for n in range(chosen.shape[0]):
+            for k in range(shown.shape[1]):
+                value = own[n, k]
+                if value == 0.0:
+                    continue
+                for e in range(2):
+                    if abs(value) > abs(shown[chosen[n, e], k]):
+                        shown[chosen[n, e], k] = value
+
+
+def forget(model, begun):
+    """Forget how things moved: who comes next has not taken the last steps, or has ``begun`` and taken none."""
+    model.nearby.skin["steps"], model.nearby.skin["unknown"] = 0, COVERED if begun else 0
+
+
+def look_at_all(system, model):
+    """Look at all cells, as whoever comes next does."""
+    skin, families = model.nearby.skin[0], model.families
+    if skin["depth"] < np.inf:
+        for m, i in enumerate(near_of(system)):
+            swap_for(system.families[i])(
+                i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
+            )
+    skin["depth"] = np.inf
+
+
+@kernel(apart=("pairs",))
+def take_pairs(x: Matrix, nearby: NeighbourList, families: Families) -> None:
+    """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
+    copy_rows(x[: nearby.at.shape[0]], nearby.at)
+    take(x, nearby, families)
+    skin, pairs, elements = nearby.skin[0], 0, 0
+    for m in range(nearby.families.size):
+        pairs += families.cells[nearby.families[m]].shape[0]
+        elements += families.cells[len(families.cells) - 2 * nearby.families.size + m].shape[0]
+    if pairs * skin.lasts > PRICE * elements:
+        skin.lasts = max(0.5 * skin.lasts, FEWEST)
+    elif 4.0 * pairs * skin.lasts < PRICE * elements:
+        skin.lasts = min(2.0 * skin.lasts, MANY)
+
+
+@kernel(leaf=True, forceinline=True)
+def reach_all(reach, x, nearby, families):
+    """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
+
+    Pairs that are found stay, see `covered`.
+    """
+    skin = nearby.skin[0]
+    skin.wished = 2.0 * reach
+    if nearby.at.shape[0]:
+        return
+    if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
+        skin.depth = math.inf
+        take(x, nearby, families)
+
+
+@kernel(leaf=True, apart=("pairs",))
+def covered(way: float, x: Matrix, nearby: NeighbourList, families: Families) -> bool:
+    """Whether the pairs that are listed are all that can touch by coming nearer by a way [m].
+
+    They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
+    bounds look at the elements themselves, see
+    `refweb.dynamics.integrators.step_bound`. So steps do not depend on which pairs happen to be listed,
+    as they would where a run is taken row by row.
+    """
+    skin = nearby.skin[0]
+    if not skin.depth < math.inf:
+        return False
+    if skin.used + way <= SHARE * skin.depth:
+        return True
+    depth = max(skin.depth, 4.0 * (skin.last + skin.before + skin.earlier))
+    if not way <= KEPT_UP_TO * depth:
+        return False
+    skin.depth, skin.used = depth, 0.0
+    take_pairs(x, nearby, families)
+    for m in range(nearby.families.size):  # how deep the pairs are is not known before the next forces
+        families.outs[nearby.families[m]][:, 0] = math.inf
+    return True
+
+
+@kernel(leaf=True, forceinline=True)
+def goes_freely(model):
+    """Whether lines push each other, and all places go as their velocities say: none is moved or carried."""
+    inertia = model.inertia
+    return model.guard.families.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
+
+
+@kernel(leaf=True, apart=("near",))
+def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before: Matrix, model: Model) -> None:
+    """Note how far things may have moved in the drift that led to x, and choose anew where the skin is used up.
+
+    ``bits`` are the velocities of all places, in a row, as whole numbers; none where nothing acts nearby. The largest
+    is known where a guard has looked for it. Motion that is prescribed is held against the places ``before``; to that
+    of a body is added what its rotation adds at its surface. States between the last three steps are covered as well,
+    which is what is looked at for peaks. Of pairs the ways relative to each other are taken where a skin as deep as may
+    be is used up in few steps otherwise.
+    """
+    if not bits.size:
+        return
+    skin, most, driven, turns = model.nearby.skin[0], np.int64(0), model.inertia.driven, model.inertia.turns
+    if not goes_freely(model):
+        for q in range(bits.size):
+            most = max(most, bits[q] & SIGN)
+        skin.top = most
+    way = abs(drift) * skin.fastest
+    for d in range(driven.size):
+        for k in range(3):
+            way = max(way, abs(x[driven[d], k] - before[d, k]))
+    way *= WAY
+    if FEWEST * way > skin.widest and not driven.size:
+        way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
+    if turns.moment.size:
+        way += 2.0 * abs(drift) * fastest_surface(x, v, turns)
+    skin.earlier, skin.before, skin.last = skin.before, skin.last, way
+    skin.longest = max(skin.longest, way)
+    skin.used += way
+    skin.steps += 1
+    if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
+        choose(drift, x, v, driven.size > 0, model.nearby, model.families)
+
+
+@kernel(apart=("near",))
+def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourList, families: Families) -> None:
+    """Choose anew what is near, behind a drift that led to x at velocities v, where motion is ``driven`` or is not."""
+    skin = nearby.skin[0]
+    way, recent = skin.last, skin.last + skin.before + skin.earlier
+    if not nearby.at.shape[0]:
+        skin.depth, skin.used = max(LASTS * way, 4.0 * recent, min(skin.wished, LONGEST * way)), 0.0
+        take(x, nearby, families)
+        return
+    if skin.depth < math.inf:
+        skin.used = spread_since(x, nearby.at) + recent
+        if skin.used + way <= KEPT_UP_TO * skin.depth:
+            return
+    near = way if driven else abs(drift) * spread_of(v[: nearby.at.shape[0]])
+    skin.depth, skin.used = max(min(skin.lasts * near, skin.widest), 4.0 * recent), 0.0
+    take_pairs(x, nearby, families)

@@ -1,0 +1,63 @@
+"""Space that the compiled loop works in: nothing in it stays from step to step."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...kernels import Integers, Matrix, Record, Vector
+from .dense_output import Inside
+
+
+class Workspace(Record):
+    """Space for what does not stay from step to step.
+
+    Attributes
+    ----------
+    where : ndarray of int, shape (2,)
+        The place of a value.
+    reaction, known, push : ndarray, shape (3,)
+        Force of the supports [N], what is known of plain probes, and the force that is integrated along the steps [N].
+    before : ndarray, shape (driven, 7)
+        State of rows whose motion is prescribed, ahead of a step.
+    aside, extra, half, momenta : ndarray, shape (rows, 3)
+        Velocities and forces that nobody needs, velocities at half a step [m/s], and momenta [N s].
+    was : ndarray, shape (changing,)
+        Natural lengths ahead of a step [m].
+    total : ndarray, shape (families + 3,)
+        Energies [J], and the size of a step [s].
+    inside : refweb.dynamics.integrators.dense_output.Inside
+        Space for looks inside of a step.
+    """
+
+    where: Integers
+    reaction: Vector
+    known: Vector
+    push: Vector
+    before: Matrix
+    aside: Matrix
+    extra: Matrix
+    half: Matrix
+    momenta: Matrix
+    was: Vector
+    total: Vector
+    inside: Inside
+
+    @classmethod
+    def of(cls, model, running):
+        """Space for the steps of a run."""
+        rows, sums, vectors = len(running.x), len(running.work) + 2, (np.zeros((len(running.x), 3)) for _ in range(4))
+        losses = [np.empty_like(model.families.outs[i]) for i in model.implicit_contacts.families.tolist()]
+        return cls(
+            where=np.zeros(2, dtype=np.int64),
+            reaction=np.zeros(3),
+            known=np.zeros(3),
+            push=np.zeros(3),
+            before=np.empty((len(model.inertia.driven), 7)),
+            aside=next(vectors),
+            extra=next(vectors),
+            half=next(vectors),
+            momenta=next(vectors),
+            was=np.empty(len(model.reels.lengths)),
+            total=np.zeros(sums),
+            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums, losses),
+        )

@@ -1,0 +1,326 @@
+"""Where two bodies touch: the skeleton of each held against the depth in the other.
+
+A part of a skeleton, see `refweb.net.skeleton`, has a thickness τ: it touches a body where it is inside of that body
+grown by τ. A straight line touches as an element of the web does, see `refweb.effects.contact.contact_points`, a point
+once. An arc touches once as well, at the place ξ where W δ^(p + 1) is largest, with the window W = sin²(π ξ). Each
+contact has the energy k/(p + 1) W δ^(p + 1), and since its place is that of an extreme its force is that of a fixed
+place: with G = ∂δ/∂y at its point y, −k W δ^p G on the first body, whose skeleton y is of, and the opposite on the
+other, both at y. So momentum and angular momentum are kept to rounding.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels import kernel
+from ...net.rotation import matrix_at, times, times_transposed
+from ...net.skeleton import ARC, COLUMNS, FROM, KIND, OWNS, SEGMENT, THICKNESS, THIRD, TO
+from ..vectors import dot
+from .contact_points import climb, hessian_times, places, window
+from .nonconvex_contacts import STEEPEST
+from .pair import _DAMPING, _EXPONENT, _FIELD, _FRICTION, _GROWTH, _SLIP, AWAY, PENALTY, pair_of
+
+ROOM, APART, SIDES = 0, 1, 4
+"""Columns of data: number of contacts there is room for, the first body's row from the second's at the start [m], and
+the first of two sides."""
+AXES, OFFSET, SPINS, PLANAR, MOBILITY, LEVER, EXTENT, FREE = 0, 9, 12, 13, 14, 20, 21, 22
+"""Columns of a side: the body's axes at the start, the centre of its shape, number of rows of its rotation that count,
+and what `refweb.effects.contact.pair.Pair` has; greatest distance of its surface from its row [m]; whether it moves."""
+THICK, PARTS, BEGIN, PAIR = 23, 24, 25, 26
+"""Least distance from its middle to its surface [m]; number of parts, and the column of the first; what
+`refweb.effects.contact.pair.pair_of` reads of the body as one that is touched, without axes."""
+PAIR_WIDTH = AWAY + 6 + _FIELD + 1
+SIDE = PAIR + PAIR_WIDTH
+"""Number of columns of a side."""
+LINE = (1.0, 0.0, -1.0, 1.0)
+"""Shares of both ends of a line."""
+SAMPLES = 8
+"""Number of parts of an arc between whose ends its deepest place is looked for."""
+TOUCHED, FIRST, SECOND, NORMAL, DEPTH, WEIGHT, SHARE, SLOT, DOWN, INNER, WIDTH = 0, 1, 4, 7, 10, 11, 12, 13, 14, 15, 16
+"""Columns of a contact: the side that is touched; its point from either body's row [m]; G, as from the first body into
+the second; depth [m]; by what its energy counts, and its losses; which contact of the pair it is; how far from its
+point, along G, the bodies touch [m]; whether its place moves."""
+
+
+class Frame(NamedTuple):
+    """How a body stands.
+
+    Attributes
+    ----------
+    axes : tuple of 3 tuples of 3 float
+        Unit vectors of its axes.
+    planar : bool
+        Whether it turns about the third alone.
+    mobility : tuple of 6 float
+        W of `refweb.net.rotation` along them, 00, 01, 02, 11, 12, 22.
+    """
+
+    axes: tuple
+    planar: bool
+    mobility: tuple
+
+
+class Law(NamedTuple):
+    """Numbers of the contact of two bodies, as in `refweb.effects.contact.pair.Pair`."""
+
+    stiffness: float
+    exponent: float
+    damping: float
+    friction: float
+    slip_velocity: float
+
+
+class Space(NamedTuple):
+    """Space to work in: rows, cell and numbers of one line, what is found on it, and all contacts of a pair."""
+
+    x: np.ndarray
+    cells: np.ndarray
+    data: np.ndarray
+    found: np.ndarray
+    contacts: np.ndarray
+
+
+@kernel()
+def side(s):
+    """First column of a side."""
+    return SIDES + SIDE * s
+
+
+@kernel()
+def frame_of(x, cells, data, c, s):
+    """The `Frame` of a side of a pair."""
+    at = side(s)
+    axes = (
+        (data[c, at], data[c, at + 1], data[c, at + 2]),
+        (data[c, at + 3], data[c, at + 4], data[c, at + 5]),
+        (data[c, at + 6], data[c, at + 7], data[c, at + 8]),
+    )
+    if data[c, at + SPINS] == 2.0:
+        turned = matrix_at(x, cells[c, 2 + 2 * s], cells[c, 3 + 2 * s])
+        axes = times(turned, axes[0]), times(turned, axes[1]), times(turned, axes[2])
+    m = at + MOBILITY
+    mobility = data[c, m], data[c, m + 1], data[c, m + 2], data[c, m + 3], data[c, m + 4], data[c, m + 5]
+    return Frame(axes, data[c, at + PLANAR] != 0.0, mobility)
+
+
+@kernel()
+def apart(x, cells, data, c):
+    """The first body's row from the second's [m]."""
+    a, b = cells[c, 0], cells[c, 1]
+    return (
+        data[c, APART] + x[a, 0] - x[b, 0],
+        data[c, APART + 1] + x[a, 1] - x[b, 1],
+        data[c, APART + 2] + x[a, 2] - x[b, 2],
+    )
+
+
+@kernel()
+def vector_at(data, c, at):
+    """Three numbers from a column on."""
+    return data[c, at], data[c, at + 1], data[c, at + 2]
+
+
+@kernel()
+def add(p, q):
+    """p + q."""
+    return p[0] + q[0], p[1] + q[1], p[2] + q[2]
+
+
+@kernel()
+def less(p, q):
+    """p − q."""
+    return p[0] - q[0], p[1] - q[1], p[2] - q[2]
+
+
+@kernel()
+def law_of(data, c):
+    """The `Law` of two bodies."""
+    at = SIDES + PAIR + AWAY + 6
+    return Law(
+        data[c, SIDES + PAIR + PENALTY],
+        data[c, at + _EXPONENT],
+        data[c, at + _DAMPING],
+        data[c, at + _FRICTION],
+        data[c, at + _SLIP],
+    )
+
+
+@functools.cache
+def arcs(depth):
+    """Kernel ``(start, end, centre, one, other, pair)`` of (place, W, point, depth, G) where an arc touches a body.
+
+    ``start`` and ``end`` are the angles at the ends of the arc, whose centre and vectors are along the axes of the
+    body. There W is 0 where it does not touch.
+    """
+
+    @kernel()
+    def on_arc(place, start, end, centre, one, other, pair):
+        """(point, depth, G, slope and bend of the depth by the place)."""
+        turn = end - start
+        angle = start + turn * place
+        c, s = math.cos(angle), math.sin(angle)
+        e = one[0] * c + other[0] * s, one[1] * c + other[1] * s, one[2] * c + other[2] * s
+        d = (
+            turn * (other[0] * c - one[0] * s),
+            turn * (other[1] * c - one[1] * s),
+            turn * (other[2] * c - one[2] * s),
+        )
+        deep, g, h = depth(add(centre, e), pair.shape)
+        return add(centre, e), deep, g, dot(g, d), dot(d, hessian_times(h, d)) - turn * turn * dot(g, e)
+
+    @kernel()
+    def rising(power, place, deep, slope, curve):
+        """What vanishes at the deepest place, positive before it, and its slope: as of straight lines."""
+        if deep <= 0.0:
+            return slope, curve
+        w = math.sin(math.pi * place) ** 2
+        w1, w2 = math.pi * math.sin(2.0 * math.pi * place), 2.0 * math.pi**2 * math.cos(2.0 * math.pi * place)
+        return (
+            w1 * deep + (power + 1.0) * w * slope,
+            w2 * deep + (power + 2.0) * w1 * slope + (power + 1.0) * w * curve,
+        )
+
+    @kernel()
+    def touched(start, end, centre, one, other, pair):
+        power, most, best = pair.exponent, -math.inf, 0
+        radius, nearest = math.sqrt(dot(one, one)), -math.inf
+        size, reach = (end - start) * radius, 2.0 * STEEPEST * radius * math.sin(0.25 * (end - start))
+        _, deep, _, _, _ = on_arc(0.5, start, end, centre, one, other, pair)
+        if deep + reach <= 0.0:
+            return 0.0, 0.0, centre, 0.0, centre
+        for n in range(SAMPLES + 1):
+            _, deep, _, _, _ = on_arc(n / SAMPLES, start, end, centre, one, other, pair)
+            nearest = max(nearest, deep)
+            felt = deep
+            if deep > 0.0:
+                felt = deep * (math.sin(math.pi * n / SAMPLES) ** 2) ** (1.0 / (power + 1.0))
+            if felt > most:
+                most, best = felt, n
+        if nearest + size / SAMPLES <= 0.0:  # gradients are shorter than 2
+            return 0.0, 0.0, centre, 0.0, centre
+        low, high, place, moved = max(best - 1, 0) / SAMPLES, min(best + 1, SAMPLES) / SAMPLES, best / SAMPLES, math.inf
+        for _ in range(100):
+            _, deep, _, slope, curve = on_arc(place, start, end, centre, one, other, pair)
+            value, curve = rising(power, place, deep, slope, curve)
+            low, high, moved, place = climb(value, curve, low, high, moved, place)
+            if moved <= 1e-15:
+                break
+        p, deep, g, _, _ = on_arc(place, start, end, centre, one, other, pair)
+        w = math.sin(math.pi * place) ** 2
+        return place, (w if deep > 0.0 else 0.0), p, deep, g
+
+    return touched
+
+
+@functools.cache
+def pressing(depth):
+    """(kernel that finds contacts of one skeleton in the depth of the other body, shape of its space).
+
+    The kernel ``(ahead, x, cells, data, c, s, space, count)`` writes those of the skeleton of side ``s``, grown by
+    ``ahead`` more, to rows of ``space.contacts`` from ``count`` on, and returns the row behind them.
+    """
+    _, _, contacts, touch_of, shape = places(depth, 0)
+    arc = arcs(depth)
+
+    @kernel()
+    def note(space, count, s, slot, way, y, g, found, thickness, touching):
+        """Write a contact; ``y`` and ``g`` are along the axes of the body that is touched."""
+        axes, offset, own, contacts = touching.axes, way[0], way[1], space.contacts
+        away = times_transposed(axes, add(y, offset))  # from the row of the body that is touched
+        g, near = times_transposed(axes, g), add(away, own)
+        deep, weight, share, inner = found
+        for k in range(3):
+            contacts[count, FIRST + k] = near[k] if s == 0 else away[k]
+            contacts[count, SECOND + k] = away[k] if s == 0 else near[k]
+            contacts[count, NORMAL + k] = g[k] if s == 0 else -g[k]
+        contacts[count, TOUCHED], contacts[count, DEPTH], contacts[count, WEIGHT] = 1 - s, deep, weight
+        contacts[count, SHARE], contacts[count, SLOT], contacts[count, INNER] = share, slot, inner
+        contacts[count, DOWN] = (thickness - 0.5 * deep) * (1.0 if s == 0 else -1.0)
+
+    @kernel()
+    def press(ahead, x, cells, data, c, s, space, count):
+        own, other, mine, its = frame_of(x, cells, data, c, s), frame_of(x, cells, data, c, 1 - s), side(s), side(1 - s)
+        away = apart(x, cells, data, c)
+        if s == 1:
+            away = -away[0], -away[1], -away[2]
+        centre, offset = vector_at(data, c, mine + OFFSET), vector_at(data, c, its + OFFSET)
+        way, row = (offset, (-away[0], -away[1], -away[2])), space.data
+        for k in range(PAIR_WIDTH):
+            row[0, k] = data[c, its + PAIR + k]
+        growth, extent, most = row[0, AWAY + 6 + _GROWTH], row[0, 0], space.contacts.shape[0]
+        before = int(data[c, its + PARTS]) if s == 1 else 0
+        for n in range(int(data[c, mine + PARTS])):
+            at = int(data[c, mine + BEGIN]) + COLUMNS * n
+            kind, thickness, slot = data[c, at + KIND], data[c, at + THICKNESS], 3 * (before + n)
+            row[0, AWAY + 6 + _GROWTH], row[0, 0] = growth + thickness + ahead, extent + thickness + ahead
+            p = add(times_transposed(own.axes, add(vector_at(data, c, at + FROM), centre)), away)
+            p = less(times(other.axes, p), offset)
+            pair = pair_of(row, 0, 2)
+            if kind == SEGMENT:
+                q = add(times_transposed(own.axes, add(vector_at(data, c, at + TO), centre)), away)
+                q = less(times(other.axes, q), offset)
+                d, middle = less(q, p), (0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2]))
+                if depth(middle, pair.shape)[0] + 0.5 * STEEPEST * math.sqrt(dot(d, d)) <= 0.0:
+                    continue
+                for k in range(3):
+                    space.x[0, k], space.x[1, k] = p[k], q[k]
+                for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.found)):
+                    touch = touch_of(space.x, space.cells, row, 2, LINE, space.found, m)
+                    end = 1 if touch.place > 0.5 else 0
+                    if (touch.inner or data[c, at + OWNS + end] != 0.0) and count < most:
+                        w = window(False, touch.place, touch.inner)[0]
+                        found = touch.spot.depth, w * touch.weight, w * touch.share, 1.0 if touch.inner else 0.0
+                        which = slot + (2 if touch.inner else end)
+                        note(space, count, s, which, way, touch.spot.y, touch.spot.gradient, found, thickness, other)
+                        count += 1
+            elif kind == ARC:
+                one = times(other.axes, times_transposed(own.axes, vector_at(data, c, at + TO)))
+                two = times(other.axes, times_transposed(own.axes, vector_at(data, c, at + THIRD)))
+                _, w, y, deep, g = arc(data[c, at + OWNS], data[c, at + OWNS + 1], p, one, two, pair)
+                if w > 0.0 and count < most:
+                    note(space, count, s, slot, way, y, g, (deep, w, w, 1.0), thickness, other)
+                    count += 1
+            else:
+                deep, g, _ = depth(p, pair.shape)
+                if deep > 0.0 and count < most:
+                    note(space, count, s, slot, way, p, g, (deep, 1.0, 1.0, 0.0), thickness, other)
+                    count += 1
+        return count
+
+    return press, shape
+
+
+@functools.cache
+def meeting(first, second):
+    """Kernels of two bodies whose depths are given, see `pressing`.
+
+    ``space_of(data)`` is the `Space`, and ``meet(ahead, x, cells, data, c, space)`` the number of contacts of a pair
+    that it holds.
+    """
+    (press, shape), (press_back, other) = pressing(second), pressing(first)
+    rows, columns = max(shape[0], other[0]), max(shape[1], other[1])
+
+    @kernel()
+    def space_of(data):
+        cells = np.empty((1, 3), dtype=np.int32)
+        for k in range(3):
+            cells[0, k] = k
+        most = int(data[0, ROOM]) if data.shape[0] else 0
+        return Space(
+            np.zeros((3, 3)), cells, np.empty((1, PAIR_WIDTH)), np.empty((rows, columns)), np.empty((most, WIDTH))
+        )
+
+    @kernel()
+    def meet(ahead, x, cells, data, c, space):
+        away = apart(x, cells, data, c)
+        reach = data[c, SIDES + EXTENT] + data[c, SIDES + SIDE + EXTENT] + ahead
+        if dot(away, away) > reach * reach:
+            return 0
+        count = press(ahead, x, cells, data, c, 0, space, 0)
+        return press_back(ahead, x, cells, data, c, 1, space, count)
+
+    return space_of, meet

@@ -1,0 +1,285 @@
+"""Where a line touches a body of any shape.
+
+A line that lies on a face, or along a ring or a cylinder, has no single nearest point: a force at the deepest one would
+jump from end to end. All shapes but spheres touch each element at both ends and once in between, at the place ξ where
+W(ξ) δ(ξ)^(p + 1) is largest, with the depth δ, the exponent p of the penalty and the window W = 4 ξ (1 − ξ). On a
+straight element that is one place, since the roots of W and δ are concave; it never jumps, and fades out where it nears
+an end, whose own contact takes over. On a curved one that bends away from the body between its ends there may be two,
+of which the deeper counts: the energy has a kink, and the force jumps, where they are equal.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ...kernels import kernel
+from ...net.rotation import times
+from ..vectors import dot
+from .nearest_point import SAMPLES, far, in_box, point, share
+from .pair import Pair, from_shape, pair_of, pairing
+
+NOWHERE = -1.0
+"""Place of the contact of an element that touches nowhere, not at its ends either."""
+
+
+class ContactPoint(NamedTuple):
+    """A place of an element, as a body sees it: vectors are from its row and along its axes.
+
+    Attributes
+    ----------
+    y, d, e : tuple of 3 float
+        The line's point y there [m], y' = dy/dξ and y''.
+    depth : float
+        Depth of that point δ [m].
+    gradient, hessian : tuple of 3 and of 6 float
+        g = ∂δ/∂y and H = ∂²δ/∂y² [1/m], of the axes 00, 01, 02, 11, 12, 22.
+    """
+
+    y: tuple
+    d: tuple
+    e: tuple
+    depth: float
+    gradient: tuple
+    hessian: tuple
+
+
+class PointContact(NamedTuple):
+    """A contact.
+
+    Attributes
+    ----------
+    c : int
+        Cell.
+    place : float
+        Its place ξ.
+    inner : bool
+        Whether the place moves as the line does.
+    pair : Pair
+        The element and the body.
+    spot : Spot
+        What is there.
+    weight, share : float
+        By what its energy counts, and its losses; 1 but on bodies that are not convex.
+    """
+
+    c: int
+    place: float
+    inner: bool
+    pair: Pair
+    spot: ContactPoint
+    weight: float
+    share: float
+
+
+@kernel()
+def hessian_times(h, p):
+    """Product of a Hessian and a vector."""
+    return (
+        h[0] * p[0] + h[1] * p[1] + h[2] * p[2],
+        h[1] * p[0] + h[3] * p[1] + h[4] * p[2],
+        h[2] * p[0] + h[4] * p[1] + h[5] * p[2],
+    )
+
+
+@kernel()
+def window(once, place, inner):
+    """(W, W', W'') of a contact; 1 at an end, and of a sphere."""
+    if not inner or once:
+        return 1.0, 0.0, 0.0
+    return 4.0 * place * (1.0 - place), 4.0 - 8.0 * place, -8.0
+
+
+@kernel(forceinline=True)
+def rise(pair, place, spot):
+    """What vanishes at the deepest place of an element, positive before it, and its slope.
+
+    W' δ + (p + 1) W δ', or where nothing is touched δ'; of a sphere the rate of −½ |y|², which is linear.
+    """
+    d, g, deep = spot.d, spot.gradient, spot.depth
+    slope, curve = dot(g, d), dot(d, hessian_times(spot.hessian, d)) + dot(g, spot.e)
+    if pair.once:
+        away = pair.shape.radius - deep
+        return away * slope, away * curve - slope * slope
+    if deep <= 0.0:
+        return slope, curve
+    power, (w, w1, w2) = pair.exponent, window(False, place, True)
+    return w1 * deep + (power + 1.0) * w * slope, w2 * deep + (power + 2.0) * w1 * slope + (power + 1.0) * w * curve
+
+
+@kernel(forceinline=True)
+def place_moves(touch, moving, nodes, functions, z):
+    """Write by how much the place of a contact moves with each node, along the body's axes, to ``z (nodes + 1, 3)``.
+
+    The last row is of the body; all are zero unless ``moving``.
+    """
+    z[:] = 0.0
+    pair, place, spot = touch.pair, touch.place, touch.spot
+    curve = rise(pair, place, spot)[1]
+    if not moving or not touch.weight * curve < 0.0:
+        return
+    (w, w1, _), g, turned = window(pair.once, place, True), spot.gradient, hessian_times(spot.hessian, spot.d)
+    own = pair.shape.radius - spot.depth if pair.once else (pair.exponent + 1.0) * w
+    for a in range(nodes + 1):
+        value, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+        for k in range(3):
+            z[a, k] = -(w1 * value * g[k] + own * (value * turned[k] + slope * g[k])) / curve
+
+
+class Places(NamedTuple):
+    """Kernels that find where lines touch bodies of one depth, see `places`, and the shape of what they find."""
+
+    within: Callable
+    deepest: Callable
+    contacts: Callable
+    touch_of: Callable
+    found: tuple
+
+
+@kernel(forceinline=True)
+def climb(value, curve, low, high, moved, place):
+    """(low, high, how far it moved, place) of the next place on the way to where a ``value`` falls through zero.
+
+    By Newton's method with the slope ``curve``, and by bisection where it leaves the bracket or comes no nearer.
+    """
+    if value > 0.0:
+        low = place
+    else:
+        high = place
+    step = place - value / curve if curve < 0.0 else -1.0
+    if not low <= step <= high or abs(step - place) > 0.5 * moved:
+        step = 0.5 * (low + high)
+    return low, high, abs(step - place), step
+
+
+@functools.cache
+def places(depth, spins=0):
+    """Kernels that find where lines touch.
+
+    ``within(x, cells, data, c, nodes, functions, place)`` is the `Spot` at a place of cell c, ``deepest`` of all but
+    the place (place, depth) of the contact between the ends of a cell, or `NOWHERE`. ``contacts`` finds those of a
+    line, and ``touch_of`` is the `Touch` that is one of them. ``found`` is (rows for each element, columns)
+    of what it finds.
+
+    Parameters
+    ----------
+    depth : kernel
+        Depth in the bodies, as `refweb.net.grown_core.depth`; where they need not be convex, with ``convex = False``,
+        see `refweb.effects.contact.nonconvex_contacts`.
+    spins : int
+        See `refweb.effects.contact.pair.pairing`.
+    """
+    paired, convex = pairing(spins), getattr(depth, "convex", True)
+
+    @kernel()
+    def within(x, cells, data, c, nodes, functions, place):
+        pair = paired(x, cells, data, c, nodes)
+        p, d, e = point(x, cells, data, c, nodes, functions, place)
+        p, d, e = times(pair.axes, p), times(pair.axes, d), times(pair.axes, e)
+        deep, gradient, hessian = depth(from_shape(p, data, c, nodes) if spins == 2 else p, pair.shape)
+        return ContactPoint(p, d, e, deep, gradient, hessian)
+
+    @kernel()
+    def climbed(x, cells, data, c, nodes, functions, low, high, place):
+        moved, pair = math.inf, pair_of(data, c, nodes)
+        if pair.once:
+            for end in (low, high):
+                spot = within(x, cells, data, c, nodes, functions, end)
+                slope = dot(spot.gradient, spot.d)
+                if (end == 0.0 and slope <= 0.0) or (end == 1.0 and slope >= 0.0):
+                    return end, spot.depth
+        for _ in range(100):
+            spot = within(x, cells, data, c, nodes, functions, place)
+            deep, slope = spot.depth, dot(spot.gradient, spot.d)
+            if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
+                return (NOWHERE if high - low == 1.0 else place), deep  # concave: nowhere deep enough
+            value, curve = rise(pair, place, spot)
+            low, high, moved, place = climb(value, curve, low, high, moved, place)
+            if moved <= 1e-15:
+                break
+        return place, within(x, cells, data, c, nodes, functions, place).depth
+
+    @kernel()
+    def felt(x, cells, data, c, nodes, functions, place):
+        deep, pair = within(x, cells, data, c, nodes, functions, place).depth, pair_of(data, c, nodes)
+        return window(pair.once, place, True)[0] ** (1.0 / (pair.exponent + 1.0)) * deep if deep > 0.0 else deep
+
+    @kernel()
+    def deepest(x, cells, data, c, nodes, functions):
+        if nodes > 2:  # from the places where samples are largest, of which there may be several
+            most, where, depth_there = -math.inf, 0.0, 0.0
+            before, here = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
+            for n in range(SAMPLES + 1):
+                at, after = n / SAMPLES, -math.inf
+                if n < SAMPLES:
+                    after = felt(x, cells, data, c, nodes, functions, at + 1.0 / SAMPLES)
+                if here >= before and here > after:
+                    low, high = max(at - 1.0 / SAMPLES, 0.0), min(at + 1.0 / SAMPLES, 1.0)
+                    place, deep = climbed(x, cells, data, c, nodes, functions, low, high, at)
+                    value = felt(x, cells, data, c, nodes, functions, place)
+                    if value > most:
+                        most, where, depth_there = value, place, deep
+                before, here = here, after
+            return where, depth_there
+        return climbed(x, cells, data, c, nodes, functions, 0.0, 1.0, 0.5)
+
+    @kernel(forceinline=True)
+    def contacts(x, cells, data, first, pieces, nodes, functions, found):
+        """Write (cell, place, whether the place moves) of each contact of a line to ``found``; return their number."""
+        count, best = 0, 0.0
+        for c in range(first, first + pieces):
+            if far(x, cells, data, c, nodes):
+                continue
+            place, deep = deepest(x, cells, data, c, nodes, functions)
+            if place == NOWHERE:
+                continue
+            inner = 0.0 < place < 1.0
+            if pair_of(data, c, nodes).once:
+                if deep > best:
+                    best, count = deep, 1
+                    found[0, 0], found[0, 1], found[0, 2] = c, place, inner
+                continue
+            if deep > 0.0 and inner:
+                found[count, 0], found[count, 1], found[count, 2] = c, place, 1.0
+                count += 1
+            for end in range(2):
+                if within(x, cells, data, c, nodes, functions, float(end)).depth > 0.0:
+                    found[count, 0], found[count, 1], found[count, 2] = c, end, 0.0
+                    count += 1
+        return count
+
+    @kernel(forceinline=True)
+    def touch_of(x, cells, data, nodes, functions, found, n):
+        c, place = int(found[n, 0]), found[n, 1]
+        spot = within(x, cells, data, c, nodes, functions, place)
+        weight, share = (1.0, 1.0) if convex else (found[n, 3], found[n, 4])
+        return PointContact(c, place, found[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
+
+    if convex:
+        return Places(within, deepest, contacts, touch_of, (3, 3))
+    from .nonconvex_contacts import COLUMNS, PLACES, several
+
+    return Places(within, *several(within, rise), touch_of, (PLACES, COLUMNS))
+
+
+@functools.cache
+def in_reach(depth, spins):
+    """The kernel that tells whether an element with two nodes may touch its body within a skin.
+
+    Where a body is convex its depth is concave along the element, and nowhere above its tangent in the middle.
+    """
+    boxed = in_box(spins)
+    if not getattr(depth, "convex", True):
+        return boxed
+    within = places(depth, spins).within
+
+    @kernel(forceinline=True)
+    def in_reach(skin, x, cells, data, c, nodes, functions):
+        if not boxed(skin, x, cells, data, c, nodes, functions):
+            return False
+        spot = within(x, cells, data, c, nodes, functions, 0.5)
+        return not spot.depth + 0.5 * abs(dot(spot.gradient, spot.d)) + skin <= 0.0
+
+    return in_reach

@@ -1,0 +1,111 @@
+"""Whether lines come as deep in a body as its middle while nodes and bodies move in straight lines.
+
+The push of a body turns over in its middle, where depth is largest: what comes there may leave on the other side. No
+point of a line comes deeper in a drift than it is, and the way of the line towards the body: that of the nodes of its
+element, less that of the body, and what that turns by. Where both together stay below `MIDDLE` of the distance of the
+middle from the surface, nothing passes. Lines that slide around a body at any depth pass nothing.
+
+The depth of an element is largest between the places where it touches. On a straight one depth in a convex body is
+concave: from any place it rises by no more than its slope there times the way to the ends, and it is at most `SHOWN`
+times that of the contacts. With ξ that of the largest W δ^(p + 1), W = 4 ξ (1 − ξ), from W'/W ≤ 1/ξ follows
+|δ'| ≤ δ/((p + 1) ξ), and from there to the deepest place it is no further than ξ: (p + 2)/(p + 1) ≤ `SHOWN`. In a
+body that is not convex the largest gradient of depth bounds it.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+from ...kernels import MEETS, kernel
+from ..vectors import dot
+from .nearest_point import closest
+from .overlap import CORE
+from .pair import RADIUS, pair_of
+
+MIDDLE = 0.7
+"""Depth that lines stay below, over the distance from the middle of a body to its surface: depth is 0.737 of that in
+the middle of a cube, 0.757 in that of a square bar, 0.8 in that of a plate, and all of it in a sphere or a capsule."""
+SHOWN = 1.5
+"""Depth of an element in a convex body over that of its deepest contact, at most; of spheres it is that."""
+PARTS = 256
+"""Largest number of parts of an element whose depth is looked at one by one."""
+
+
+def limits_of(family, bodies):
+    """(Least depth that nothing is to come to [m], depth of an element over that which is shown of it, at most).
+
+    The second is infinite where that is not known. They are those of a family and the bodies that its cells touch.
+    """
+    own = [body for body in bodies if body.row in family.cells[:, 2]]
+    shown = [1.0 if b.shape.once else SHOWN if getattr(b.shape.depth(), "convex", True) else math.inf for b in own]
+    return MIDDLE * min(body.thickness for body in own), max(shown)
+
+
+@kernel(forceinline=True)
+def nearing(cells, c, nodes, kick, drift, v, f, inverse):
+    """Largest way of a node of cell c less that of its body in a drift behind a kick [m]."""
+    most, b = 0.0, cells[c, nodes]
+    for a in range(nodes):
+        i, square = cells[c, a], 0.0
+        for k in range(3):
+            own = v[i, k] + kick * inverse[i, k] * f[i, k]
+            square += (own - v[b, k] - kick * inverse[b, k] * f[b, k]) ** 2
+        most = max(most, square)
+    return abs(drift) * math.sqrt(most)
+
+
+@functools.cache
+def passing(depth, nodes, functions, spins=0):
+    """The kernel of `refweb.kernels.MEETS` of lines in bodies of one depth, None for spheres alone.
+
+    It writes the nodes of an element, the row of the body, and 1 where that is in the core of the body already, else 0.
+    ``room`` is what points of bodies come nearer by as they turn. Arguments are those of
+    `refweb.effects.contact.penalty.kernels`.
+    """
+    if depth is None:
+
+        @kernel()
+        def below(x, cells, data, c, share, room):
+            away = math.sqrt(closest(x, cells, data, c, nodes, functions)[1])
+            return data[c, RADIUS] - away < share * data[c, RADIUS] - room
+
+    else:
+        from .contact_points import places
+        from .penalty import thickness
+
+        (within, *_), steepest = places(depth, spins), 0.0
+        if not getattr(depth, "convex", True):
+            from .nonconvex_contacts import STEEPEST as steepest
+
+        @kernel()
+        def below(x, cells, data, c, share, room):
+            limit = share * thickness(pair_of(data, c, nodes).shape) - max(steepest, 1.0) * room
+            parts = 1
+            while parts <= PARTS:
+                seen, most = -math.inf, -math.inf
+                for n in range(parts):
+                    spot = within(x, cells, data, c, nodes, functions, (n + 0.5) / parts)
+                    slope = steepest * math.sqrt(dot(spot.d, spot.d)) if steepest else abs(dot(spot.gradient, spot.d))
+                    seen, most = max(seen, spot.depth), max(most, spot.depth + 0.5 * slope / parts)
+                if most < limit:
+                    return True
+                if not seen < limit:
+                    return False
+                parts *= 4
+            return False
+
+    @kernel(MEETS)
+    def meets(room, way, kick, drift, x, v, f, inverse, cells, data, met):
+        for c in range(cells.shape[0]):
+            own = room + nearing(cells, c, nodes, kick, drift, v, f, inverse)
+            reach = data[c, RADIUS] + own
+            if closest(x, cells, data, c, nodes, functions)[1] > reach * reach:
+                continue
+            if not below(x, cells, data, c, MIDDLE, own):
+                met[0], met[1], met[2] = cells[c, 0], cells[c, 1], cells[c, nodes]
+                met[3] = 0 if below(x, cells, data, c, CORE, 0.0) else 1
+                return True
+        return False
+
+    return meets

@@ -1,0 +1,187 @@
+"""Where a line touches a body that is not convex.
+
+There F = W(ξ) δ(ξ)^(p + 1), see `refweb.effects.contact.contact_points`, may have several maxima along an element, with
+minima in between. Its energy is k/(p + 1) times what F rises by along the element: the sum of its maxima less that of
+its minima where the line is inside. Of a convex body that is the one maximum. A maximum that appears on a slope brings
+a minimum of the same place, and one that appears at the surface has no depth: so the energy has one slope everywhere.
+
+Maxima and minima are the places where the slope of F changes its sign, from one sample to the next; samples are at most
+half as far apart as the length on which the surface may turn. Where a sample is outside, the line is outside as far as
+its distance from the surface; those samples are left out.
+
+Losses have no energy: each maximum has the share of its push that F falls by on both sides on average, and minima have
+none. These shares are those of the rise, none is negative, and friction takes energy wherever it acts.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+from ...kernels import kernel
+from ..vectors import dot
+from .nearest_point import far, point
+from .pair import pair_of, power_of_depth
+
+SAMPLES = 256
+"""Largest number of parts of an element between whose ends slopes are looked at."""
+LEAST = 4
+"""Least number of them."""
+PLACES = 2 * SAMPLES + 2
+"""Largest number of contacts of an element."""
+LOOKS = 4
+"""Number of looks for a slope of F that changes its sign twice between two samples."""
+FURTHER = 1.8
+"""How far the next sample is from one outside, over its distance from the surface: at 2 both see all between."""
+STEEPEST = 1.25
+"""Largest gradient of a depth."""
+WEIGHT, SHARE, RISE = 3, 4, 5
+"""Columns of what is found: 1 of a maximum or an end and −1 of a minimum; share of the push that losses have; F."""
+COLUMNS = 6
+"""Number of columns."""
+
+
+@kernel()
+def note(found, n, c, place, inner, weight, rise):
+    """Write a contact to a row."""
+    found[n, 0], found[n, 1], found[n, 2] = c, place, inner
+    found[n, WEIGHT], found[n, SHARE], found[n, RISE] = weight, max(weight, 0.0), rise
+
+
+@kernel()
+def least_between(begin, slope, end, last):
+    """Where a cubic polynomial on (0, 1) has an extremum, of which ends and slopes there are known, of unlike signs."""
+    mean = end - begin
+    b, a = 6.0 * mean - 4.0 * slope - 2.0 * last, 3.0 * (slope + last - 2.0 * mean)
+    root = math.sqrt(max(b * b - 4.0 * a * slope, 0.0))
+    q = -0.5 * (b + math.copysign(root, b))
+    for place in (slope / q if q != 0.0 else -1.0, q / a if a != 0.0 else -1.0):
+        if 0.0 < place < 1.0:
+            return place
+    return slope / (slope - last)
+
+
+@kernel()
+def share_out(found, begin, end):
+    """Write the shares of the maxima among the places between the ends of an element."""
+    for n in range(begin, end):
+        if found[n, WEIGHT] > 0.0:
+            before = found[n - 1, RISE] if n > begin and found[n - 1, WEIGHT] < 0.0 else 0.0
+            after = found[n + 1, RISE] if n + 1 < end and found[n + 1, WEIGHT] < 0.0 else 0.0
+            found[n, SHARE] = max(1.0 - 0.5 * (before + after) / found[n, RISE], 0.0)
+
+
+@functools.cache
+def several(within, rise):
+    """(kernel of the deepest place of an element, kernel of all contacts of a line), as in `places`."""
+
+    @kernel()
+    def between(x, cells, data, c, nodes, functions, low, high, place, sign):
+        pair, moved = pair_of(data, c, nodes), math.inf
+        for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
+            value, curve = rise(pair, place, within(x, cells, data, c, nodes, functions, place))
+            if sign * value > 0.0:
+                low = place
+            else:
+                high = place
+            step = place - value / curve if sign * curve < 0.0 else -1.0
+            if not low <= step <= high or abs(step - place) > 0.5 * moved:
+                step = 0.5 * (low + high)
+            moved, place = abs(step - place), step
+            if moved <= 1e-15:
+                break
+        return place
+
+    @kernel()
+    def dip(x, cells, data, c, nodes, functions, low, high, begin, end):
+        """A place between two where the slope of F has another sign than at both, 2 where there is none."""
+        pair, sign = pair_of(data, c, nodes), 1.0 if begin[0] > 0.0 else -1.0
+        for _ in range(LOOKS):
+            width = high - low
+            if not (sign * begin[1] < 0.0 and sign * end[1] > 0.0):
+                break
+            place = low + width * least_between(begin[0], width * begin[1], end[0], width * end[1])
+            value, curve = rise(pair, place, within(x, cells, data, c, nodes, functions, place))
+            if (value > 0.0) != (sign > 0.0):
+                return place
+            if abs(value) > abs(curve) * width:
+                break
+            if sign * curve < 0.0:
+                low, begin = place, (value, curve)
+            else:
+                high, end = place, (value, curve)
+        return 2.0
+
+    @kernel()
+    def scan(x, cells, data, c, nodes, functions, found, begin):
+        """Write the contacts of a cell between its ends to rows from ``begin`` on; (row behind, depths of its ends)."""
+        pair, count = pair_of(data, c, nodes), begin
+        _, d, _ = point(x, cells, data, c, nodes, functions, 0.5)
+        steepest = STEEPEST * math.sqrt(dot(d, d)) * (1.0 if nodes == 2 else float(nodes * nodes))
+        first = last = -math.inf
+        middle = within(x, cells, data, c, nodes, functions, 0.5)
+        convex = nodes == 2 and pair.shape.fine == math.inf
+        if middle.depth + 0.5 * (abs(dot(middle.gradient, middle.d)) if convex else steepest) <= 0.0:
+            return count, first, last
+        parts = int(min(max(2.0 * steepest / pair.shape.fine, LEAST), SAMPLES))
+        n, last_n, sure, low, before, deep_before = 0, -1, 0, 0.0, (0.0, 0.0), 0.0
+        while True:
+            place = n / parts
+            spot = within(x, cells, data, c, nodes, functions, place)
+            clear = deep_before + spot.depth + steepest * (n - last_n) / parts <= 0.0
+            if not clear and n > sure:  # look again nearer to what was certain
+                n = sure
+                continue
+            value = rise(pair, place, spot)
+            if n == 0:
+                first = spot.depth
+            elif not clear and n == last_n + 1:
+                turn = (before[0] > 0.0) != (value[0] > 0.0)
+                inner = 2.0 if turn else dip(x, cells, data, c, nodes, functions, low, place, before, value)
+                for k in range(1 if turn else 2 if inner < 1.0 else 0):
+                    begins, ends = (low, place) if turn else (low, inner) if k == 0 else (inner, place)
+                    sign = 1.0 if (before[0] > 0.0) == (k == 0) else -1.0
+                    at = before[0] / (before[0] - value[0]) if turn else 0.5
+                    at = begins + at * (ends - begins)
+                    at = between(x, cells, data, c, nodes, functions, begins, ends, at, sign)
+                    deep = within(x, cells, data, c, nodes, functions, at).depth
+                    if deep > 0.0 and 0.0 < at < 1.0:
+                        felt = 4.0 * at * (1.0 - at) * deep * power_of_depth(pair.exponent, deep)
+                        note(found, count, c, at, 1.0, sign, felt)
+                        count += 1
+            if n == parts:
+                last = spot.depth
+                break
+            far_on = -spot.depth / steepest * parts if spot.depth < 0.0 else 0.0
+            last_n, low, before, deep_before = n, place, value, spot.depth
+            sure, n = min(n + max(int(far_on), 1), parts), min(n + max(int(FURTHER * far_on), 1), parts)
+        share_out(found, begin, count)
+        return count, first, last
+
+    @kernel()
+    def deepest(x, cells, data, c, nodes, functions):
+        found, where, most = np.empty((PLACES, COLUMNS)), 0.0, -math.inf
+        count, first, last = scan(x, cells, data, c, nodes, functions, found, 0)
+        most = max(first, last)
+        for n in range(count):
+            deep = within(x, cells, data, c, nodes, functions, found[n, 1]).depth
+            if deep > most:
+                where, most = found[n, 1], deep
+        return where, most
+
+    @kernel()
+    def contacts(x, cells, data, first, pieces, nodes, functions, found):
+        count = 0
+        for c in range(first, first + pieces):
+            if far(x, cells, data, c, nodes):
+                continue
+            count, begin, end = scan(x, cells, data, c, nodes, functions, found, count)
+            for at, deep in ((0.0, begin), (1.0, end)):
+                if deep > 0.0:
+                    note(found, count, c, at, 0.0, 1.0, 0.0)
+                    count += 1
+        return count
+
+    return deepest, contacts

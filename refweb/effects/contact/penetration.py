@@ -1,0 +1,65 @@
+"""Whether lines can have passed through bodies.
+
+A line passes a body through its middle, where the push turns over. Methods follow how deep every line comes, see
+`refweb.effects.contact.line_body_ccd`: explicit ones before each drift, in which nodes and bodies move in straight
+lines, and those of steps of their own on their interpolants. So it is certain that nothing has passed where no line has
+come to the middle of a body from the start of a run on; that a line is in the core at the start is refused.
+
+The middle of a mesh is that of its field, see `refweb.net.boundary.field`: where a wall is thinner than nearly all of
+its surface, it is not seen.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def named(system, met):
+    """'line 1 ... body "a"', of what has met: a line by its nodes, and a body by its row."""
+    net = system.net
+    return net.line_between(met[:2]), next(body for body in net.bodies if body.row == met[2])
+
+
+def would_pass(system, met):
+    """That a line would come to the middle of a body in any step."""
+    line, body = named(system, met)
+    return (
+        f'line {line} would come to the middle of body "{body.name}", {body.thickness:.3g} m below its surface: use a '
+        "slower motion or a thicker body"
+    )
+
+
+class BodyPassage:
+    """What is known of lines that may have passed through bodies.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With contact.
+    """
+
+    def __init__(self, system):
+        self._system, self._met = system, np.full(5, np.inf)
+        self._followed = any(family.passing is not None for family in system.families)
+
+    def note(self, met):
+        """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
+        self._met = met
+
+    def told(self):
+        """Whether nothing can have passed, as ``run.json`` has it."""
+        if not self._followed:
+            return "not certified: curved elements are not followed"
+        time, *met = self._met
+        if not np.isfinite(time):
+            return "certified"
+        line, body = named(self._system, met)
+        return (
+            f'not certified: line {line} came to the middle of body "{body.name}", where it may pass, at t = '
+            f"{time:.6g} s"
+        )
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        if np.isfinite(self._met[0]):
+            yield f"lines may have passed through bodies, {self.told()}"

@@ -1,0 +1,204 @@
+"""Whether centre lines meet while nodes move in straight lines, and how long none can come through another.
+
+Points of two elements come nearer to each other by no more than the largest of the four differences of the ways of
+their nodes, for such a difference is linear along either element. A pair whose distance is above that does not meet. Of
+the others the motion is followed: from a distance d it may go on by d over that difference, and so on until its end, or
+until centre lines are nearer than `MEETING` of the distance at which lines touch.
+
+Two elements that share a node meet where one folds flat onto the other: their distance is that of the far node of
+either from the other. They do not push each other, nor do those that are near along the net, so that these are told of
+and not kept apart. A pair with a distance d need not be looked at again before rows have moved by d relative to each
+other.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import CCD_NEIGHBOURS, MEETS, TIME_TO_CONTACT, kernel
+from ...net.net import REFERENCE
+from ..vectors import dot
+from .pair import SCALE, SHAPE, TOUCH, WIDTH, nearest, place_of
+from .search import found
+
+MEETING = 1e-9
+"""Distance at which centre lines meet, over that at which lines touch."""
+LOOKS = 200
+"""Largest number of looks at the motion of a pair; one that is not decided by then counts as meeting."""
+AHEAD = 64.0
+"""Number of ways that what is looked at in turn is chosen for."""
+TRAVEL = 0.2
+"""Largest share of the distance of touch that lines may come nearer by in an implicit step, or half of what they are
+apart."""
+
+
+@kernel(forceinline=True)
+def from_line(u, w):
+    """Distance of the point u from the segment of w, both from its beginning."""
+    square = dot(w, w)
+    s = min(max(dot(u, w) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    d = u[0] - s * w[0], u[1] - s * w[1], u[2] - s * w[2]
+    return math.sqrt(dot(d, d))
+
+
+@kernel(forceinline=True)
+def distance(p, u, w, joined):
+    """Distance of two elements; of those that are ``joined`` at their beginnings, of their ends from each other."""
+    return min(from_line(u, w), from_line(w, u)) if joined else math.sqrt(max(nearest(p, u, w)[2], 0.0))
+
+
+@kernel(forceinline=True)
+def longest_of(p, u, w):
+    """Largest difference of what is p − … of the first and of the other element: at one of their ends."""
+    most = 0.0
+    for i in range(2):
+        for j in range(2):
+            a, b = p[0] + i * u[0] - j * w[0], p[1] + i * u[1] - j * w[1]
+            c = p[2] + i * u[2] - j * w[2]
+            most = max(most, a * a + b * b + c * c)
+    return math.sqrt(most)
+
+
+@kernel(forceinline=True)
+def ways_of(cells, c, kick, drift, v, f, inverse):
+    """What the vectors (p, u, w) of pair c change by in a drift, behind a kick."""
+    i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
+    a0, a1 = drift * (v[i, 0] + kick * inverse[i, 0] * f[i, 0]), drift * (v[i, 1] + kick * inverse[i, 1] * f[i, 1])
+    b0, b1 = drift * (v[j, 0] + kick * inverse[j, 0] * f[j, 0]), drift * (v[j, 1] + kick * inverse[j, 1] * f[j, 1])
+    c0, c1 = drift * (v[k, 0] + kick * inverse[k, 0] * f[k, 0]), drift * (v[k, 1] + kick * inverse[k, 1] * f[k, 1])
+    d0, d1 = drift * (v[m, 0] + kick * inverse[m, 0] * f[m, 0]), drift * (v[m, 1] + kick * inverse[m, 1] * f[m, 1])
+    a2, b2 = drift * (v[i, 2] + kick * inverse[i, 2] * f[i, 2]), drift * (v[j, 2] + kick * inverse[j, 2] * f[j, 2])
+    c2, d2 = drift * (v[k, 2] + kick * inverse[k, 2] * f[k, 2]), drift * (v[m, 2] + kick * inverse[m, 2] * f[m, 2])
+    return (a0 - c0, a1 - c1, a2 - c2), (b0 - a0, b1 - a1, b2 - a2), (d0 - c0, d1 - c1, d2 - c2)
+
+
+@kernel(forceinline=True)
+def gone(vector, share, way):
+    """A vector after a share of its way."""
+    return vector[0] + share * way[0], vector[1] + share * way[1], vector[2] + share * way[2]
+
+
+@kernel()
+def meet(room, place, ways, joined):
+    """(Whether a pair comes nearer than ``room`` on its way, its distance at the start, by how much it may change)."""
+    (p, u, w), (dp, du, dw) = place, ways
+    most, share, start = longest_of(dp, du, dw), 0.0, distance(p, u, w, joined)
+    left = start
+    for _ in range(LOOKS):
+        if not left - room > 0.0:
+            return True, start, most
+        if left - room > (1.0 - share) * most:
+            return False, start, most
+        share += (left - room) / most
+        left = distance(gone(p, share, dp), gone(u, share, du), gone(w, share, dw), joined)
+    return True, start, most
+
+
+@kernel(forceinline=True)
+def note(cells, c, met):
+    """Write the nodes of pair c."""
+    for n in range(4):
+        met[n] = cells[c, n]
+
+
+@kernel(MEETS)
+def meets(room, way, kick, drift, x, v, f, inverse, cells, data, met):
+    if cells.shape[1] != 4:
+        _, cells, data = found(max(way, 0.0) + room, x, cells, data)
+    for c in range(cells.shape[0]):
+        if data[c, SCALE] > 0.0:
+            near, joined = room + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
+            ways = ways_of(cells, c, kick, drift, v, f, inverse)
+            if meet(near, place_of(x, cells, data, c), ways, joined)[0]:
+                note(cells, c, met)
+                return True
+    return False
+
+
+@kernel(CCD_NEIGHBOURS)
+def watch(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met):
+    count = cells.shape[0]
+    past, until, came = due[count], due[count + 1], False
+    if past + way + room >= until:  # choose those whose turn comes soon
+        until, chosen[count] = past + AHEAD * (way + room) if count else math.inf, 0
+        for c in range(count):
+            if due[c] <= until:
+                chosen[chosen[count]] = c
+                chosen[count] += 1
+        due[count + 1] = until
+    next_one = until
+    for n in range(chosen[count]):
+        c = chosen[n]
+        if due[c] > past + way + room:
+            next_one = min(next_one, due[c])
+            continue
+        near, joined = room + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
+        ways = ways_of(cells, c, kick, drift, v, f, inverse)
+        closed, start, _ = meet(near, place_of(x, cells, data, c), ways, joined)
+        due[c] = past + start
+        next_one = min(next_one, due[c])
+        if closed and data[c, SCALE] > 0.0 and not came:
+            note(cells, c, met)
+            came = True
+    due[count], due[count + 2] = past + way, next_one
+    return came
+
+
+@kernel(TIME_TO_CONTACT)
+def soon(x, v, cells, data):
+    time = math.inf
+    for c in range(cells.shape[0]):
+        if data[c, SCALE] > 0.0:
+            i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
+            p = v[i, 0] - v[k, 0], v[i, 1] - v[k, 1], v[i, 2] - v[k, 2]
+            u = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
+            w = v[m, 0] - v[k, 0], v[m, 1] - v[k, 1], v[m, 2] - v[k, 2]
+            speed = 2.0 * longest_of(p, u, w)
+            if speed > 0.0:
+                place = place_of(x, cells, data, c)
+                left = distance(place.p, place.u, place.w, False) - data[c, TOUCH]
+                time = min(time, max(TRAVEL * data[c, TOUCH], 0.5 * left) / speed)
+    return time
+
+
+def neighbours(net, beside, touch):
+    """(Nodes, numbers, elements) of the pairs of elements that do not push: joined at a node, or near along the net.
+
+    Joined ones begin at what they share. Two lines between the same nodes are one on the other at any time, and no
+    pair.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        The elements.
+    beside : ndarray, shape (elements, most)
+        Those that are near each other along the net, see `refweb.effects.self_contact.table.near_along`.
+    touch : float
+        Distance at which lines touch [m].
+    """
+    cells, count = net.cells, len(net.cells)
+    place = np.stack([net.points[cells[:, 0]]] * 2, axis=1)
+    place[:, 1] += net.line_data[:, REFERENCE : REFERENCE + 3]
+    ends = np.arange(2 * count)  # element, and which of its nodes
+    order = ends[np.argsort(cells.ravel(), kind="stable")]
+    begin = np.searchsorted(cells.ravel()[order], np.arange(net.nodes + 1))
+    joined = []
+    for size in np.unique(np.diff(begin)):
+        starts = begin[:-1][np.diff(begin) == size]
+        one, other = np.triu_indices(size, 1)
+        joined.append(np.stack([order[starts[:, None] + one].ravel(), order[starts[:, None] + other].ravel()], axis=1))
+    joined = np.concatenate([*joined, np.zeros((0, 2), dtype=np.int64)])
+    twice = (np.sort(cells[joined[:, 0] // 2], axis=1) == np.sort(cells[joined[:, 1] // 2], axis=1)).all(axis=1)
+    joined = joined[~twice]
+    element, column = np.nonzero(beside > np.arange(count)[:, None])
+    near = 2 * np.stack([element, beside[element, column].astype(np.int64)], axis=1)
+    pairs = np.concatenate([joined, near])
+    elements, first = pairs // 2, pairs % 2
+    rows = np.stack([cells[elements, first], cells[elements, 1 - first]], axis=2).reshape(-1, 4)
+    at = np.stack([place[elements, first], place[elements, 1 - first]], axis=2).reshape(-1, 4, 3)
+    data = np.zeros((len(pairs), WIDTH))
+    data[:, TOUCH], data[:, SCALE] = touch, 1.0
+    data[:, SHAPE : SHAPE + 9] = (at[:, 1:] - at[:, :1]).reshape(-1, 9)
+    return np.ascontiguousarray(rows, dtype=np.int32), data, elements

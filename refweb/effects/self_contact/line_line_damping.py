@@ -1,0 +1,135 @@
+"""What damping takes where lines touch, as compiled kernels.
+
+With the forces f of `refweb.effects.self_contact.line_line_penalty` on the four nodes of a pair, their velocities v,
+and |f| the root of the sum of the squares of all components, damping adds
+
+    F = m f,        m = max(d δ̇, −1),        δ̇ = −f·v/|f|,
+
+the push of Hunt and Crossley, which never turns into a pull. δ̇ is the rate of the overlap: where middles of elements
+cross, |f| is the push, and up to √2 of it towards their ends. F has no resultant and no moment, as f has none, and does
+not feel a rigid motion. Its power m f·v is not positive. With K = −∂f/∂x,
+
+    −∂F/∂v = d f f/|f| where m > −1,        −∂F/∂x = m K − f ∂m/∂x,        ∂δ̇/∂x = K v/|f| − (f·v) K f/|f|³.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import BOUND, FORCE, STIFFNESS, kernel
+from .line_line_penalty import MOST, OF_REACH, add_all_second, give, pushed, reject_step, steepest, stored
+from .pair import DAMPING, LENGTH, OTHER, SCALE, TOUCH
+from .search import found
+
+SHALLOW = 0.05
+"""Share of the overlap that a pair may come to that is reckoned with before it is there: a step that has to do with
+more is iterated for longer, and the next bound knows the overlap."""
+
+
+@kernel(forceinline=True)
+def loss(v, cells, data, c, forces):
+    """(m, |f|, f·v) of pair c, f being the forces on its four nodes."""
+    square = power = 0.0
+    for n in range(4):
+        for k in range(3):
+            square += forces[n][k] * forces[n][k]
+            power += forces[n][k] * v[cells[c, n], k]
+    size = math.sqrt(square)
+    if not size > 0.0:
+        return 0.0, 0.0, 0.0
+    return max(-data[c, DAMPING] * power / size, -1.0), size, power
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    if cells.shape[1] == 4:
+        for c in range(cells.shape[0]):
+            _, forces = pushed(x, cells, data, c)
+            damped, _, power = loss(v, cells, data, c, forces)
+            give(damped, f, cells, c, forces)
+            out[c, 0] = damped * power
+        return
+    out[:, 0] = 0.0
+    chosen, rows, numbers = found(0.0, x, cells, data)
+    for c in range(rows.shape[0]):
+        _, forces = pushed(x, rows, numbers, c)
+        damped, _, power = loss(v, rows, numbers, c, forces)
+        give(damped, f, rows, c, forces)
+        for n in range(2):
+            out[chosen[c, n], 0] += 0.5 * damped * power
+
+
+@kernel(STIFFNESS)
+def stiffness(t, x, v, blocks, cells, data, definite):
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        if definite:
+            continue
+        _, push = pushed(x, cells, data, c)
+        damped, size, power = loss(v, cells, data, c, push)
+        if size == 0.0:
+            continue
+        add_all_second(x, cells, data, c, False, blocks[c])
+        slope = np.zeros(12)
+        for i in range(12):
+            for j in range(12):
+                n, k = j // 3, j % 3
+                slope[i] += blocks[c, j, i] * (v[cells[c, n], k] - power * push[n][k] / size**2) / size
+        rate = data[c, DAMPING] if damped > -1.0 else 0.0
+        for i in range(12):
+            for j in range(12):
+                blocks[c, i, j] = damped * blocks[c, i, j] - rate * push[i // 3][i % 3] * slope[j]
+
+
+@kernel(STIFFNESS)
+def damping(t, x, v, blocks, cells, data, definite):
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        _, push = pushed(x, cells, data, c)
+        damped, size, _ = loss(v, cells, data, c, push)
+        if size == 0.0 or damped == -1.0:
+            continue
+        for i in range(12):
+            for j in range(12):
+                blocks[c, i, j] = data[c, DAMPING] * push[i // 3][i % 3] * push[j // 3][j % 3] / size
+
+
+@kernel()
+def add_bounds(reach, speed, x, mass, rates, cells, data, viscous):
+    """Add the row sums of ∂F/∂v, or of ∂F/∂x, to the rates."""
+    own, most = np.zeros(rates.size), np.zeros(rates.size)
+    for c in range(cells.shape[0]):
+        room = reject_step(reach, speed, x, mass, cells, data, c)
+        if room > 0.0:
+            now = (1.875 * stored(x, cells, data, c) / data[c, SCALE]) ** 0.4
+            room = min(room, max(2.0 * now, SHALLOW * room))
+            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
+            value *= data[c, DAMPING] * (0.5 * room / data[c, TOUCH] if viscous else speed)
+            for n in range(4):
+                own[cells[c, n]] += value
+                most[cells[c, n]] = max(most[cells[c, n]], value)
+    for r in range(rates.size):
+        rates[r] += min(own[r], MOST * most[r])
+
+
+@kernel()
+def add_bounds_of_any(reach, speed, x, mass, rates, cells, data, viscous):
+    """The same of pairs, or of elements; of these no further than the longest is."""
+    reach *= OF_REACH
+    if cells.shape[1] == 4:
+        add_bounds(reach, speed, x, mass, rates, cells, data, viscous)
+        return
+    _, rows, numbers = found(min(reach, data[:, LENGTH].max()), x, cells, data)
+    add_bounds(reach, speed, x, mass, rates, rows, numbers, viscous)
+
+
+@kernel(BOUND)
+def bound(reach, speed, x, mass, rates, cells, data):
+    add_bounds_of_any(reach, speed, x, mass, rates, cells, data, False)
+
+
+@kernel(BOUND)
+def damping_bound(reach, speed, x, mass, rates, cells, data):
+    add_bounds_of_any(reach, speed, x, mass, rates, cells, data, True)

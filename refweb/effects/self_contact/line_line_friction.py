@@ -1,0 +1,368 @@
+"""Friction where lines touch, as compiled kernels, and how explicit kicks solve for it.
+
+The push of a pair, see `refweb.effects.self_contact.line_line_penalty`, has the resultant N n on its first element, but
+for what is along either line, as at joints, and its shares on the four nodes say where it acts: at a of the first
+element and at b of the other, d = a − b. With the directions û and ŵ of the elements, the rates at which they slide
+along themselves,
+
+    s₁ = d/dt (û·d),        s₂ = d/dt (ŵ·d),
+
+for these shares, do not feel a motion of the pair as a whole. The slip that has them as components along û and ŵ has
+the square |u|² = sᵀ G⁻¹ s, G = [[1, c], [c, 1]], c = û·ŵ. Friction is Coulomb's, regularised with the slip velocity
+v_s,
+
+    F = −μ N ∂|u|²/∂s / (2 √(|u|² + v_s²)),        its power  F·s = −μ N |u|²/√(|u|² + v_s²) ≤ 0,
+
+spread to the nodes as s takes their velocities, so that it keeps momentum and angular momentum. Nodes of a straight
+line take no moment about it, so friction has none either: lines turn freely about themselves, and one that is wound
+around a straight line is held no more than over a pulley that turns, whatever μ is.
+
+Where lines do not roll, s are the two components across n of the velocity of one centre line relative to the other, and
+G is the identity: the friction of threads, by which a line that is wound n turns holds T₂/T₁ ≤ e^(2π n μ). It keeps
+momentum. Of angular momentum 2 r F is left in each contact to a twist that elements without thickness do not have, and
+nets that turn as a whole are braked, as their lines would have to turn along. To keep it and to hold exclude each
+other.
+
+N is the push of the overlap, whatever damping adds to it. Lines that lie along each other slide along themselves alone:
+across, such lines roll, as nothing resists their turning about themselves. 1 + `ALIKE` c²/(L L'), of the distance of
+touch c, stands for the ones of G, so that this is the limit.
+
+In explicit kicks friction is solved for contact by contact, see `refweb.effects.contact_solver`, along the two
+directions between which J M⁻¹ Jᵀ has no mixed term. Tangents of N by differences steer iterations of implicit methods
+alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import BOUND, COMMIT, DETECT, FORCE, STIFFNESS, WARM_START, kernel
+from ..base import CELL, ImplicitContactKernels
+from ..contact_solver import (
+    DAMPING,
+    FORCES,
+    MIXED,
+    OWN,
+    PUSH,
+    ROWS,
+    START,
+    THETA,
+    sweeping,
+)  # fmt: skip
+from ..contact_solver import FRICTION as DRAG
+from ..contact_solver import SLIP as CREEP
+from ..contact_solver import WIDTH as BEHIND
+from ..vectors import cross, dot
+from .line_line_penalty import bound as press_bound
+from .line_line_penalty import pushed
+from .pair import FRICTION, LENGTH, NAMES, OTHER, ROLLS, RUBBING, SLIP, TOUCH, place_of
+from .search import found
+
+ALIKE = 0.01
+"""Share of (2r)²/(L L') that keeps the slip of lines along each other finite: it takes half of it from friction."""
+STEP = 1e-6
+"""Step of differences, over the distance of touch."""
+ALONG, KEYS, WHOLE = BEHIND, BEHIND + 24, BEHIND + 30
+"""Columns of what touches, behind those of `refweb.effects.contact_solver`: what four nodes add to the slip along
+either
+direction; the numbers of both elements; and what forces along either are along û, and along ŵ."""
+SLOTS, NOTED = 8, 5
+"""Pairs of an element that are remembered, and what of each: both elements, the number of the step, forces along û and
+ŵ [N]."""
+
+
+@kernel(forceinline=True)
+def set_rows_of_threads(along, n, a, b, rows, shares):
+    """Write what `slip_rows` does of centre lines that do not roll: components along the first line and across it."""
+    off = dot(along, n)
+    e = along[0] - off * n[0], along[1] - off * n[1], along[2] - off * n[2]
+    inverse = 1.0 / math.sqrt(dot(e, e))
+    e = inverse * e[0], inverse * e[1], inverse * e[2]
+    axes, weights = (e, cross(n, e)), (1.0 - a, a, b - 1.0, -b)
+    for i in range(2):
+        for m in range(4):
+            for k in range(3):
+                rows[i, m, k] = weights[m] * axes[i][k]
+        shares[i, i], shares[i, 1 - i] = 1.0, 0.0
+
+
+@kernel()
+def slip_rows(x, cells, data, c, rows, shares):
+    """N of pair c [N], 0 where it does not touch; what nodes add to both components of u to ``rows (2, 4, 3)``.
+
+    ``shares (2, 2)`` is what forces along both are along û and ŵ, or along the components of threads.
+    """
+    _, push = pushed(x, cells, data, c)
+    whole = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
+    p, u, w = place_of(x, cells, data, c)
+    long, wide = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
+    if not (dot(whole, whole) > 0.0 and long > 0.0 and wide > 0.0):
+        return 0.0
+    one, other = (u[0] / long, u[1] / long, u[2] / long), (w[0] / wide, w[1] / wide, w[2] / wide)
+    mixed = dot(one, other)
+    apart = 1.0 + ALIKE * data[c, TOUCH] ** 2 / (data[c, LENGTH] * data[c, OTHER])
+    both, differ = 1.0 / math.sqrt(2.0 * (apart + mixed)), 1.0 / math.sqrt(2.0 * (apart - mixed))
+    shares[0, 0], shares[0, 1], shares[1, 0], shares[1, 1] = both, both, differ, -differ
+    p0, p1, p2 = whole
+    for i in range(2):  # what pushes along either line, at a joint, is no pressure
+        first, last = shares[i, 0], shares[i, 1]
+        e = (
+            first * one[0] + last * other[0],
+            first * one[1] + last * other[1],
+            first * one[2] + last * other[2],
+        )
+        size = dot(whole, e)
+        p0, p1, p2 = p0 - size * e[0], p1 - size * e[1], p2 - size * e[2]
+    size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+    if not size > 0.0:
+        return 0.0
+    n = p0 / size, p1 / size, p2 / size
+    within = dot(whole, n)
+    if not within > 0.0:
+        return 0.0
+    a, b = dot(push[1], n) / within, -dot(push[3], n) / within
+    if data[c, ROLLS] == 0.0:
+        set_rows_of_threads(one, n, a, b, rows, shares)
+        return size
+    d = p[0] + a * u[0] - b * w[0], p[1] + a * u[1] - b * w[1], p[2] + a * u[2] - b * w[2]
+    own, its = dot(one, d), dot(other, d)
+    for k in range(3):
+        tilt, lean = (d[k] - own * one[k]) / long, (d[k] - its * other[k]) / wide
+        for i in range(2):
+            mean = shares[i, 0] * one[k] + shares[i, 1] * other[k]
+            rows[i, 0, k] = (1.0 - a) * mean - shares[i, 0] * tilt
+            rows[i, 1, k] = a * mean + shares[i, 0] * tilt
+            rows[i, 2, k] = -(1.0 - b) * mean - shares[i, 1] * lean
+            rows[i, 3, k] = -b * mean + shares[i, 1] * lean
+    return size
+
+
+@kernel(forceinline=True)
+def slip_of(v, cells, c, rows, i):
+    """Component i of u [m/s]."""
+    total = 0.0
+    for n in range(4):
+        for k in range(3):
+            total += rows[i, n, k] * v[cells[c, n], k]
+    return total
+
+
+@kernel()
+def rub(x, v, f, cells, data, c, rows, shares):
+    """Add the friction of pair c to the rows ``cells[c]`` of f; its power [W]."""
+    normal = slip_rows(x, cells, data, c, rows, shares)
+    if normal == 0.0:
+        return 0.0
+    one, other = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
+    drag = data[c, FRICTION] * normal / math.sqrt(one * one + other * other + data[c, SLIP] ** 2)
+    for n in range(4):
+        for k in range(3):
+            f[cells[c, n], k] -= drag * (one * rows[0, n, k] + other * rows[1, n, k])
+    return -drag * (one * one + other * other)
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
+    if cells.shape[1] == 4:
+        for c in range(cells.shape[0]):
+            out[c, 0] = rub(x, v, f, cells, data, c, rows, shares)
+        return
+    out[:, 0] = 0.0
+    chosen, pairs, numbers = found(0.0, x, cells, data)
+    for c in range(pairs.shape[0]):
+        out[chosen[c, 0], 0] += rub(x, v, f, pairs, numbers, c, rows, shares)
+
+
+@kernel(STIFFNESS)
+def stiffness(t, x, v, blocks, cells, data, definite):
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
+    place, speed, ahead, behind = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    own = np.empty((1, 4), dtype=np.int32)
+    for n in range(4):
+        own[0, n] = n
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        if definite or slip_rows(x, cells, data, c, rows, shares) == 0.0:
+            continue
+        numbers, step = data[c : c + 1], STEP * data[c, TOUCH]
+        for n in range(4):
+            for k in range(3):
+                place[n, k], speed[n, k] = x[cells[c, n], k], v[cells[c, n], k]
+        for m in range(12):
+            n, k = m // 3, m % 3
+            was = place[n, k]
+            ahead[:], behind[:] = 0.0, 0.0
+            place[n, k] = was + step
+            rub(place, speed, ahead, own, numbers, 0, rows, shares)
+            place[n, k] = was - step
+            rub(place, speed, behind, own, numbers, 0, rows, shares)
+            place[n, k] = was
+            for i in range(12):
+                blocks[c, i, m] = (behind[i // 3, i % 3] - ahead[i // 3, i % 3]) / (2.0 * step)
+
+
+@kernel(STIFFNESS)
+def damping(t, x, v, blocks, cells, data, definite):
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        normal = slip_rows(x, cells, data, c, rows, shares)
+        if normal == 0.0:
+            continue
+        u = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
+        size = math.sqrt(u[0] * u[0] + u[1] * u[1] + data[c, SLIP] ** 2)
+        drag = data[c, FRICTION] * normal / size
+        for i in range(2):
+            for j in range(2):
+                value = drag * ((1.0 if i == j else 0.0) - u[i] * u[j] / (size * size))
+                for m in range(12):
+                    for n in range(12):
+                        blocks[c, m, n] += value * rows[i, m // 3, m % 3] * rows[j, n // 3, n % 3]
+
+
+@kernel(BOUND)
+def bound(reach, speed, x, mass, rates, cells, data):
+    own = np.zeros(rates.size)
+    if cells.shape[0]:
+        press_bound(reach, speed, x, mass, own, cells, data)
+        friction = data[0, FRICTION if cells.shape[1] == 4 else RUBBING]
+        for r in range(rates.size):
+            rates[r] += friction * own[r]
+
+
+# Kicks
+
+
+@kernel(forceinline=True)
+def along(touches, n, i, rows):
+    """Component along direction i, 1 or 2, of u, of velocities ``rows (rows, 3)``."""
+    at, total = ALONG + 12 * (i - 1), 0.0
+    for m in range(4):
+        r = int(touches[n, ROWS + m])
+        for k in range(3):
+            total += touches[n, at + 3 * m + k] * rows[r, k]
+    return total
+
+
+@kernel(forceinline=True)
+def moved(touches, n, i, f, inverse):
+    """Component along direction i, 1 or 2, of the acceleration by forces f; 0 along the normal."""
+    if i == 0:
+        return 0.0
+    at, total = ALONG + 12 * (i - 1), 0.0
+    for m in range(4):
+        r = int(touches[n, ROWS + m])
+        for k in range(3):
+            total += touches[n, at + 3 * m + k] * inverse[r, k] * f[r, k]
+    return total
+
+
+@kernel(forceinline=True)
+def apply_force(touches, n, p, q, s, f):
+    """Add forces along both directions to the rows of a contact; there is none along the normal."""
+    for m in range(4):
+        r = int(touches[n, ROWS + m])
+        for k in range(3):
+            f[r, k] += q * touches[n, ALONG + 3 * m + k] + s * touches[n, ALONG + 12 + 3 * m + k]
+
+
+@kernel(forceinline=True)
+def delassus(rows, i, j, cells, c, inverse):
+    """J M⁻¹ Jᵀ between two components [1/kg]."""
+    total = 0.0
+    for m in range(4):
+        for k in range(3):
+            total += rows[i, m, k] * rows[j, m, k] * inverse[cells[c, m], k]
+    return total
+
+
+@kernel()
+def set_touch(touches, at, c, cell, normal, cells, data, v, inverse, rows, shares):
+    """Write all that sweeps ask of pair c, which shows its power at a ``cell``."""
+    touches[at, CELL], touches[at, PUSH], touches[at, DAMPING] = cell, normal, 0.0
+    touches[at, DRAG], touches[at, CREEP] = data[c, FRICTION], data[c, SLIP]
+    touches[at, KEYS], touches[at, KEYS + 1] = data[c, NAMES], data[c, NAMES + 1]
+    first, last = delassus(rows, 0, 0, cells, c, inverse), delassus(rows, 1, 1, cells, c, inverse)
+    angle = 0.5 * math.atan2(2.0 * delassus(rows, 0, 1, cells, c, inverse), first - last)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    for m in range(4):
+        touches[at, ROWS + m] = cells[c, m]
+        for k in range(3):
+            p, q = rows[0, m, k], rows[1, m, k]
+            rows[0, m, k], rows[1, m, k] = cosine * p + sine * q, cosine * q - sine * p
+            touches[at, ALONG + 3 * m + k], touches[at, ALONG + 12 + 3 * m + k] = rows[0, m, k], rows[1, m, k]
+    for j in range(2):
+        p, q = shares[0, j], shares[1, j]
+        touches[at, KEYS + 2 + 2 * j], touches[at, KEYS + 3 + 2 * j] = cosine * p + sine * q, cosine * q - sine * p
+    for i in range(2):
+        touches[at, OWN + 1 + i] = delassus(rows, i, i, cells, c, inverse)
+        touches[at, START + 1 + i] = along(touches, at, 1 + i, v)
+        touches[at, MIXED + i] = touches[at, FORCES + 1 + i] = 0.0
+    touches[at, OWN] = touches[at, START] = touches[at, FORCES] = 0.0
+    touches[at, THETA] = touches[at, THETA + 1] = 1.0
+
+
+@kernel(DETECT)
+def meet(h, x, v, inverse, cells, data, touches, begin):
+    rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
+    count, chosen = begin, np.empty((0, 2), dtype=np.int64)
+    if cells.shape[1] != 4:
+        chosen, cells, data = found(0.0, x, cells, data)
+    for c in range(cells.shape[0]):
+        normal = slip_rows(x, cells, data, c, rows, shares)
+        if normal > 0.0:
+            if count < touches.shape[0]:
+                cell = chosen[c, 0] if chosen.shape[0] else c
+                set_touch(touches, count, c, cell, normal, cells, data, v, inverse, rows, shares)
+            count += 1
+    return count
+
+
+@kernel(forceinline=True)
+def slot_of(memory, touches, n, number):
+    """(row, first column) of what is remembered of a pair; a new one takes the place that is oldest."""
+    row, oldest, at = int(touches[n, KEYS]) % memory.shape[0], math.inf, 0
+    for slot in range(SLOTS):
+        here = NOTED * slot
+        if (
+            memory[row, here + 2] > 0.0
+            and memory[row, here] == touches[n, KEYS]
+            and (memory[row, here + 1] == touches[n, KEYS + 1])
+        ):
+            return row, here
+        if memory[row, here + 2] < oldest:
+            oldest, at = memory[row, here + 2], here
+    return row, at
+
+
+@kernel(WARM_START)
+def recall(number, memory, f, touches, begin, end):
+    for n in range(begin, end):
+        row, at = slot_of(memory, touches, n, number)
+        same = memory[row, at] == touches[n, KEYS] and memory[row, at + 1] == touches[n, KEYS + 1]
+        if same and memory[row, at + 2] == number - 1 and number > 1:
+            # of F = Σ Fᵢ (what direction i is along û and ŵ), the components again
+            a, b, c, d = touches[n, KEYS + 2], touches[n, KEYS + 3], touches[n, KEYS + 4], touches[n, KEYS + 5]
+            whole, one, other = a * d - b * c, memory[row, at + 3], memory[row, at + 4]
+            q, s = (d * one - b * other) / whole, (a * other - c * one) / whole
+            touches[n, FORCES + 1], touches[n, FORCES + 2] = q, s
+            apply_force(touches, n, 0.0, q, s, f)
+
+
+@kernel(COMMIT)
+def give(number, memory, v, touches, begin, end, out):
+    out[:, 0] = 0.0
+    for n in range(begin, end):
+        row, at = slot_of(memory, touches, n, number)
+        q, s = touches[n, FORCES + 1], touches[n, FORCES + 2]
+        memory[row, at], memory[row, at + 1], memory[row, at + 2] = touches[n, KEYS], touches[n, KEYS + 1], number
+        memory[row, at + 3] = q * touches[n, KEYS + 2] + s * touches[n, KEYS + 3]
+        memory[row, at + 4] = q * touches[n, KEYS + 4] + s * touches[n, KEYS + 5]
+        out[int(touches[n, CELL]), 0] += q * along(touches, n, 1, v) + s * along(touches, n, 2, v)
+
+
+KICKS = ImplicitContactKernels(meet, recall, sweeping(moved, apply_force), give, WHOLE, SLOTS * NOTED)
+"""How explicit kicks solve for it."""

@@ -1,0 +1,384 @@
+"""The push between lines, as compiled kernels.
+
+Two elements with natural lengths L and L', whose vectors are u and w, have the energy
+
+    E = ½ κ f (L I + L' I'),        f² = |u × w|²/(L L')² + c²/(L L'),        κ = k/(√12 c³),
+
+I and I' being the overlaps of each with the line of the other, see `refweb.effects.self_contact.overlap_integrals`, c =
+2r the distance at which lines touch, and k the stiffness. All of it follows from the four nodes smoothly and does not
+change as the pair is carried and turned: its forces are the gradient, their resultant and their moment are zero.
+
+Lines that cross with their centre lines h apart overlap over a length that goes with one over the sine of their angle.
+f takes that away: whatever the angle, at any place that is not at a free end,
+
+    E = (16/15) κ (c² − h²)^(5/2) f/sin,        push = k h (c² − h²)^(3/2)/(√27 r³) · f/sin,
+
+where f/sin is 1 but for (c/L)², and both are times the mean of the stretches |u|/L and |w|/L'. For a small overlap δ
+that is 3.08 k δ^(3/2)/√r, as crossed cylinders push by Hertz; at h = r it is k r and largest. Where what overlaps is
+further than c from all ends, both integrals are these roots and powers to rounding, and no sum is taken. Lines that lie
+along each other push with 2 κ f h (c² − h²)·2 on their length: elements of a pair together by up to k r again, over the
+length that they share. So the stiffness of a pair is of the order of k at any angle, and steps need not be shorter for
+lines that are parallel.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
+from ..vectors import cross, dot
+from .overlap_integrals import add_second, first
+from .pair import ENDS, LENGTH, OTHER, SCALE, TOUCH, angle_factor, apart, nearest, numbers_of, place_of
+from .search import REACH, found
+
+MARGIN = 0.75
+"""Factor on that of a rigid body: of 4000 pairs at random no row sum is above 0.7 of what it leaves."""
+MOST = 6.0
+"""Number of others that lie against an element at one time in bounds, at most: so many equal lines fit around one."""
+FAR = 4.0
+"""Reach over the longest element above which a bound does not look which elements are near each other."""
+OF_REACH = 0.5
+"""Share of the reach of a bound that pairs come nearer by: that is twice what two rows may at its speed."""
+NOT_SEEN = -1.0
+"""What a pair shows that does not overlap."""
+NO_PUSH = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+"""Forces of such a pair."""
+
+
+@kernel(forceinline=True)
+def overlap(p, u, w, n, s, t, of):
+    """(J, its slopes by ½ p·p, p·u, p·w, ½ u·u, u·w and ½ w·w), E = f J, see `first`."""
+    uu, uw, ww, nn, pp, pu, pw = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, p), dot(p, u), dot(p, w)
+    one, a = first(pp, pu, pw, uw, ww, nn, s, t, of.touch)
+    other, b = first(pp, -pw, -pu, uw, uu, nn, t, s, of.touch)
+    own, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.other
+    return own * one + more * other, (
+        own * a[0] + more * b[0],
+        own * a[1] - more * b[2],
+        own * a[2] - more * b[1],
+        own * a[3] + more * b[5],
+        own * a[4] + more * b[4],
+        own * a[5] + more * b[3],
+    )
+
+
+@kernel(forceinline=True)
+def to_nodes(p, u, w, s, t, slopes):
+    """Gradients by the four nodes of what has such slopes."""
+    a, b, c, d, e, g = slopes
+    by_p = a * p[0] + b * u[0] + c * w[0], a * p[1] + b * u[1] + c * w[1], a * p[2] + b * u[2] + c * w[2]
+    by_u = (
+        b * p[0] + d * u[0] + e * w[0] + s * by_p[0],
+        b * p[1] + d * u[1] + e * w[1] + s * by_p[1],
+        b * p[2] + d * u[2] + e * w[2] + s * by_p[2],
+    )
+    by_w = (
+        c * p[0] + e * u[0] + g * w[0] - t * by_p[0],
+        c * p[1] + e * u[1] + g * w[1] - t * by_p[1],
+        c * p[2] + e * u[2] + g * w[2] - t * by_p[2],
+    )
+    return (
+        (by_p[0] - by_u[0], by_p[1] - by_u[1], by_p[2] - by_u[2]),
+        by_u,
+        (-by_p[0] - by_w[0], -by_p[1] - by_w[1], -by_p[2] - by_w[2]),
+        by_w,
+    )
+
+
+@kernel(forceinline=True)
+def between(place, s, t):
+    """Vector from the share t of the other element to the share s of the first."""
+    p, u, w = place
+    return p[0] + s * u[0] - t * w[0], p[1] + s * u[1] - t * w[1], p[2] + s * u[2] - t * w[2]
+
+
+@kernel(forceinline=True)
+def slopes_of_factor(u, w, n, f, area):
+    """(∂f/∂u, ∂f/∂w)."""
+    one, other, scale = cross(w, n), cross(n, u), 1.0 / (f * area * area)
+    return (
+        (scale * one[0], scale * one[1], scale * one[2]),
+        (scale * other[0], scale * other[1], scale * other[2]),
+    )
+
+
+@kernel(forceinline=True)
+def crossed(place, n, of):
+    """(J, its slopes, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
+
+    Of a crossing at the places s and t of both infinite lines, a distance h apart, R = c² − h² and N = |u × w|, the
+    overlap is (R/N²)^½ |w| long to either side along the first element, and the same of the other:
+
+        J = (8/15) κ R^(5/2) (L |w| + L' |u|)/N.
+
+    The slopes are numbers a, b, α and β: ∂J/∂p = a n, ∂J/∂u = w × (a p + b n) + α u, and ∂J/∂w = (a p + b n) × u + β w.
+    """
+    (p, u, w), touch = place, of.touch
+    uu, uw, ww, nn, pn = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, n)
+    room = touch * touch * nn - pn * pn
+    if not (room > 0.0 and nn > 0.0):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
+    first, other = math.sqrt(uu), math.sqrt(ww)
+    both = first * other
+    one = 1.0 / (nn * both)  # of three numbers by one division: those and roots are most of the time
+    inverse, short = one * both, one * nn
+    room *= inverse
+    half = math.sqrt(room * inverse)
+    d, e = dot(u, p), dot(w, p)
+    s, t, along = (uw * e - ww * d) * inverse, (uu * e - uw * d) * inverse, half * abs(uw) + touch
+    wide, high = max(half * other, along * other * short), max(half * first, along * first * short)
+    if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
+    size = of.length * other + of.other * first
+    scale = 8.0 / 15.0 * of.scale * room * half
+    j, by_p, share = scale * room * size, -5.0 * scale * pn * inverse * size, scale * room * short
+    turn = -(by_p * pn + j) * inverse
+    return j, by_p, turn, of.other * other * share, of.length * first * share, pn * pn * inverse
+
+
+@kernel()
+def forces_of(place, of):
+    """(How deep a pair that may touch overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes)."""
+    p, u, w = place
+    n = cross(u, w)
+    f, area = angle_factor(n, of.length, of.other, of.touch)
+    j, by_p, turn, own, more, square = crossed(place, n, of)
+    if j == 0.0:
+        return forces_near_ends(place, n, f, area, of)
+    a, b, own, more = f * by_p, f * turn + j / (f * area * area), f * own, f * more
+    m = a * p[0] + b * n[0], a * p[1] + b * n[1], a * p[2] + b * n[2]
+    q, r = cross(w, m), cross(m, u)
+    q = q[0] + own * u[0], q[1] + own * u[1], q[2] + own * u[2]
+    r = r[0] + more * w[0], r[1] + more * w[1], r[2] + more * w[2]
+    return max(of.touch - math.sqrt(square), 0.0), (
+        (q[0] - a * n[0], q[1] - a * n[1], q[2] - a * n[2]),
+        (-q[0], -q[1], -q[2]),
+        (r[0] + a * n[0], r[1] + a * n[1], r[2] + a * n[2]),
+        (-r[0], -r[1], -r[2]),
+    )
+
+
+@kernel(forceinline=True)
+def forces_near_ends(place, n, f, area, of):
+    """The same of a pair that overlaps near an end, or does not: lines may meet far from both segments."""
+    s, t, square = nearest(place.p, place.u, place.w)
+    if square > (REACH * of.touch) ** 2:
+        return NOT_SEEN, NO_PUSH
+    p, u, w = between(place, s, t), place.u, place.w
+    j, (a, b, c, d, e, g) = overlap(p, u, w, n, s, t, of)
+    if j == 0.0:
+        return NOT_SEEN, NO_PUSH
+    f, turn = -f, -j / (f * area * area)
+    e, d, g = f * e - turn * dot(u, w), f * d + turn * dot(w, w), f * g + turn * dot(u, u)
+    return max(of.touch - math.sqrt(square), 0.0), to_nodes(p, u, w, s, t, (f * a, f * b, f * c, d, e, g))
+
+
+@kernel(forceinline=True)
+def pushed(x, cells, data, c):
+    """(How deep pair c overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes [N]).
+
+    What is apart costs no call, and a call takes no array, nor does what is written here: to count the references to
+    the arrays of a pair takes as long as its push.
+    """
+    place, of = place_of(x, cells, data, c), numbers_of(data, c)
+    if apart(place, of.touch):
+        return NOT_SEEN, NO_PUSH
+    return forces_of(place, of)
+
+
+@kernel(forceinline=True)
+def give(share, f, cells, c, forces):
+    """Add a share of the forces on the four nodes of pair c to f."""
+    for n in range(4):
+        for k in range(3):
+            f[cells[c, n], k] += share * forces[n][k]
+
+
+@kernel()
+def energy_of(place, of):
+    """Energy of a pair that may touch [J]."""
+    n = cross(place.u, place.w)
+    j = crossed(place, n, of)[0]
+    if j == 0.0:
+        s, t, square = nearest(place.p, place.u, place.w)
+        if not square > (REACH * of.touch) ** 2:
+            j = overlap(between(place, s, t), place.u, place.w, n, s, t, of)[0]
+    return angle_factor(n, of.length, of.other, of.touch)[0] * j
+
+
+@kernel(forceinline=True)
+def stored(x, cells, data, c):
+    """Energy of pair c [J]."""
+    place, of = place_of(x, cells, data, c), numbers_of(data, c)
+    return 0.0 if apart(place, of.touch) else energy_of(place, of)
+
+
+@kernel(FORCE)
+def force(t, x, v, f, cells, data, out):
+    if cells.shape[1] == 4:
+        for c in range(cells.shape[0]):
+            deep, forces = pushed(x, cells, data, c)
+            out[c, 0] = max(deep, 0.0)
+            if deep != NOT_SEEN:
+                give(1.0, f, cells, c, forces)
+        return
+    out[:, 0] = 0.0
+    chosen, rows, numbers = found(0.0, x, cells, data)
+    for c in range(rows.shape[0]):
+        deep, forces = pushed(x, rows, numbers, c)
+        if deep != NOT_SEEN:
+            give(1.0, f, rows, c, forces)
+            for n in range(2):
+                out[chosen[c, n], 0] = max(out[chosen[c, n], 0], deep)
+
+
+@kernel(ENERGY)
+def energy(t, x, cells, data, out):
+    if cells.shape[1] == 4:
+        for c in range(cells.shape[0]):
+            out[c] = stored(x, cells, data, c)
+        return
+    out[:] = 0.0
+    chosen, rows, numbers = found(0.0, x, cells, data)
+    for c in range(rows.shape[0]):
+        own = 0.5 * stored(x, rows, numbers, c)
+        for n in range(2):
+            out[chosen[c, n]] += own
+
+
+@kernel()
+def add_turning(block, place, j, slopes, by_u, by_w, f, area):
+    """Add what follows of f as the elements turn: ∇f ∇J + ∇J ∇f + J ∇∇f; ``slopes (4, 3)`` are those of J."""
+    u, w, of_u, of_w = place.u, place.w, (-1.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 1.0)
+    uu, uw, ww, scale = dot(u, u), dot(u, w), dot(w, w), j / (f * area * area)
+    for a in range(3):
+        for b in range(3):
+            one = 1.0 if a == b else 0.0
+            first_block = scale * (ww * one - w[a] * w[b]) - j * by_u[a] * by_u[b] / f
+            mixed = scale * (2.0 * u[a] * w[b] - w[a] * u[b] - uw * one) - j * by_u[a] * by_w[b] / f
+            last_block = scale * (uu * one - u[a] * u[b]) - j * by_w[a] * by_w[b] / f
+            for m in range(4):
+                tilt = of_u[m] * by_u[a] + of_w[m] * by_w[a]
+                for n in range(4):
+                    other = of_u[n] * by_u[b] + of_w[n] * by_w[b]
+                    value = tilt * slopes[n, b] + slopes[m, a] * other
+                    value += of_u[m] * of_u[n] * first_block + of_w[m] * of_w[n] * last_block
+                    value += of_u[m] * of_w[n] * mixed
+                    block[3 * m + a, 3 * n + b] += value
+                    block[3 * n + b, 3 * m + a] += of_u[m] * of_w[n] * mixed
+
+
+@kernel()
+def add_all_second(x, cells, data, c, definite, block):
+    """Add the second derivatives of the energy of pair c to its block, or a part that is positive semidefinite."""
+    place, of = place_of(x, cells, data, c), numbers_of(data, c)
+    if apart(place, of.touch):
+        return
+    p, u, w = place
+    n = cross(u, w)
+    f, area = angle_factor(n, of.length, of.other, of.touch)
+    half = 0.5 * of.scale * f
+    add_second(p, u, w, of.touch, half * of.length, definite, (0, 1, 2, 3), block)
+    back = -p[0], -p[1], -p[2]
+    add_second(back, w, u, of.touch, half * of.other, definite, (2, 3, 0, 1), block)
+    if definite:
+        return
+    s, t, _ = nearest(p, u, w)
+    q = between(place, s, t)
+    j, by_products = overlap(q, u, w, n, s, t, of)
+    by_nodes, slopes = to_nodes(q, u, w, s, t, by_products), np.empty((4, 3))
+    for m in range(4):
+        for k in range(3):
+            slopes[m, k] = by_nodes[m][k]
+    by_u, by_w = slopes_of_factor(u, w, n, f, area)
+    add_turning(block, place, j, slopes, by_u, by_w, f, area)
+
+
+@kernel(STIFFNESS)
+def stiffness(t, x, v, blocks, cells, data, definite):
+    for c in range(cells.shape[0]):
+        blocks[c] = 0.0
+        add_all_second(x, cells, data, c, definite, blocks[c])
+
+
+@kernel(forceinline=True)
+def steepest(touch, scale, first_length, other_length, room):
+    """Bound on the stiffness of a pair [N/m] whose c² − D is at most ``room``: 8 c² κ f times the length in reach."""
+    eta = touch / math.sqrt(first_length * other_length)
+    shared = eta * (min(first_length, other_length) + 2.0 * touch)
+    return MARGIN * 8.0 * touch * touch * scale * math.sqrt(4.0 * room + shared * shared)
+
+
+@kernel(forceinline=True)
+def room_left(most, touch, scale, stored_now, moving):
+    """c² − D that a pair may come to: what is within reach, and for what its energy and that of motion allow."""
+    if not scale > 0.0:
+        return 0.0
+    most, power = min(most, touch * touch), 1.875 * (stored_now + moving) / scale
+    return most if power >= touch**5 else min(most, power**0.4)
+
+
+@kernel(forceinline=True)
+def reject_step(reach, speed, x, mass, cells, data, c):
+    """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
+    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
+    square = nearest(place.p, place.u, place.w)[2]
+    if not square < (REACH * touch + reach) ** 2:
+        return 0.0
+    own, other = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
+    reduced = own * other / (own + other) if min(own, other) > 0.0 else max(own, other)
+    moving = 0.5 * reduced * speed * speed if speed > 0.0 else math.inf
+    left = max(math.sqrt(square) - reach, 0.0)
+    return room_left(2.0 * touch * touch - left * left, touch, data[c, SCALE], stored(x, cells, data, c), moving)
+
+
+@kernel()
+def note_pairs(reach, speed, x, mass, cells, data, own, most):
+    """Write the sum and the largest of the bounds of all pairs of each row."""
+    for c in range(cells.shape[0]):
+        room = reject_step(reach, speed, x, mass, cells, data, c)
+        if room > 0.0:
+            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
+            for n in range(4):
+                own[cells[c, n]] += value
+                most[cells[c, n]] = max(most[cells[c, n]], value)
+
+
+@kernel()
+def note_all(speed, mass, cells, data, own, most):
+    """The same where any two elements may touch: each has its middle touched by another like it."""
+    for c in range(cells.shape[0]):
+        touch, scale, length = data[c, TOUCH], data[c, SCALE], data[c, LENGTH]
+        moving = math.inf if speed == 0.0 else 0.25 * (mass[cells[c, 0]] + mass[cells[c, 1]]) * speed * speed
+        room = room_left(math.inf, touch, scale, 0.0, moving)
+        value = steepest(touch, scale, length, length, room)
+        for n in range(2):
+            most[cells[c, n]] = own[cells[c, n]] = max(most[cells[c, n]], value)
+
+
+@kernel()
+def longest(x, cells, data):
+    """Length of the longest element."""
+    square = 0.0
+    for c in range(cells.shape[0]):
+        i, j, own = cells[c, 0], cells[c, 1], 0.0
+        for k in range(3):
+            own += (data[c, ENDS + 3 + k] - data[c, ENDS + k] + x[j, k] - x[i, k]) ** 2
+        square = max(square, own)
+    return math.sqrt(square)
+
+
+@kernel(BOUND)
+def bound(reach, speed, x, mass, rates, cells, data):
+    own, most, reach = np.zeros(rates.size), np.zeros(rates.size), OF_REACH * reach
+    if cells.shape[1] == 4:
+        note_pairs(reach, speed, x, mass, cells, data, own, most)
+    elif reach > FAR * longest(x, cells, data):
+        note_all(speed, mass, cells, data, own, most)
+    else:
+        _, rows, numbers = found(reach, x, cells, data)
+        note_pairs(reach, speed, x, mass, rows, numbers, own, most)
+    for r in range(rates.size):
+        rates[r] += min(own[r], MOST * most[r])

@@ -1,0 +1,201 @@
+"""Whether lines can have passed through lines, and which stiffness would hold them.
+
+Lines pass where their centre lines meet. Methods follow the motion of every pair, see
+`refweb.effects.self_contact.line_line_ccd`: explicit ones before each drift, in which nodes move in straight lines, and
+those of steps of their own on their interpolants. So it is certain that nothing has passed where no two have met from
+the start of a run on. How the web came from its own position to that start is no part of it.
+
+Two elements that share a node do not push each other, nor do those within two radii of each other along the net. They
+are followed as well: the first two that fold flat onto each other, or meet, are told. What hangs on them cannot have
+passed unseen, for that is met itself.
+
+An overlap above r is refused: from there on the push falls.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...errors import PenetrationError, SolverError
+from ...net.net import AXIAL_STIFFNESS, LENGTH
+
+AIM = 0.8
+"""Overlap that a stiffness is named for, over the radius."""
+STIFFER = 4.0
+"""Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
+POWER = 2.5
+"""Power of an overlap that the energy of lines that cross goes with."""
+PRESCRIBED = "the motion of both is prescribed, and no stiffness of [self_contact] holds them"
+"""What is said of lines that are moved through each other."""
+HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
+"""Energy of lines that cross and overlap by `AIM` of the radius, over k r²."""
+
+
+def pressed(system):
+    """Number of the family of lines against lines of a system, None where there is none."""
+    found = (i for i, family in enumerate(system.families) if family.crossing is not None)
+    return next(found, None)
+
+
+def lines_of(net, nodes):
+    """ "lines 1 and 2", those of two elements by the nodes of both, shape (4,)."""
+    one, other = (net.line_between(pair) for pair in np.reshape(nodes, (2, 2)))
+    return f"lines {one} and {other}"
+
+
+def holding(energy, radius):
+    """Stiffness that stores an energy [J] at `AIM` of a radius [m], where lines cross [N/m]."""
+    return energy / (HELD * radius**2)
+
+
+def would_pass(system, v, nodes):
+    """That two lines would pass, and which stiffness would hold them; ``nodes (4,)`` are those of both.
+
+    It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v. A node that a body
+    carries comes with the mass of the body.
+    """
+    held, pairs = system.held.all(axis=1), np.reshape(nodes, (2, 2))
+    crossing = system.families[pressed(system)].crossing
+    given = f"{lines_of(system.net, nodes)} would pass through each other"
+    heavy = []
+    for pair in pairs:
+        free = pair[~held[pair]].tolist()
+        rows = list(set(system.carriers.moving(free) if system.carriers else free))
+        heavy.append(system.net.mass[rows].sum() if free else np.inf)
+    mass = 1.0 / (1.0 / heavy[0] + 1.0 / heavy[1]) if np.isfinite(heavy).any() else np.inf
+    speed = max(float(np.linalg.norm(v[i] - v[k])) for i in pairs[0] for k in pairs[1])
+    if np.isinf(mass):
+        return f"{given}: {PRESCRIBED}"
+    enough = max(holding(0.5 * mass * speed**2, 0.5 * crossing.touch), 2.0 * crossing.stiffness)
+    return (
+        f"{given}: [self_contact] stiffness = {float(f'{enough:.2g}'):g} would hold what comes at {speed:.3g} m/s, in "
+        f"place of {crossing.stiffness:.3g}"
+    )
+
+
+def first_stiffness(system):
+    """Stiffness of lines that a scene asks for before it is solved [N/m].
+
+    It is EA/L of the stiffest element, or what stores at `AIM` of the radius the energy with which two of the heaviest
+    elements come together at the largest velocity that any two nodes or bodies have towards each other: a net that is
+    thrown at a body folds on it as fast.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With any stiffness of lines.
+    """
+    net, touch = system.net, system.families[pressed(system)].crossing.touch
+    lines = float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+    if net.quasi_static:
+        return lines
+    v = system.initial_velocity()[: system.rows - net.spins]
+    speed = float(np.linalg.norm(np.ptp(v, axis=0)))
+    mass = 0.5 * float(net.mass[net.cells].sum(axis=1).max())
+    return max(lines, float(f"{holding(0.5 * mass * speed**2, 0.5 * touch):.2g}"))
+
+
+class Passage:
+    """What is known of lines that may have passed each other.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a family of lines against lines.
+    unfollowed : str, optional
+        What does not follow them, and why; None where they are followed.
+    chosen : bool
+        Whether the stiffness is refweb's choice.
+    """
+
+    def __init__(self, system, unfollowed=None, chosen=False):
+        self._system, self._unfollowed, self._chosen = system, unfollowed, chosen
+        family = system.families[pressed(system)]
+        self.touch, self._stiffness, self._elements = family.crossing.touch, family.crossing.stiffness, family.elements
+        self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
+
+    def note(self, overlap, crossings):
+        """Note the deepest overlap [m], and what has met so far, see `IntegratorState.crossings`."""
+        self._deepest, self._crossings = max(self._deepest, overlap), crossings
+
+    def plain(self):
+        """Overlap, radius and stiffness as ``run.json`` has them."""
+        own = {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
+        return {**own, "chosen": self._chosen}
+
+    def told(self):
+        """Whether nothing can have passed, as ``run.json`` has it."""
+        if self._unfollowed is not None:
+            return f"not certified: {self._unfollowed}"
+        net, ((time, *nodes), (folded, *beside)) = self._system.net, self._crossings
+        if np.isfinite(time):
+            return f"not certified: {lines_of(net, nodes)} may have passed through each other at t = {time:.6g} s"
+        if np.isfinite(folded):
+            return (
+                f"certified but for neighbours along the net: {lines_of(net, beside)} came to lie on each other at "
+                f"t = {folded:.6g} s"
+            )
+        return "certified"
+
+    def remarks(self):
+        """What a reader of the results has to know."""
+        if (told := self.told()) != "certified":
+            yield f"lines may have passed through lines, {told}"
+
+    def _enough(self, overlap, own, v):
+        """Stiffness that may hold what overlaps so far [N/m].
+
+        Above the top of the push what comes is hardly braked, and the overlap tells nothing of its energy: it is at
+        least that which stores, at `AIM` of the radius, what is stored so far and what two elements bring that come
+        together as fast as any two of their nodes.
+        """
+        radius = 0.5 * self.touch
+        enough = self._stiffness * (overlap / (AIM * radius)) ** POWER
+        if v is None:
+            return enough
+        mass, cells = self._system.net.mass, self._system.net.cells
+        nodes = cells[own].ravel() if own.ndim else np.unique(cells)
+        heavy = mass[cells[own if own.ndim else slice(None)]].sum(axis=1).max()
+        moving = 0.25 * heavy * float((np.ptp(v[nodes], axis=0) ** 2).sum())
+        stored = self._stiffness * min(overlap / (AIM * radius), 1.0) ** POWER
+        return max(enough, stored + holding(moving, radius))
+
+    def refuse(self, overlap, when, cell, v=None):
+        """Refuse an overlap above the radius [m] of a cell, at a time or load step in words; v are velocities then.
+
+        Raises
+        ------
+        TooSoft
+            Where refweb chose the stiffness.
+        SolverError
+            Where it was given.
+        """
+        radius = 0.5 * self.touch
+        if not overlap > radius:
+            return
+        own = self._elements[cell]
+        names = " and ".join(str(n) for n in self._system.net.line[own].ravel().tolist()) if own.ndim else None
+        names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
+        if own.ndim and self._system.held[self._system.net.cells[own]].all():
+            raise SolverError(
+                f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}: {PRESCRIBED}"
+            )
+        enough = float(f"{self._enough(overlap, own, v):.2g}")
+        if self._chosen:
+            enough = max(enough, STIFFER * self._stiffness)
+            raise PenetrationError(
+                f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, with "
+                f"stiffness = {self._stiffness:.3g}; repeated with stiffness = {enough:g}",
+                {"self_contact": enough},
+            )
+        words = f"{enough:g} may be enough in place of {self._stiffness:.3g}"
+        if self._unfollowed is not None:  # what does not move does not tell what it would take
+            words = f"{words}; nodes that are themselves moved into other lines are held by none"
+        else:
+            words = f"{words}, or leave it out"
+        raise SolverError(
+            f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}, where the "
+            f"push falls and lines pass: [self_contact] stiffness = {words}"
+        )

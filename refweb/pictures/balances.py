@@ -1,0 +1,306 @@
+"""The books of a run as plots: where its energy is, and what gave it its momentum, with what each is open by."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..results.units import readable
+from .histories import clock_of, tick_steps
+from .plot_data import unit_of
+from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, dot, label, legend, telling
+
+AXES = "xyz"
+FLOATING = ("potential_energy", "frame_energy", "orbit_energy")
+"""Energies that have no zero of their own."""
+HATCHES = ("", "//", "..", "\\\\", "xx", "--", "++", "oo")
+SMALL = 1e-3
+"""Share of the largest momentum below which that along an axis has no panel."""
+STORED, LOST, GIVEN, TOTAL = "stored", "dissipated_energy", "work", "total_energy"
+
+
+class EnergyBalance(NamedTuple):
+    """The book of energies.
+
+    Attributes
+    ----------
+    parts : dict of str to ndarray
+        What is stacked, by name: energies [J], shape (rows,), where they have no zero above their least.
+    least : dict of str to float
+        What has been subtracted of each of them [J].
+    top : ndarray
+        Their sum [J].
+    given : ndarray
+        What is there at the start, and work [J]; as large as ``top`` where the book closes.
+    """
+
+    parts: dict
+    least: dict
+    top: np.ndarray
+    given: np.ndarray
+
+    @property
+    def drift(self):
+        """What there is too much [J]."""
+        return self.top - self.given
+
+
+def energy_book(shown):
+    """The `EnergyBalance` of a run.
+
+    The total is the sum of what is stored and moves; what damping and friction took is stacked on it, so that the whole
+    changes by work alone.
+    """
+    table, names = shown.history, [name for name in shown.energies if name not in (GIVEN, TOTAL)]
+    names.sort(key=lambda name: (name == LOST, name == "kinetic_energy"))
+    least = {}
+    for name in names:
+        low = float(np.nanmin(table[name])) if np.isfinite(table[name]).any() else 0.0
+        least[name] = low if name in FLOATING or low < 0.0 else 0.0
+    parts = {name: table[name] - least[name] for name in names}
+    top = np.sum(list(parts.values()), axis=0)
+    work = table[GIVEN] if GIVEN in shown.energies else np.zeros_like(top)
+    return EnergyBalance(parts, least, top, top[:1] + work - work[:1])
+
+
+def energy(shown):
+    """Panels of the book of energies: stacked of one run, of several a panel for each kind; and what it is open by."""
+    if len(shown) > 1:
+        return _energies_beside(shown)
+    (s,) = shown
+    book, dynamic = energy_book(s), s.record.kind == "dynamic"
+    second, clock = clock_of(shown) if dynamic else (1.0, "")
+    along = f"time [{clock}]" if dynamic else "load step"
+    factor, unit = unit_of("J", book.top, book.given)
+    keep = telling(*book.parts.values(), most=300)
+    at = s.along[keep] / second
+    if len(keep) == 1 and not dynamic:  # of one load step a column as broad as half a step
+        keep, at = np.repeat(keep, 2), at + np.array([-0.25, 0.25])
+
+    def stack(axes):
+        entries, below = [], np.zeros(len(keep))
+        for number, (name, values) in enumerate(book.parts.items()):
+            above = below + values[keep] / factor
+            fill = {"facecolor": COLOURS[number % 7], "edgecolor": (1.0, 1.0, 1.0, 0.5), "linewidth": 0.0}
+            area = axes.fill_between(at, below, above, hatch=HATCHES[number % len(HATCHES)], **fill)
+            if len(keep) == 1:  # an instant has no breadth
+                axes.vlines(at, below, above, color=COLOURS[number % 7], linewidth=12.0)
+            entries.append((area, _called(name, book.least[name])))
+            below = above
+        (line,) = axes.plot(at, below, color=DARK, linewidth=1.6, marker=dot(keep))
+        entries.append((line, _called("sum", sum(book.least.values()))))
+        if dynamic:
+            start = "at the start" + (" + work" if GIVEN in s.energies else "")
+            (line,) = axes.plot(at, book.given[keep] / factor, color="white", linestyle=(0, (2, 2)), linewidth=1.6)
+            entries.append((line, start))
+        axes.set_ylim(bottom=0.0)
+        if not dynamic:
+            tick_steps(axes, s.along.tolist())
+        label(axes, "energy", unit)
+        legend(axes, entries, columns=2)
+        if dynamic:
+            _white_on_dark(axes)
+
+    panels = [Panel(stack, along, 1.3 * TALL)]
+    if dynamic:
+        panels.append(_drifts(shown, "energy", second, clock))
+    return panels
+
+
+def _white_on_dark(axes):
+    """Put the last entry of a legend, which is white on the drawing, on a dark line."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    for line in (axes.get_legend().get_lines()[-1], axes.get_lines()[-1]):
+        line.set_path_effects([Stroke(linewidth=3.0, foreground=DARK), Normal()])
+
+
+def _called(name, least):
+    """The name of an energy as a legend has it."""
+    name = name.removesuffix("_energy").replace("_", " ")
+    return f"{name} above {readable(least, None, 'J')}" if least else name
+
+
+def _drifts(shown, what, second, clock):
+    """The panel of what the book of energies is open by."""
+    drifts = [energy_book(s).drift for s in shown]
+    factor, unit = unit_of("J", *drifts)
+
+    def draw(axes):
+        entries = []
+        for s, drift in zip(shown, drifts, strict=True):
+            keep = telling(drift)
+            style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
+            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, marker=dot(keep), **style)
+            said = s.said(_share(s, "energy_drift", what))
+            entries += [(line, said)] if said else []
+        label(axes, "drift", unit)
+        legend(axes, entries)
+
+    return Panel(draw, f"time [{clock}]", LOW)
+
+
+def _share(s, key, what):
+    """How far a book is open, as ``run.json`` says it of a run that has ended."""
+    found = None if s.record.status == "running" else (s.record.summary.get("solver") or {}).get(key)
+    return "" if found is None else f"{what} drift {found:.1e} of the largest {what}"
+
+
+def _energies_beside(shown):
+    """A panel for each energy of several runs, and one for what their books are open by."""
+    names = dict.fromkeys(name for s in shown for name in s.energies)
+    dynamic = shown[0].record.kind == "dynamic"
+    second, clock = clock_of(shown) if dynamic else (1.0, "")
+    along = f"time [{clock}]" if dynamic else "load step"
+
+    def panel(name, first):
+        having = [s for s in shown if name in s.energies]
+        factor, unit = unit_of("J", *(s.history[name] for s in having))
+
+        def draw(axes):
+            for s in having:
+                keep = telling(s.history[name])
+                style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
+                axes.plot(s.along[keep] / second, s.history[name][keep] / factor, marker=dot(keep), **style)
+            label(axes, name.removesuffix("_energy").replace("_", " "), unit)
+            if first:
+                legend(axes, names_of(axes, shown))
+
+        return Panel(draw, along, LOW)
+
+    panels = [panel(name, not number) for number, name in enumerate(names)]
+    return [*panels, _drifts(shown, "energy", second, clock)] if dynamic else panels
+
+
+def names_of(axes, shown):
+    """Entries of a legend that name runs by their ink."""
+    return [
+        (axes.plot([], [], color=s.ink.colour, linestyle=s.ink.style, linewidth=1.4)[0], s.name)
+        for s in shown
+        if s.name
+    ]
+
+
+class MomentumBalancePlot(NamedTuple):
+    """The book of momentum along one axis [N s], all of shape (rows,): momentum and what gave it, by name.
+
+    Attributes
+    ----------
+    momentum : ndarray
+        Of all that is free.
+    impulses : dict of str to ndarray
+        What came in since the start.
+    """
+
+    momentum: np.ndarray
+    impulses: dict
+
+    @property
+    def given(self):
+        """What was there at the start, and what came in."""
+        return self.momentum[:1] + np.sum(list(self.impulses.values()), axis=0)
+
+    @property
+    def drift(self):
+        """What there is too much."""
+        return self.momentum - self.given
+
+
+def momentum_book(shown):
+    """The `MomentumBalancePlot` along each axis."""
+    names = {"impulse of supports": "support_impulse", "impulse of loads and all else": "outer_impulse"}
+    names = {words: name for words, name in names.items() if f"{name}_x" in shown.history}
+    return {
+        axis: MomentumBalancePlot(
+            shown.history[f"momentum_{axis}"],
+            {words: shown.history[f"{name}_{axis}"] for words, name in names.items()},
+        )
+        for axis in AXES
+    }
+
+
+def has_momentum(shown):
+    """Whether a run has a book of momentum."""
+    return all(f"momentum_{axis}" in shown.units for axis in AXES)
+
+
+def momentum(shown):
+    """Panels of the book of momentum: for each axis momentum against impulses, and what it is open by."""
+    books = [momentum_book(s) for s in shown]
+    sizes = {axis: max(_size(b[axis]) for b in books) for axis in AXES}
+    drawn = [axis for axis in AXES if sizes[axis] > SMALL * max(sizes.values())] or ["z"]
+    small = [axis for axis in AXES if axis not in drawn]
+    notes = (f"Along {' and '.join(small)} all momenta are below {SMALL:g} of the largest.",) if small else ()
+    largest = np.array(max(sizes.values()))
+    factor, unit = unit_of("N s", largest)
+    second, clock = clock_of(shown)
+    low, high = _ends([b[axis] for b in books for axis in drawn])
+
+    def panel(axis, first):
+        def draw(axes):
+            for s, book in zip(shown, books, strict=True):
+                entries = _momenta(axes, s, book[axis], second, factor, len(shown) > 1)
+            axes.set_ylim(low / factor, high / factor)
+            label(axes, f"along {axis}", unit)
+            if first:
+                legend(axes, names_of(axes, shown) + entries)
+
+        return Panel(draw, f"time [{clock}]", LOW, notes)
+
+    panels = [panel(axis, not number) for number, axis in enumerate(drawn)]
+    return [*panels, _momentum_drifts(shown, books, second, clock)]
+
+
+def _size(book):
+    return max(float(np.nanmax(np.abs(v), initial=0.0)) for v in (book.momentum, *book.impulses.values()))
+
+
+def _ends(books):
+    """Ends of an axis on which all momenta and impulses are."""
+    values = np.concatenate([v for book in books for v in (book.momentum, *book.impulses.values())])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    room = 0.06 * (high - low) or 1.0
+    return low - room, high + room
+
+
+def _momenta(axes, s, book, second, factor, several):
+    """Draw momentum and impulses along one axis; of several runs the latter thin. Entries of the legend."""
+    at, entries = s.along / second, []
+    curves = {"momentum of all that is free": book.momentum, **book.impulses}
+    for number, (words, values) in enumerate(curves.items()):
+        ink = Ink.of(number)
+        style = {"color": s.ink.colour if several else ink.colour, "linestyle": ink.style}
+        keep = telling(values)
+        (line,) = axes.plot(
+            at[keep], values[keep] / factor, marker=dot(keep), linewidth=1.6 if number == 0 else 1.1, **style
+        )
+        handle = line if not several else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
+        entries.append((handle, words))
+    keep = telling(book.given)
+    style = {"color": DARK, "linestyle": STYLES[3], "linewidth": 2.2}
+    (line,) = axes.plot(at[keep], book.given[keep] / factor, **style, zorder=3)
+    return [*entries, (line, "at the start + impulses")]
+
+
+def _momentum_drifts(shown, books, second, clock):
+    """The panel of what the book of momentum is open by."""
+    drifts = [(s, axis, book[axis].drift) for s, book in zip(shown, books, strict=True) for axis in AXES]
+    factor, unit = unit_of("N s", *(drift for _, _, drift in drifts))
+
+    def draw(axes):
+        entries = []
+        for s, axis, drift in drifts:
+            keep, ink = telling(drift), Ink.of(AXES.index(axis))
+            style = {"color": s.ink.colour if s.name else ink.colour, "linestyle": ink.style, "linewidth": 1.2}
+            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, marker=dot(keep), **style)
+            if s is shown[0]:
+                handle = line if not s.name else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
+                entries.append((handle, f"along {axis}"))
+        label(axes, "drift", unit)
+        legend(axes, entries, columns=3)
+
+    shares = [(s, _share(s, "momentum_drift", "momentum")) for s in shown]
+    said = tuple(s.said(words if s.name else words.capitalize()) for s, words in shares if words)
+    return Panel(draw, f"time [{clock}]", LOW, said)

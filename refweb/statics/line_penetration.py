@@ -1,0 +1,63 @@
+"""Lines that lie deep in lines at an equilibrium, or meet on the way from one to the next.
+
+Between two equilibria there is no motion to look at. Two lines that meet on their straight ways from the one to the
+other have passed, or have slid around each other: which of the two, no load step says, and smaller ones may.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..effects.self_contact.penetration import Passage, lines_of, pressed
+
+UNFOLLOWED = "what moves between load steps is not followed"
+
+
+class LinePassage:
+    """Follows lines that touch lines from one equilibrium to the next.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        With a family of lines against lines.
+    chosen : bool
+        Whether the stiffness is refweb's choice.
+
+    Attributes
+    ----------
+    deepest : refweb.effects.self_contact.penetration.Passage
+        The deepest overlap.
+    why : str
+        Why it is not certain that nothing has passed.
+    """
+
+    def __init__(self, system, chosen):
+        self._system, self._family = system, system.families[pressed(system)]
+        self._x = np.zeros((system.rows, 3)) if system.laid is None else system.laid
+        self.deepest, self.why = Passage(system, UNFOLLOWED, chosen), UNFOLLOWED
+
+    def note(self, state):
+        """Note an equilibrium, a `refweb.results.state.State`.
+
+        Raises
+        ------
+        TooSoft
+            For an overlap above the radius, where refweb chose the stiffness.
+        SolverError
+            For one, where the stiffness was given.
+        """
+        family, still = self._family, np.zeros((self._system.rows, 3))
+        shown = np.zeros((len(family.cells), 1))
+        family.force(state.time, state.x, still, np.zeros_like(still), family.cells, family.data, shown)
+        if len(shown):
+            cell = int(shown.argmax())
+            self.deepest.note(float(shown[cell, 0]), None)
+            self.deepest.refuse(float(shown[cell, 0]), f"load step {state.time:g}", cell)
+        met, way = np.zeros(4, dtype=np.int64), state.x - self._x
+        numbers = 0.0, 0.0, 0.0, 1.0, self._x, way, still, still, family.cells, family.data, met
+        if self.why == UNFOLLOWED and family.crossing.meets(*numbers):
+            self.why = (
+                f"{lines_of(self._system.net, met)} meet on their straight ways to load step {state.time:g}; smaller "
+                "load_steps may tell whether they pass or slide around each other"
+            )
+        self._x = state.x

@@ -1,0 +1,209 @@
+"""What nodes that bodies carry add to the tangent: they are no unknowns, but move with these.
+
+With δx = δx_b + δθ × a of a node at the arm a, a force f on it is a force and the moment a × f on the body. A block of
+a cell that has such a node becomes L K T, T being what moves the cell's nodes and L what gathers their forces; and as
+the arm turns, −∂(a × f)/∂θ = (f·a) 1 − a⊗f. Where forces depend on velocity, C becomes L C T_v, and K gains what turns
+velocities:
+
+    δv = δv_b + δω × a + ω × (δθ × a),        δω = W δu + δθ × ω − W (δθ × u),
+
+with W and u of `refweb.net.rotation`. A quaternion makes δθ as `refweb.net.rotation.to_quaternion` has it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..net.rotation import RigidRotations, add_forces_to_bodies, angular_velocity, matrix_at, update_attached_nodes
+
+
+class _Cell:
+    """A cell with nodes that bodies carry.
+
+    Attributes
+    ----------
+    family, at : int
+        Number of the family in the pattern, and of the cell in it.
+    own : list of int
+        Place among ``rows`` of each of its rows; −1 of one that is carried.
+    parts : list of (int, int, int)
+        Of those that are: which row it is, which node that is carried, and the place of the body's row among ``rows``,
+        before its rows of rotation.
+    """
+
+    def __init__(self, family, at, cell, turns):
+        self.family, self.at = family, at
+        number = {int(node): c for c, (node, _) in enumerate(turns.carried)}
+        rows: list = []
+        for row in cell.tolist():
+            rows += turns.rows[turns.carried[number[row], 1]].tolist() if row in number else [row]
+        self.rows = list(dict.fromkeys(rows))
+        self.own = [-1 if row in number else self.rows.index(row) for row in cell.tolist()]
+        self.parts = [
+            (i, number[row], [self.rows.index(r) for r in turns.rows[turns.carried[number[row], 1]].tolist()])
+            for i, row in enumerate(cell.tolist())
+            if row in number
+        ]
+
+    def unmoved(self):
+        """(T, L) of what is not carried, shapes (3 of the cell, 3 of its rows) and the other way round."""
+        T = np.zeros((3 * len(self.own), 3 * len(self.rows)))
+        for i, r in enumerate(self.own):
+            if r >= 0:
+                T[3 * i : 3 * i + 3, 3 * r : 3 * r + 3] = np.eye(3)
+        return T, T.T.copy()
+
+
+class Carried:
+    """The nodes that free bodies carry.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        With the bodies.
+    families : list of refweb.effects.base.Family
+        Those of the pattern, in its order.
+    """
+
+    def __init__(self, net, families):
+        self.turns, self._families, self._entries = RigidRotations.of(net), families, []
+        turns, nodes = self.turns, self.turns.carried[:, 0]
+        self._cells = [
+            _Cell(i, int(at), family.cells[at], turns)
+            for i, family in enumerate(families)
+            for at in np.flatnonzero(np.isin(family.cells, nodes).any(axis=1))
+        ]
+
+    @staticmethod
+    def waiting(net):
+        """Those of bodies that are held and feel nothing."""
+        return Waiting(net, [])
+
+    @property
+    def cells(self):
+        """Rows that are coupled, each of shape (1, rows)."""
+        return [np.array([cell.rows], dtype=np.int32) for cell in self._cells]
+
+    def moving(self, rows):
+        """Rows whose motion is that of some rows: of each node that is carried its body, of any other itself."""
+        bodies = dict(zip(self.turns.carried[:, 0].tolist(), self.turns.carried[:, 1].tolist(), strict=True))
+        return [int(self.turns.rows[bodies[row], 0]) if row in bodies else row for row in rows]
+
+    def update_attached_nodes(self, x, v):
+        """Write places and velocities of the nodes, shape (rows, 3)."""
+        update_attached_nodes(x, v, self.turns)
+
+    def add_forces_to_bodies(self, x, f):
+        """Add the forces on the nodes to those on the bodies, shape (rows, 3)."""
+        add_forces_to_bodies(x, f, self.turns)
+
+    def _arrange(self, pattern, free):
+        """Find where entries stand in the pattern of a system, which has `cells`."""
+        if self._entries:
+            return
+        number = np.full(3 * max(3 + self.turns.rows.max(), 1 + free.max() // 3), -1)
+        number[free] = np.arange(len(free))
+        keys = np.repeat(np.arange(pattern.size), np.diff(pattern.indptr)) * np.int64(pattern.size) + pattern.indices
+        self._spun = [_entries(rows[1:].tolist(), pattern.size, number, keys) for rows in self.turns.rows]
+        self._entries = [_entries(cell.rows, pattern.size, number, keys) for cell in self._cells]
+
+    def _state(self, x, v):
+        """Of each node its arm, and of its body ω, W, u and δθ by the quaternion, (3, 4) from that behind on."""
+        found = []
+        for c, (_, n) in enumerate(self.turns.carried):
+            _, spin, turn = self.turns.rows[n]
+            R = np.array(matrix_at(x, spin, turn))
+            q = np.array([1.0 + x[turn, 0], *x[spin]])
+            angle = np.zeros((3, 6))  # of q's vector part, which stands first, and of q₀
+            angle[:, :3], angle[:, 3] = q[0] * np.eye(3) + _cross(q[1:]), -q[1:]
+            angle *= 2.0 / (q @ q)
+            W = R @ self.turns.mobility[n] @ R.T
+            found.append((R @ self.turns.arms[c], np.array(angular_velocity(n, x, v, self.turns)), W, v[spin], angle))
+        return found
+
+    def _matrices(self, cell, state):
+        """(T, T by velocities, T of velocities by places, L) of a cell."""
+        T, L = cell.unmoved()
+        fast, turned = T.copy(), np.zeros_like(T)
+        for i, c, (b, s, q) in cell.parts:
+            arm, omega, W, u, angle = state[c]
+            at, body, spin, quaternion = (
+                slice(3 * i, 3 * i + 3), slice(3 * b, 3 * b + 3), slice(3 * s, 3 * s + 3), slice(3 * q, 3 * q + 3)
+            )  # fmt: skip
+            A = _cross(arm)
+            T[at, body] = fast[at, body] = L[body, at] = np.eye(3)
+            L[spin, at], fast[at, spin] = A, -A @ W
+            T[at, spin], T[at, quaternion] = -A @ angle[:, :3], -A @ angle[:, 3:]
+            rate = A @ (_cross(omega) - W @ _cross(u)) - _cross(omega) @ A
+            turned[at, spin], turned[at, quaternion] = rate @ angle[:, :3], rate @ angle[:, 3:]
+        return T, fast, turned, L
+
+    def add_stiffness(self, values, system, t, x, v, blocks):
+        """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its families."""
+        self._arrange(system.pattern, system.free)
+        state, damped = self._state(x, v), {}
+        for i, family in enumerate(self._families):
+            if family.damping is not None:
+                damped[i] = np.zeros_like(blocks[i])
+                data = system.line_data(t) if family.lines else family.data
+                family.damping(t, x, v, damped[i], family.cells, data, False)
+        for cell, entries in zip(self._cells, self._entries, strict=True):
+            T, _, turned, L = self._matrices(cell, state)
+            whole = _beside(L @ blocks[cell.family][cell.at] @ T, blocks, cell)
+            if cell.family in damped:
+                whole += L @ damped[cell.family][cell.at] @ turned
+            _add(values, entries, whole)
+        force = system.force(t, x, v)
+        for c, (node, n) in enumerate(self.turns.carried):
+            (arm, *_, angle), f = state[c], force[node]
+            whole = np.zeros((6, 6))
+            whole[:3] = ((f @ arm) * np.eye(3) - np.outer(arm, f)) @ angle
+            _add(values, self._spun[n], whole)
+
+    def add_damping(self, values, system, x, v, blocks):
+        """Add to the values of C what these nodes have of it, of the blocks of −∂f/∂v."""
+        self._arrange(system.pattern, system.free)
+        state = self._state(x, v)
+        for cell, entries in zip(self._cells, self._entries, strict=True):
+            _, fast, _, L = self._matrices(cell, state)
+            _add(values, entries, _beside(L @ blocks[cell.family][cell.at] @ fast, blocks, cell))
+
+
+class Waiting(Carried):
+    """Nodes of bodies that are held and feel nothing."""
+
+    def add_forces_to_bodies(self, x, f):
+        """Nothing is felt."""
+
+    def add_stiffness(self, values, system, t, x, v, blocks):
+        """Nothing is to be added."""
+
+    def add_damping(self, values, system, x, v, blocks):
+        """Nothing is to be added."""
+
+
+def _entries(rows, size, number, keys):
+    """(rows, columns, places) of the entries of a block of some rows that are in a pattern, of column × size + row."""
+    of = number[3 * np.array(rows)[:, None] + np.arange(3)].ravel()
+    inside = np.flatnonzero(of >= 0)
+    row, column = (side.ravel() for side in np.meshgrid(inside, inside, indexing="ij"))
+    wanted = of[column] * np.int64(size) + of[row]
+    at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    there = keys[at] == wanted
+    return row[there], column[there], at[there]
+
+
+def _beside(whole, blocks, cell):
+    """A new block of a cell without what of it is in the pattern already."""
+    T, L = cell.unmoved()
+    return whole - L @ blocks[cell.family][cell.at] @ T
+
+
+def _add(values, entries, whole):
+    row, column, at = entries
+    values[at] += whole[row, column]
+
+
+def _cross(a):
+    """Matrix of a × b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])

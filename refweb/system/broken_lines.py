@@ -1,0 +1,133 @@
+"""A system some of whose elements are broken."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..net.net import AXIAL_STIFFNESS
+
+
+class Breaks(NamedTuple):
+    """What has broken, in the order in which it did.
+
+    Attributes
+    ----------
+    elements : ndarray of int
+        Elements.
+    times : ndarray
+        When each broke [s].
+    energies : ndarray
+        What each held, and what ended with it [J].
+    places : ndarray, shape (breaks, 3)
+        Where its middle was [m].
+    widths : ndarray
+        How much earlier each may have broken [s].
+    """
+
+    elements: np.ndarray = np.zeros(0, dtype=np.int64)
+    times: np.ndarray = np.zeros(0)
+    energies: np.ndarray = np.zeros(0)
+    places: np.ndarray = np.zeros((0, 3))
+    widths: np.ndarray = np.zeros(0)
+
+    def and_then(self, *more):
+        """These and more, which are given as the fields are."""
+        return Breaks(*(np.concatenate([one, other]) for one, other in zip(self, more, strict=True)))
+
+
+def torn(system, elements, energies):
+    """The system with these elements broken, which held these energies [J].
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        It stays as it is.
+    elements : ndarray of int
+        Elements.
+    energies : ndarray
+        What each held [J].
+
+    Raises
+    ------
+    InputError
+        For a consistent mass.
+    """
+    system = _breakable(system)
+    net = system.net
+    numbers = net.line_data.copy()
+    numbers[elements, AXIAL_STIFFNESS] = 0.0
+    numbers[elements, net.column("rupture_energy")] = energies
+    other = copy.copy(system)
+    other.net = replace(net, line_data=numbers)
+    broken = np.zeros(len(net.cells), dtype=bool)
+    broken[elements] = True
+    other.families = [_severed(family, broken, numbers) for family in system.families]
+    for kept in ("unsupported_parts", "carriers"):
+        other.__dict__.pop(kept, None)
+    other.arrange()
+    return other
+
+
+def _breakable(system):
+    """The system, or where nothing of it may break one with the column, family and `BreakLimits` of broken elements."""
+    if system.weakness is not None:
+        return system
+    from ..effects.base import BreakLimits
+    from ..effects.broken import HELD, held
+
+    other = copy.copy(system)
+    other.net = net = system.net.with_column(HELD, 0.0)
+    other.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
+    other.families.append(held(net))
+    other.weakness = BreakLimits(np.full(len(net.cells), np.inf))
+    return other
+
+
+def with_broken_lines(system):
+    """The system with the lines broken that are so in its web, each at its middle."""
+    elements = system.net.middle_of(system.net.web.broken)
+    return torn(system, elements, np.zeros(len(elements)))
+
+
+def _severed(family, broken, numbers):
+    """A family that does nothing through broken elements; ``numbers`` are those of the lines."""
+    if family.lines:
+        return replace(family, data=numbers)
+    if family.elements is None or family.disable_cells is None:
+        return family
+    left = replace(family, data=_without(family, family.data, broken[family.elements]))
+    if family.crossing is None:
+        return left
+    beside = _without(family, family.crossing.data, broken[family.crossing.elements])
+    return replace(left, crossing=family.crossing._replace(data=beside))
+
+
+def _without(family, data, ends):
+    """Numbers of cells that do nothing where an element of theirs ``ends``."""
+    ends = ends if ends.ndim == 1 else ends.any(axis=1)
+    if not ends.any():
+        return data
+    data, own = data.copy(), data[ends]
+    family.disable_cells(own)
+    data[ends] = own
+    return data
+
+
+def tear(system, t, x, v, elements):
+    """(The system with more of its elements broken, what each held [J]), at displacement x, velocity v and time t.
+
+    What ends is the energy of the system less that of the torn one; of several that break together each has its share
+    of that by what it held itself.
+    """
+    own = sum(system.energy_of(f, t, x)[elements] for f in system.families if f.lines and f.energy is not None)
+    stored = [f for f in system.families if f.book not in ("work", "dissipated_energy")]
+    before = sum(system.energy_of(family, t, x).sum() for family in stored)
+    whole = torn(system, elements, np.zeros(len(elements)))
+    left = [f for f in whole.families if f.book not in ("work", "dissipated_energy")]
+    lost = before - sum(whole.energy_of(family, t, x).sum() for family in left)
+    share = np.abs(own) / np.abs(own).sum() if np.abs(own).sum() > 0.0 else np.full(len(elements), 1.0 / len(elements))
+    return torn(system, elements, lost * share), lost * share
