@@ -141,14 +141,12 @@ def run_steps(
 ) -> int:  # fmt: skip
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
     where, reaction, known, push, before = space.where, space.reaction, space.known, space.push, space.before
-    aside, extra, half, was = space.aside, space.extra, space.half, space.was
-    inside, total = space.inside, space.total
+    aside, extra, half, was, total = space.aside, space.extra, space.half, space.was, space.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    still, viscous, powers = families.still, families.viscous, families.powers
-    rubbing = model.implicit_contacts.families
+    viscous, powers, rubbing = families.viscous, families.powers, model.implicit_contacts.families
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     lines, first, data_of_lines = families.outs[0], families.forces[0], families.data[0]
@@ -164,7 +162,7 @@ def run_steps(
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
         if looks:
-            note_state(x, v, f, inverse, inside.before)
+            note_state(x, v, f, inverse, space.inside.before)
         if stages and not inner_stages(now, h, scheme, model, running, reaction, push, extra):
             return step - 1
         if guarded and passes(now - h, kick, drift, stages, model, running):
@@ -181,7 +179,7 @@ def run_steps(
             update_neighbours(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
         first(now, x, v, f, families.cells[0], data_of_lines, lines)
-        for i in still:
+        for i in families.still:
             act(i, now, x, v, f, families)
         if near:
             show_near(nearby, families)
@@ -200,7 +198,7 @@ def run_steps(
         if pushing:
             push_on(now, kick, last, x, v, model.outside, families, extra, push, pushed)
         if looks:
-            look_inside(now, h, step == fresh, stages == 0, inside, where, total, model, observed, running)
+            look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
         turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
         note_time(looked, now)
         for i in followed:
@@ -212,7 +210,7 @@ def run_steps(
         if sums.shape[0]:
             turned = look_at_books(now, x, v, total, extremes, ending, model, observed, running) or turned
         if turned or watched and step == fresh:
-            looks = look_again(now, h, step == fresh, stages > 0, inside, total, model, observed, running)
+            looks = look_again(now, h, step == fresh, stages > 0, space.inside, total, model, observed, running)
         if averaged:
             average(now, x, v, f, lines, where, stages > 0, observed, running.averages, extremes)
         if events.size and note_events(now, h, x, v, f, lines, events, where, observed, total):
