@@ -140,19 +140,18 @@ def run_steps(
     space: Workspace,
 ) -> int:  # fmt: skip
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
-    where, reaction, known, push, before = space.where, space.reaction, space.known, space.push, space.before
-    aside, extra, half, was, total = space.aside, space.extra, space.half, space.was, space.total
+    where, known, push, before, total = space.where, space.known, space.push, space.before, space.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
     mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    viscous, powers, rubbing = families.viscous, families.powers, model.implicit_contacts.families
+    viscous, powers, extra, half = families.viscous, families.powers, space.extra, space.half
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
     lines, first, data_of_lines = families.outs[0], families.forces[0], families.data[0]
     near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
-    pushing, pushed, length_force = model.outside.pushing.size > 0, running.ledger.pushed, running.length_force
-    stages, looked = scheme.drifts.size - 1, extremes.looked
+    pushing, rubbing = model.outside.pushing.size > 0, model.implicit_contacts.families
+    stages, looked, reaction = scheme.drifts.size - 1, extremes.looked, space.reaction
     kick, drift, last = scheme.kicks[stages] * h, scheme.drifts[stages] * h, scheme.kicks[stages + 1] * h
     sums, bits = observed.sums, flat_v[: 3 * model.inertia.linear * (near and not stages)].view(np.int64)
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
@@ -172,9 +171,9 @@ def run_steps(
         if stages:
             book_potential(-1.0, now - last, x, families, work)
         if moves:
-            move_supports(now, h, x, v, f, aside, motions.kernels, motions.cells, motions.data, motions.outs)
+            move_supports(now, h, x, v, f, space.aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            change_lengths(now, x, reels, was, data_of_lines, length_force, work)
+            change_lengths(now, x, reels, space.was, data_of_lines, running.length_force, work)
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
@@ -196,7 +195,7 @@ def run_steps(
         book_motion(driven, mass, x, v, f, before, work)
         give_reaction(kick, last, held, flat_f, reaction, impulse)
         if pushing:
-            push_on(now, kick, last, x, v, model.outside, families, extra, push, pushed)
+            push_on(now, kick, last, x, v, model.outside, families, extra, push, running.ledger.pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
         turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
