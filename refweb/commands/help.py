@@ -1,18 +1,24 @@
-"""What a table of a scene file is: its keys, units, defaults, limits, and an example."""
+"""Print what a table of a scene file may hold, or what a term means."""
 
 
 def add_arguments(parser):
-    """The table, or all of them."""
-    text = "such as gravity, web, web.cable, solve.dynamic, cable.groups (default: a line for each)"
+    """Declare the table, or term, and the format."""
+    text = "such as gravity, web.cable, solve.dynamic; a term, or glossary for all (default: a line for each table)"
     parser.add_argument("table", nargs="?", metavar="TABLE", help=text)
     parser.add_argument("--markdown", action="store_true", help="the whole reference, as Markdown")
 
 
 def run(arguments):
     """Print the pages."""
+    from ..reference.glossary import explained
+    from ..reference.pages import names
     from ..reference.words import as_markdown, as_text, overview
 
     if arguments.markdown:
         print(as_markdown(), end="")
+    elif arguments.table is None:
+        print(overview())
+    elif arguments.table in names() or (text := explained(arguments.table)) is None:
+        print(as_text(arguments.table))
     else:
-        print(overview() if arguments.table is None else as_text(arguments.table))
+        print(text)

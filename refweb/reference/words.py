@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 
+from . import glossary
 from .pages import header_of, line_of, names, pages_of
 
 RULES = (
@@ -23,7 +24,8 @@ def overview():
     lines = {header_of(name): line_of(name) for name in names()}
     width = max(map(len, lines))
     listed = [f"{header:{width}}  {line}" for header, line in lines.items()]
-    return "\n".join([*listed, "", "refweb help TABLE says what a table may hold, such as refweb help web"])
+    hint = "refweb help TABLE says what a table may hold, such as refweb help web"
+    return "\n".join([*listed, "", hint, "refweb help glossary explains terms"])
 
 
 def as_text(name, width=100):
@@ -65,7 +67,7 @@ def as_markdown():
         for page in found:
             parts += [f"### `{page.header}`"] if page.name != name else []
             parts += _markdown(page)
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join([*parts, glossary.as_markdown()]) + "\n"
 
 
 def _markdown(page):

@@ -12,6 +12,7 @@ from jsonschema import Draft4Validator
 
 import refweb
 from refweb.__main__ import main
+from refweb.reference.glossary import GLOSSARY
 from refweb.reference.pages import names, pages_of, takes
 from refweb.reference.schema import schema
 from refweb.reference.words import as_markdown, as_text
@@ -138,7 +139,7 @@ def test_the_reference_is_what_help_prints():
 def test_markdown_has_all_of_it(capsys):
     assert main(["help", "--markdown"]) == 0
     text = capsys.readouterr().out
-    assert text == as_markdown() and text.count("\n## ") == len(names())
+    assert text == as_markdown() and text.count("\n## ") == len(names()) + 1
     for page in PAGES.values():
         assert page.summary in text and page.example in text
         assert all(f"| `{key.name}` | " in text for key in page.keys)
@@ -149,8 +150,8 @@ def test_markdown_has_all_of_it(capsys):
 
 def test_overview_has_a_line_for_each_table(capsys):
     assert main(["help"]) == 0
-    *lines, empty, hint = capsys.readouterr().out.splitlines()
-    assert len(lines) == len(names()) and empty == "" and "refweb help TABLE" in hint
+    *lines, empty, hint, glossary = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(names()) and empty == "" and "refweb help TABLE" in hint and "help glossary" in glossary
     for line, name in zip(lines, names(), strict=True):
         header = line.split("  ")[0]
         assert name == "scene" or header.strip("[]") == name
@@ -220,3 +221,18 @@ def test_limits_stand_with_the_keys_that_have_them():
         for beyond in (least - 1, most + 1):
             with pytest.raises(refweb.InputError):
                 read(key, beyond)
+
+
+def test_the_glossary_explains_each_term_once(capsys):
+    """In one sentence of at most 25 words; terms of scene files keep their meaning as tables."""
+    terms = [term for entries in GLOSSARY.values() for term in entries]
+    assert len(terms) >= 120 and len({term.lower() for term in terms}) == len(terms)
+    for entries in GLOSSARY.values():
+        for term, meaning in entries.items():
+            assert meaning.endswith(".") and len(meaning.split()) <= 25, term
+            assert main(["help", term]) == 0
+            printed = capsys.readouterr().out
+            assert printed.startswith(f"{term}: {meaning}") or term in names()
+    assert main(["help", "glossary"]) == 0
+    printed = capsys.readouterr().out
+    assert all(f"{term}: " in printed for term in terms) and max(map(len, printed.splitlines())) <= 100
