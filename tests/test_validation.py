@@ -19,6 +19,10 @@ LONG = (
     "cross_validation",
     "open_parameters",
     "capture_satellite",
+    "capture",
+    "capture_in_orbit",
+    "published_throw",
+    "falling_net",
 )
 """Cases that take more than ten seconds with ``--quick``; what they show has tests of its own beside them."""
 

@@ -259,8 +259,8 @@ def test_a_force_without_value(method, monkeypatch):
 
     own = System.forces
 
-    def forces(self, t, x, v=None):
-        found = own(self, t, x, v)
+    def forces(self, t, x, v=None, per_cell=None):
+        found = own(self, t, x, v, per_cell)
         found.force[CENTRE] += np.nan if t > 0.3 * END else 0.0
         return found
 
