@@ -94,7 +94,7 @@ def _reason(error):
 
 
 def alone():
-    """As `main`, for a process of its own, which looks for unreachable objects seldom and, at its end, not at all."""
+    """Run `main` in a process of its own, which looks for unreachable objects seldom and, at its end, not at all."""
     gc.set_threshold(*THRESHOLDS)
     try:
         return main()

@@ -1,4 +1,4 @@
-"""What readers of values accept, as JSON Schema of draft 4 has it; a reader carries it as ``accepts``."""
+"""Accepted values of readers, as JSON Schema of draft 4 has them; a reader carries them as ``accepts``."""
 
 from __future__ import annotations
 
@@ -35,5 +35,5 @@ def by_name(items):
 
 
 def any_of(*schemas):
-    """What one of these accepts."""
+    """Accept any value that one of some schemas accepts."""
     return {"anyOf": list(schemas)}

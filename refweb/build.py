@@ -210,7 +210,7 @@ def _check_carried(system, supported, solve):
 
 
 def _takes_links(method):
-    """Whether a method holds lengths exactly; methods of statics do not."""
+    """Tell if a method holds lengths exactly; methods of statics do not."""
     return method in INTEGRATORS and getattr(load(INTEGRATORS[method].integrator), "takes_links", False)
 
 
@@ -247,7 +247,7 @@ def _check_observables(observables, system, solve):
 
 
 def _own_columns(system):
-    """Where names stand that nothing in a scene may have, by name."""
+    """Tables and columns with reserved names, by name."""
     return dict.fromkeys(taken(system), "a column of its own")
 
 

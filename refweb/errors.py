@@ -1,4 +1,4 @@
-"""What refweb refuses, and what solvers raise."""
+"""Errors: refused input, and failures of solvers."""
 
 import contextlib
 

@@ -136,7 +136,7 @@ def inner(one, other):
 
 @kernel(leaf=True)
 def among(values, value):
-    """Whether a number is among those of a vector."""
+    """Tell if a number is among those of a vector."""
     for n in range(values.shape[0]):
         if values[n] == value:
             return True

@@ -203,12 +203,12 @@ EXPORTS = (
 
 
 def exports():
-    """Where each name of the package lives: classes of webs and effects, and `EXPORTS`."""
+    """Modules of the names of the package: classes of webs and effects, and `EXPORTS`."""
     return {reference.split(":")[1]: reference for reference in (*EXPORTS, *WEBS.values(), *EFFECTS.values())}
 
 
 def load(reference) -> Any:
-    """What a ``"module:name"`` or a ``"module"`` stands for."""
+    """Object that a ``"module:name"`` or a ``"module"`` stands for."""
     module, _, name = reference.partition(":")
     found = importlib.import_module(module)
     return getattr(found, name) if name else found

@@ -201,7 +201,7 @@ def _before(kept, summary, system, versions):
 
 
 def simulation_of(scene, system, solution, kept=None):
-    """What leads a scene from start to end; refuses what its solver cannot take, with an `InputError`."""
+    """Make the simulation of a scene; refuse with an `InputError` a scene that its solver cannot take."""
     with in_file(scene.file):
         if scene.solve.kind == "static":
             from .statics.simulation import Simulation
@@ -213,7 +213,7 @@ def simulation_of(scene, system, solution, kept=None):
 
 
 def notices(scene, system):
-    """What a user should know of a scene before it is solved, each a text."""
+    """Notices on a scene before it is solved, each a text."""
     if system.net.web.kind == "file":
         from .net.mesh_file import remarks
 

@@ -44,7 +44,7 @@ MAX_HISTORY_ROWS = 10_000_000
 
 @table
 class Scene:
-    """What refweb computes.
+    """Scene: the web, its material, all effects, the solver and the output.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What to solve, what to hold and what to write: the tables of a scene that are neither web, cable nor effect."""
+"""Settings of a scene: solver, supports and output, the tables that are neither web, cable nor effect."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ class Event(Table):
 
 @table
 class Output(Table):
-    """What a result folder holds.
+    """Content of a result folder.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class Output(Table):
 
 @table
 class Accuracy(Table):
-    """How the errors of results are found.
+    """Method that finds the errors of results.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What users hold of a run: its results, the fields of its last state as arrays, and its result folder."""
+"""Solutions: the results of a run, the fields of its last state as arrays, and its result folder."""
 
 from __future__ import annotations
 

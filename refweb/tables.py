@@ -1,4 +1,4 @@
-"""How a table of a scene becomes a checked value.
+"""Conversion of a table of a scene to a checked value.
 
 A table is a class with `table` above it, whose fields say what they accept: ``area: float = real(above=0, unit="m²")``.
 The same class is the Python value, the TOML table and, for effects, the effect itself. Every refusal is an `InputError`
@@ -112,7 +112,7 @@ def integer(default=MISSING, *, at_least=None, at_most=None) -> Any:
 
 
 def choice(*names, default=MISSING) -> Any:
-    """One of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
+    """Accept one of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
 
     def valid():
         return [one for given in names for one in (given if isinstance(given, dict) else [given])]

@@ -26,15 +26,19 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "net",
         "*",
-        "What is there: nodes, lines, lengths, laws, elements, mass, bodies; it knows no forces, time or solvers.",
+        "The model: nodes, lines, lengths, laws, elements, mass, bodies; it knows no forces, time or solvers.",
     ),
     (
         "net.boundary",
         "*",
         "Solids that a surface of triangles bounds: read, checked, weighed, and how deep a point is in them.",
     ),
-    ("net.shapes", "*", "What rigid bodies look like, one file a shape; they know nothing of contact."),
-    ("effects", "*", "What acts on a net, one file an effect; no effect knows another, a global matrix or a solver."),
+    ("net.shapes", "*", "Shapes of rigid bodies, one file a shape; they know nothing of contact."),
+    (
+        "effects",
+        "*",
+        "Effects: forces on a net, one file an effect; no effect knows another, a global matrix or a solver.",
+    ),
     (
         "effects.contact",
         "*",
@@ -58,7 +62,7 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "results",
         "*",
-        "One instant, its observables, the solution and the result folder; it does not know how they were computed.",
+        "Results: an instant, its observables, the solution and the folder; they do not know how they were computed.",
     ),
     (
         "results.observables",
@@ -69,19 +73,19 @@ ROOMS = [  # room, its modules ("*": all in its folder), the first sentence of i
     (
         "pages",
         "*",
-        "One page of a run: what was simulated, found and drawn; it knows records, and nothing of what made them.",
+        "Pages of a run: its scene, results and pictures; they know records, and nothing of what made them.",
     ),
     (
         "reference",
         "*",
-        "What a scene file may say: values by path, its tables in words and as a schema; it knows no scene.",
+        "Reference of scene files: values by path, its tables in words and as a schema; it knows no scene.",
     ),
     ("the scene", "build scene", ""),
     ("statics", "*", "Equilibria and their bounds; it knows no time and no events."),
     (
         "dynamics.integrators",
         "*",
-        "One system through time, seen by probes; it knows no scene, no files and no errors of results.",
+        "Integrators: a system through time, seen by probes; they know no scene, no files and no errors of results.",
     ),
     ("dynamics", "*", "A scene through time: start, rows, frames, errors; it does not know the command line."),
     ("what users hold", "solution", ""),

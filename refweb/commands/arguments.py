@@ -29,7 +29,7 @@ def scene_of(arguments):
 
 
 def add_json(parser):
-    """What is printed, as JSON."""
+    """Add the option that prints JSON."""
     parser.add_argument("--json", action="store_true", help="as JSON")
 
 

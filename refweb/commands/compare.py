@@ -1,4 +1,4 @@
-"""Results of two runs or more side by side: do they agree within ±?"""
+"""Compare results of two runs or more side by side: do they agree within ±?"""
 
 from .arguments import add_json, print_json
 

@@ -1,4 +1,4 @@
-"""What a person at a terminal sees: one box before a run and one after."""
+"""Output at a terminal: one box before a run and one after."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What digits cost: errors and CPU times of every method on a scene."""
+"""Compute the cost of digits: errors and CPU times of every method on a scene."""
 
 import pathlib
 

@@ -1,4 +1,4 @@
-"""What a scene or a result folder holds."""
+"""Print the content of a scene or a result folder."""
 
 import json
 import pathlib

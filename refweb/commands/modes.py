@@ -1,4 +1,4 @@
-"""Natural frequencies and mode shapes about the equilibrium of a scene."""
+"""Compute natural frequencies and mode shapes about the equilibrium of a scene."""
 
 import pathlib
 

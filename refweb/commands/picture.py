@@ -64,7 +64,7 @@ def run(arguments):
 
 
 def _values(words):
-    """What ``--range`` and ``--view`` give: a name, or numbers, with spaces or commas between them."""
+    """Read ``--range`` and ``--view``: a name, or numbers, with spaces or commas between them."""
     if words is None:
         return None
     words = [part for word in words for part in word.split(",") if part]
@@ -72,7 +72,7 @@ def _values(words):
 
 
 def _number(word):
-    """Whether a word is a number."""
+    """Tell if a word is a number."""
     try:
         return float(word) is not None
     except ValueError:

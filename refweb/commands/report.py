@@ -1,4 +1,4 @@
-"""One page of a result folder: results, plots, pictures, and the web in space to turn and play."""
+"""Write one page of a result folder: results, plots, pictures, and the web in space to turn and play."""
 
 import pathlib
 

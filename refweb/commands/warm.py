@@ -37,7 +37,7 @@ def run(arguments):
 
 
 def _foresee(scene):
-    """What the box before a run says of its steps, where it says it."""
+    """Compute the expected steps that the box before a run prints, where it prints them."""
     from ..dynamics.expected_cost import expected_cost
     from ..errors import InputError
     from ..registry import INTEGRATORS

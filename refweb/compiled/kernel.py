@@ -82,16 +82,16 @@ class Kernel:
 
     @property
     def _linked(self):
-        """Whether kernels that name it are optimized with it."""
+        """True if kernels that name it are optimized with it."""
         return self.apart is None or numba_internals.PLAIN
 
     def machine_code_key(self):
-        """What a caller's machine code depends on, see `refweb.compiled.keys.described`."""
+        """Key of all that a caller's machine code depends on, see `refweb.compiled.keys.described`."""
         return self._key if self._linked else _ByAddress(self).machine_code_key()
 
     @functools.cached_property
     def _slot(self):
-        """Where its address stands, which kernels share that are the same."""
+        """Slot of its address, shared by kernels that are the same."""
         symbol = f"refweb.{self.name}.{keys.digest(self.signature)[:8]}"
         return numba_internals.slot_of(symbol, self._key)
 
@@ -117,7 +117,7 @@ class Kernel:
             return (self._compiled() if self._linked else _ByAddress(self))._numba_type_
 
     def known(self):
-        """Whether its machine code is loaded, or on disk."""
+        """Tell if its machine code is loaded, or on disk."""
         if self._slot.filled:
             return True
         return numba_internals.PLAIN or self._body._cache.has(self.signature)
@@ -174,7 +174,7 @@ class _ByAddress:
         return numba_internals.Called(self.kernel.signature, self.kernel._slot.symbol)
 
     def machine_code_key(self):
-        """As of one that is ``apart``."""
+        """Key of a kernel that is called by address."""
         return f"apart {self.kernel._slot.symbol}"
 
 

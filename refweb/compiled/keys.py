@@ -1,4 +1,4 @@
-"""What the machine code of a kernel depends on: its own bytecode, and that of all that is compiled into it.
+"""Keys of machine code: the bytecode of a kernel, and of all that is compiled into it.
 
 A comment, a docstring or a moved line changes no bytecode, so that nothing is compiled again. A kernel that is called
 by its address counts with its signature alone: its callers stay as they are when it changes.
@@ -37,7 +37,7 @@ def platform_key(processor):
 
 
 def code_of(code, docstring=None):
-    """What a code object does, as a text: neither line numbers nor its docstring, which is its first constant."""
+    """Text of a code object's instructions: neither line numbers nor its docstring, which is its first constant."""
     constants = [code_of(one) if isinstance(one, python.CodeType) else repr(one) for one in code.co_consts]
     if docstring is not None and code.co_consts[:1] == (docstring,):
         constants = constants[1:]
@@ -60,7 +60,7 @@ def globals_in(code):
 
 
 def captured(function):
-    """What a function names outside of itself, as pairs of a name and a value, in an order of its own."""
+    """Pairs of name and value that a function refers to outside of itself, in a fixed order."""
     for name in sorted(globals_in(function.__code__)):
         if name in function.__globals__:
             value = function.__globals__[name]
@@ -74,7 +74,7 @@ def captured(function):
 
 
 def described(value, seen):
-    """What a captured value is, as a text that is the same in every process.
+    """Describe a captured value by a text that is the same in every process.
 
     Parameters
     ----------

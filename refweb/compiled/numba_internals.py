@@ -82,7 +82,7 @@ def options(given, counted):
 
 
 class Cache:
-    """What a dispatcher of numba asks for machine code: files of `refweb.compiled.store`.
+    """Cache of a dispatcher of numba: files of `refweb.compiled.store`.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Cache:
             yield store.SHIPPED / self.file(signature, other)
 
     def has(self, signature):
-        """Whether there is machine code of a signature."""
+        """Tell if there is machine code of a signature."""
         return any(path.exists() for path in self._paths(signature))
 
     def load_overload(self, signature, target_context):
@@ -163,7 +163,7 @@ def address_of(made, signature):
 
 
 class Slot:
-    """Where the address of a kernel stands for its callers, 0 until it is compiled.
+    """Memory of the address of a kernel for its callers, 0 until it is compiled.
 
     Its symbol is known to LLVM before any caller is compiled or read from disk: a symbol that is not would end the
     process.
@@ -175,7 +175,7 @@ class Slot:
 
     @property
     def filled(self):
-        """Whether the address is known."""
+        """True if the address is known."""
         return bool(self._place.value)
 
     @property
@@ -225,7 +225,7 @@ class Called(types.Callable):
         return (self.signature,), False
 
     def get_impl_key(self, sig):
-        """What the calls are lowered by."""
+        """Return the key by which the calls are lowered."""
         return Called
 
 

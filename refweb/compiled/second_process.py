@@ -21,7 +21,7 @@ LEAST = 8
 
 
 def allowed():
-    """Whether a second process may compile.
+    """Tell if a second process may compile.
 
     Not on one core, not where ``REFWEB_COMPILERS=1`` says so, and not in a worker: its like are busy on other cores.
     """

@@ -1,4 +1,4 @@
-"""Where machine code is kept: one file a kernel and signature, named by all that it depends on.
+"""Storage of machine code: one file for each kernel and signature, named by all that it depends on.
 
 It is looked for in a folder of the user's, see `folder`, then in the one that a wheel brings, ``machine_code`` in this
 package. A file is written beside its place and moved there, so that several processes may share a folder, and is read

@@ -26,7 +26,7 @@ STUCK = 1.5
 
 @dataclass
 class AccuracyState:
-    """Where the loop stands, which a checkpoint keeps.
+    """State of the accuracy loop, which a checkpoint keeps.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class AccuracyState:
         return cls(first, float(kept["accuracy"]), int(kept["repeated"]), float(kept["drift"]), missing)
 
     def arrays(self):
-        """What a checkpoint keeps of it."""
+        """Arrays that a checkpoint keeps of it."""
         names, shares = np.array(list(self.missing), dtype=str), np.array(list(self.missing.values()))
         counted = {"accuracy": self.knob, "repeated": self.repeated, "drift": self.drift}
         return {**counted, "missing": names, "shares": shares}
@@ -126,7 +126,7 @@ def run_within_drift(simulation, folder, tell):
 
 
 def _throw(simulation, run, ended, rows, known):
-    """What came of a throw, with ± where a twin has ended, of what is settled before a ``known`` time."""
+    """Results of a throw, with ± where the step refinement has ended, for all that is settled before a ``known`` time."""
     scene, watch = simulation.scene, simulation.watch
     state, twin, factor = watch.state(run.course), None, 0.0
     if ended is not None:
@@ -195,7 +195,7 @@ def reach_digits(simulation, digits, folder, tell):
 
 
 def _over(simulation, digits, knob, why, price):
-    """That accuracy is raised no further, and what it would take."""
+    """Text that accuracy is raised no further, and the cost of doing so."""
     budget, name = simulation.budget, simulation.integrator.knob
     return (
         f"with {name} = {knob:.3g} {why}, more than what was left of the budget of {budget.whole:.3g} s of CPU time: "

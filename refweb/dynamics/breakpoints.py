@@ -1,4 +1,4 @@
-"""What corners of tables cost: no step passes one, and a table with more of them than a run has steps sets the step."""
+"""Cost of the breakpoints of tables: steps end at each, and more breakpoints than steps set the step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ TOLD = 1.5
 
 
 def remarks_on_corners(scene, system):
-    """How corners of tables shorten the steps of a run, a list of at most one sentence; empty where that is little.
+    """Warn that breakpoints of tables shorten the steps of a run: a list of at most one sentence.
 
     Parameters
     ----------

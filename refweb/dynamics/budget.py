@@ -1,4 +1,4 @@
-"""What it may cost to raise the accuracy of a run: a budget of CPU time, and what is spent of it.
+"""Budget of CPU time for raising the accuracy of a run, and the part of it that is spent.
 
 The first run goes to its end whatever it costs, as there is no result before. One that follows it is not begun where it
 is expected to cost more than what is left, and is ended where it is seen to.
@@ -63,7 +63,7 @@ class Budget:
 
     @property
     def spent(self):
-        """What is spent [s]."""
+        """CPU time that is spent [s]."""
         return clock() - self._began
 
     def begin(self):

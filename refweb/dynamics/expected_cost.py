@@ -1,4 +1,4 @@
-"""What an explicit run will take: its step, what sets that, and the CPU time to expect."""
+"""Expected cost of an explicit run: its step, the cause of that step, and the CPU time."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def ruling(integrator, system, reach, speed):
 
 
 def _parts(system, bounds, reach, speed):
-    """What each family adds to the bounds of the row sums, shape (families, rows)."""
+    """Parts of each family in the bounds of the row sums, shape (families, rows)."""
     rates, parts, turns = np.zeros(system.rows), [], RigidRotations.of(system.net)
     for family, bound in zip(system.families, bounds, strict=True):
         before, data = rates.copy(), system.net.line_data if family.lines else family.data

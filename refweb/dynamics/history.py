@@ -1,4 +1,4 @@
-"""What an integrator looks at for a scene, and how its `History` becomes rows of ``history.csv`` and results.
+"""Monitors of a scene, and the way from their `History` to rows of ``history.csv`` and results.
 
 Observables of a state are probes, those of energies, work and step size weighted sums of the integrator's books. Behind
 the scene's own probes stand those of what refweb warns of, and those of events that no observable tells.
@@ -64,13 +64,13 @@ def _probes_of_warnings(system, followed, step_size):
 
 
 def _of_tension(probe):
-    """Whether a probe follows the largest of all tensions, each times a scale, and no mean of it."""
+    """Tell if a probe follows the largest of all tensions, each times a scale, and no mean of it."""
     every = probe.kernel is probes.line and list(probe.rows[1:]) == [0, len(probe.data)]
     return every and probe.rows[0] == 0 and probe.sign > 0.0 and not probe.average
 
 
 def _tells_strain(system, scale):
-    """Whether the largest tension times a scale is that of the most strained element, whatever that is."""
+    """Tell if the largest tension times a scale is that of the most strained element in any case."""
     net, lines = system.net, [family for family in system.families if family.lines]
     if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
@@ -93,7 +93,7 @@ def _event_of(event, system):
 
 
 class Watch:
-    """What an integrator looks at for a scene, and what becomes of it.
+    """Monitors of a scene, and the results that are made of them.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ class Watch:
         ]
 
     def _weights_of_columns(self, energies):
-        """What each column of ``history.csv`` is of the columns of a `History`, shape (columns there, columns)."""
+        """Weights of the columns of a `History` in each column of ``history.csv``, shape (columns there, columns)."""
         unit = History.empty(0, len(self.probes), self.system.families)
         unit = History(unit.names, np.eye(len(unit.names)), unit.probed)
         columns = [unit.time]
@@ -174,7 +174,7 @@ class Watch:
         return (history.values[:, :, None] * self._weights).sum(axis=1)
 
     def compared(self, table):
-        """What a run and its twin are compared by, of rows of ``history.csv``.
+        """Columns of ``history.csv`` by which a run and its step refinement are compared.
 
         Time, observables in their order, and energy less work [J]: that stays what it is at the start, so that its
         error is known in either run.
@@ -237,7 +237,7 @@ class Watch:
         return [o.name for o in extreme if np.isinf(values[self._slot(o)])]
 
     def corrections(self, course, relative=0.0, absolute=None):
-        """What ± of results is no less than, by name of the observable.
+        """Lower limits of ± of results, by name of the observable.
 
         That is what extremes exceed the values at steps by, and what the integral of a mean leaves open. A method that
         keeps a ``relative`` tolerance may find an extreme of an instant no better than that, and one with ``absolute``
@@ -256,7 +256,8 @@ class Watch:
         return found
 
     def drifts(self, course, twin, time):
-        """How far bodies whose velocities differ in a run and its twin come apart in half a time [s], by observable.
+        """Distance that bodies with different velocities in a run and its refinement gain in half a time [s], by
+        observable.
 
         Only of places of bodies: nodes swing, and what their velocities differ by is turned around in less time.
         """

@@ -16,7 +16,7 @@ OFF = 1e-9
 
 
 class Start(NamedTuple):
-    """Where a run begins.
+    """Initial state of a run.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ def start_of(scene, system):
 
 
 def remarks_on(start, system):
-    """What a reader has to know of a start: jumps of motion, and bodies inside of the web."""
+    """Remarks on a start: jumps of motion, and bodies inside of the web."""
     before = np.zeros((system.rows, 3)) if start.x is None else start.x
     there = before.copy()
     system.drive(0.0, there)

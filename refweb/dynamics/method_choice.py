@@ -121,7 +121,7 @@ def step_price(system, touched=False):
 
 
 def _damped(system, bound):
-    """By what factor damping makes the bound of stability smaller."""
+    """Factor by which damping makes the bound of stability smaller."""
     return _bound(_undamped(system)) / bound
 
 
@@ -142,5 +142,5 @@ def _bound(system):
 
 
 def _quiet(scene, system):
-    """Whether no body, velocity or lack of equilibrium makes waves."""
+    """Tell if no body, velocity or lack of equilibrium makes waves."""
     return scene.solve.start == "equilibrium" and not system.contact and not system.initial_velocity().any()

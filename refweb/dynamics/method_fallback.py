@@ -62,12 +62,12 @@ class MethodFallback:
         return self._scene.replace(solve=self.choice.solve)
 
     def told(self):
-        """What ``run.json`` has to say of the choice."""
+        """Record of the choice for ``run.json``."""
         refused = {"refused": [refusal._asdict() for refusal in self.refused]} if self.refused else {}
         return {"choice": self.choice.reason, **refused}
 
     def arrays(self):
-        """What a checkpoint keeps."""
+        """Arrays that a checkpoint keeps."""
         methods, why = ([refusal[i] for refusal in self.refused] for i in range(2))
         return {"refused_methods": np.array(methods, dtype=str), "refused_why": np.array(why, dtype=str)}
 
@@ -105,7 +105,7 @@ class MethodFallback:
         return None
 
     def _takes(self, solve):
-        """Whether a method takes the scene."""
+        """Tell if a method takes the scene."""
         try:
             INTEGRATORS[solve.method].integrator_of(solve, self._system)
         except InputError:

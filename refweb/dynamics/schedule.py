@@ -1,4 +1,4 @@
-"""When a run is looked at: the times of its history rows, those that frames are written at, and blocks of them."""
+"""Times of a run: its history rows, the rows with frames, and blocks of rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_ROWS = 10_000
 
 
 class Schedule(NamedTuple):
-    """When a run is looked at.
+    """Times of the history rows and frames of a run.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Schedule(NamedTuple):
 
     @classmethod
     def of(cls, scene):
-        """That of a scene: the rows of its interval, and a frame every ``frames`` rows and at the end."""
+        """Make the schedule of a scene: the rows of its interval, and a frame every ``frames`` rows and at the end."""
         times = row_times(scene)
         frames = np.unique(np.append(np.arange(0, len(times), scene.output.frames), len(times) - 1))
         return cls(times, frames, times_between(times))

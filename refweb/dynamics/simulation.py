@@ -110,7 +110,7 @@ class Simulation:
 
     @property
     def done(self):
-        """How far it came."""
+        """Text that says how far the run came."""
         return f"t = {self._tables[-1][-1, 0] if self._tables else 0.0:.6g} s"
 
     @property
@@ -177,7 +177,7 @@ class Simulation:
             passage.overlaps.refuse()
 
     def run(self, folder, tell):
-        """One run from start to end, an `RunResult`; ``tell`` is called with the share that is done."""
+        """Run once from start to end and return an `RunResult`; ``tell`` is called with the share that is done."""
         times, integrator = self.schedule.times, self.integrator
         course, ahead = self._set_off(folder)
         self._refuse_overlap(course)
@@ -260,7 +260,7 @@ class Simulation:
             self._lines.refuse(overlap, f"t = {time:.6g} s", cell, course.v)
 
     def _unfollowed(self):
-        """Why lines that touch lines are not followed, None where they are."""
+        """Reason why contacts of lines with lines are not followed, None where they are."""
         method = self.scene.solve.method
         if not getattr(self.integrator, "follows_lines", False):
             return f"{method} does not follow lines in its steps"
@@ -321,7 +321,7 @@ class Simulation:
         folder.frame(number, state, run=kept | ({"compared": np.array(self._compared)} if self._compared else {}))
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         if not self.solution.reduced:
             return
         if self._largest_stress is not None:

@@ -29,7 +29,7 @@ ROUNDING = 1e-12
 
 
 class TwinRun(NamedTuple):
-    """What came of a twin.
+    """Outcome of a step refinement.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Twin:
 
 
 def _parts(times, end):
-    """Which times are in each part of that to ``end``: from ½ to end, from ¼ to ½, from ⅛ to ¼, from 0 to ⅛."""
+    """Times in each part of that to ``end``: from ½ to end, from ¼ to ½, from ⅛ to ¼, from 0 to ⅛."""
     starts = (0.5, 0.25, 0.125, 0.0)
     for start, until in zip(starts, (1.0, *starts[:-1]), strict=False):
         near = (times >= start * end) & (times <= until * end)
@@ -132,7 +132,7 @@ def _largest_mean(times, apart, end):
 
 
 def _of_chance(times, off, apart, end, order, least):
-    """How many times too small differences are, by that of energy, whose error is known: 1 to `MOST_CHANCE`.
+    """Factor by which differences are too small, by that of energy, whose error is known: 1 to `MOST_CHANCE`.
 
     Parameters
     ----------

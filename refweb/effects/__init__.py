@@ -1,4 +1,4 @@
-"""What acts on a net, one file an effect; no effect knows another, a global matrix or a solver.
+"""Effects: forces on a net, one file an effect; no effect knows another, a global matrix or a solver.
 
 How to write an effect
 ----------------------

@@ -1,4 +1,4 @@
-"""How nodes that bodies carry answer to forces, for kicks that are solved for.
+"""Response of attached nodes to forces, for kicks that are solved for.
 
 Such a node, at the arm a from the centre of mass of its body, has the velocity v + ω × a, and a force p on it is p and
 the moment a × p on the body. Of a kick by p, with the mass M and the tensor of inertia J of the body as it stands,
@@ -55,7 +55,7 @@ def columns(net, nodes):
 
 @kernel(forceinline=True)
 def is_carried(data, c, at):
-    """Whether a body carries the node whose columns begin at ``at``."""
+    """Tell if a body carries the node whose columns begin at ``at``."""
     return data[c, at] >= 0.0
 
 

@@ -67,7 +67,7 @@ class ImplicitContactKernels(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """What tells whether cells of a family, each of two lines, can have passed through themselves.
+    """Check if cells of a family, each of two lines, can have passed through each other.
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ class Family:
 
     @property
     def dead(self):
-        """Whether it is a load that follows from time alone, with a power and a potential."""
+        """True for a load that follows from time alone, with a power and a potential."""
         return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
 
 
@@ -313,7 +313,7 @@ class Constraint:
         return (self.direction(x) * self.between(v)).sum(axis=1)
 
     def turning(self, v):
-        """What d²g/dt² has besides the accelerations, |v₂ − v₁|²/L [m/s²], shape (cells,)."""
+        """Part of d²g/dt² beside the accelerations, |v₂ − v₁|²/L [m/s²], shape (cells,)."""
         return (self.between(v) ** 2).sum(axis=1) / self.length
 
     def pull(self, x, multipliers):
@@ -341,7 +341,7 @@ class BreakLimits:
 
     @property
     def watched(self):
-        """Whether any tension breaks anything."""
+        """True if any tension breaks anything."""
         return bool(np.isfinite(self.limits).any())
 
 

@@ -1,4 +1,4 @@
-"""What broken elements show, and what they held: tension and strain 0, and an energy that stays.
+"""Values of broken elements: tension and strain 0, and the energy that they had, which stays.
 
 Every system with broken elements has this family, whether a ``[rupture]`` broke them or the web came with them.
 """

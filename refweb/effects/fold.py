@@ -14,7 +14,7 @@ from ..tables import Several, Table, choice, nodes, real, table, text, vector
 
 @table
 class Fold(Table):
-    """Where the nodes of the web are at the start of a run: drawn in to a hub and wound about it, or as a file has it.
+    """Initial positions of the nodes: drawn in to a hub and wound about it, or as a file has them.
 
     Natural lengths, and the places that displacements are counted from, stay those of ``[web]``; nodes that order and
     subdivision add lie straight between the ends of their line. Velocities that spin are those of the folded web. All

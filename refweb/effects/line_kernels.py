@@ -1,4 +1,4 @@
-"""What kernels over line elements have in common: gradients, strain, and forces along the line.
+"""Common parts of kernels over line elements: gradients, strain, and forces along the line.
 
 ``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers.
 """

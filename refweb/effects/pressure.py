@@ -161,7 +161,7 @@ class Pressure(Table):
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
 
     def _sides(self, web, lines, normal):
-        """Of each line 1 if it pushes away from the point by itself, −1 if not."""
+        """Sign of each line: 1 if it pushes away from the point by itself, −1 if not."""
         ends = web.points[web.lines]
         push = np.cross(ends[:, 1] - ends[:, 0], normal)
         side = ((ends.mean(axis=1) - self.away_from) * push).sum(axis=1)

@@ -20,7 +20,7 @@ from .broken import HELD, held
 
 @table
 class GroupRupture(Table):
-    """What may differ on the lines of one group; None keeps the value of `Rupture`.
+    """Keys that may differ on the lines of one group; None keeps the value of `Rupture`.
 
     Examples
     --------

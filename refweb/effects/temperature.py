@@ -20,7 +20,7 @@ def _change(name, value):
 
 @table
 class GroupTemperature(Table):
-    """What may differ on the lines of one group; None keeps the value of `Temperature`.
+    """Keys that may differ on the lines of one group; None keeps the value of `Temperature`.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""What is there: nodes, lines, lengths, laws, elements, mass, bodies; it knows no forces, time or solvers."""
+"""The model: nodes, lines, lengths, laws, elements, mass, bodies; it knows no forces, time or solvers."""

@@ -19,7 +19,7 @@ _DENSE: dict = dict(at_least=0, unit="kg/m³")
 
 @table
 class Group(Table):
-    """What may differ from `Cable` on the lines of one group; None keeps the cable's value.
+    """Keys that may differ from `Cable` on the lines of one group; None keeps the cable's value.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class Cable(Table):
         return values
 
     def _values(self, web):
-        """What the cable and its groups give to each line, by key."""
+        """Values that the cable and its groups give to each line, by key."""
         given, values = givers(web.groups, self.groups, len(web.lines), "[cable.groups]"), {}
         missing = {"strength": np.inf, "slackness": 0.0, "smoothing": 0.0}
         for key in (f.name for f in fields(Group)):

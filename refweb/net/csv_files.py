@@ -45,7 +45,7 @@ class _Columns:
         self.path, self.columns, self._rows = path, columns, rows
 
     def at(self, number):
-        """How a message calls a row."""
+        """Name of a row in messages."""
         return f"{self.path.name}, line {self._rows[number]}"
 
     def numbers(self, key, whole=False, empty=None):

@@ -97,7 +97,7 @@ def _numbered(dofs, line, place, nodes):
 
 
 class Elements(NamedTuple):
-    """What the lines of a web are cut into.
+    """Elements into which the lines of a web are divided.
 
     Attributes
     ----------

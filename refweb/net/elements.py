@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Straight:
-    """What scikit-fem's ``ElementLineP1`` says of itself, as far as a net is made of it."""
+    """Data of scikit-fem's ``ElementLineP1`` that a net needs."""
 
     maxdeg = 1
     doflocs = np.array([[0.0], [1.0]])

@@ -67,7 +67,7 @@ def by_place(lines, rim, nodes):
 
 
 def givers(groups, tables, count, where="groups"):
-    """Which of some tables by group gives each key of a line.
+    """Tables by group that give each key of a line.
 
     Parameters
     ----------

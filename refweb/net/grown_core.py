@@ -65,7 +65,7 @@ def _half_square(at, c):
 
 @kernel()
 def _smooth(l0, l1, l2, radius, c0, c1, c2, t):
-    """As `depth`, of a box, where faces share: ``t`` is the depth in the nearest one."""
+    """Depth of a box, as `depth`, where faces share: ``t`` is the depth in the nearest one."""
     for _ in range(60):
         g, g1, _ = _shrinkage(t, radius)
         b0, b1, b2 = _half_square(l0, c0 - g), _half_square(l1, c1 - g), _half_square(l2, c2 - g)
@@ -94,7 +94,7 @@ def _smooth(l0, l1, l2, radius, c0, c1, c2, t):
 
 @kernel()
 def grown_box(l0, l1, l2, radius, c0, c1, c2, thin):
-    """As `depth`, of a box; ``thin`` is whether its core is a point or a line."""
+    """Depth of a box, as `depth`; ``thin`` is true if its core is a point or a line."""
     w0, w1, w2 = _beyond(l0, c0), _beyond(l1, c1), _beyond(l2, c2)
     distance = math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
     if distance > 0.0 and (thin or distance >= (1.0 - EXACT) * radius):

@@ -158,7 +158,7 @@ def _window(mesh, rows, columns, side, kind):
 
 @table
 class Paper(Table):
-    """One of the three webs of the paper's section 3.2, exactly.
+    """Web of the paper's section 3.2, exactly: a triangle, square or hexagon web.
 
     Groups of lines: ``anchors``, the links at the rim; ``inner``, all others; of these and of links ``rows``,
     ``columns``, ``rising``, ``falling`` and ``diagonals``, see `refweb.net.lattices`.

@@ -146,7 +146,7 @@ def _web_of(mesh):
 
 
 def _kept(mesh, lines, rim, count):
-    """Which nodes are those of the web, bool of shape (nodes,), None for all.
+    """Mask of the nodes that the web keeps, bool of shape (nodes,), None for all.
 
     Nodes within curved lines are not, and of Gmsh those that no line uses and no physical point names.
     """

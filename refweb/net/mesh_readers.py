@@ -1,4 +1,4 @@
-"""What meshes a file holds: meshio reads it, and VTK what meshio does not know.
+"""Meshes from files: meshio reads them, and VTK those that meshio does not know.
 
 meshio leaves out polylines of .vtu files without a word, and knows neither polygonal data nor texts; such files are
 read by VTK. It does so in a process of its own, as it may end the one that it is in on a file that is damaged.
@@ -49,7 +49,7 @@ class Block(NamedTuple):
 
 
 class Mesh(NamedTuple):
-    """What a file holds.
+    """Content of a mesh file.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ def read(path):
 
 
 def _asks_for_vtk(path, suffix):
-    """Whether a VTK file has polygonal data, polylines or texts."""
+    """Tell if a VTK file has polygonal data, polylines or texts."""
     if suffix == ".vtk":
         with path.open("rb") as file:
             return re.search(rb"^\s*DATASET\s+POLYDATA", file.read(2000), re.MULTILINE | re.IGNORECASE) is not None
@@ -123,7 +123,7 @@ def _asks_for_vtk(path, suffix):
 
 
 def _has_polylines(path, whole):
-    """Whether meshio leaves cells of a .vtu file out."""
+    """Tell if meshio leaves cells of a .vtu file out."""
     said = sum(map(int, re.findall(rb'NumberOfCells="(\d{1,12})"', whole)))
     try:
         return said != sum(len(block.data) for block in by_meshio(path, "vtu").cells)

@@ -1,4 +1,4 @@
-"""What effects act on: the rows of the unknowns, their mass, and the lines between them.
+"""Nets: the rows of the unknowns, their mass, and the lines between them, on which effects act.
 
 `refweb.net.discretisation` makes a net of a web; effects add rows, mass and columns of numbers to it, and leave what is
 there alone.
@@ -30,7 +30,7 @@ LAW = len(COLUMNS)
 
 @dataclass(frozen=True, eq=False)
 class Net:
-    """What effects act on: the rows of the unknowns, their mass, and the lines between them.
+    """Net that effects act on: the rows of the unknowns, their mass, and the lines between them.
 
     Attributes
     ----------

@@ -83,7 +83,7 @@ class Grown(NamedTuple):
 
 
 class Shape(Table):
-    """What a body looks like: its keys in ``[[body]]`` as fields of a table, and what follows from them alone.
+    """Shape of a body: its keys in ``[[body]]`` as fields of a table, and the data that follow from them alone.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class Shape(Table):
         return ()
 
     def told(self):
-        """What the box of a scene says of it, each a text."""
+        """Texts on it for the box of a scene."""
         return ()
 
     def volume(self):
@@ -245,7 +245,7 @@ class RigidBody:
 
     @property
     def tumbles(self):
-        """Whether its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia.
+        """True if its orientation counts: a free body that is no ring, nor a sphere with one moment of inertia.
 
         Of a body that carries nodes it does.
         """
@@ -261,7 +261,7 @@ class RigidBody:
 
     @property
     def mobility(self):
-        """That over the tensor of inertia, along its axes, shape (3, 3)."""
+        """Moment of inertia times the inverse of the inertia tensor, along its axes, shape (3, 3)."""
         found = self.moment * np.linalg.inv(self.inertia)
         return 0.5 * (found + found.T)
 

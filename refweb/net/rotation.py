@@ -181,7 +181,7 @@ def _exact(a, b):
 
 
 def _scales(body, net):
-    """What makes rates of the nodes that a body of a net carries its own, see `carry_rates`; shape (carried, 3)."""
+    """Scales that turn rates of attached nodes into rates of the body, see `carry_rates`; shape (carried, 3)."""
     if not body.carried:
         return np.zeros((0, 3))
     size, axes = np.linalg.eigh(body.mobility)

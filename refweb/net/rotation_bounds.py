@@ -1,4 +1,4 @@
-"""How fast bodies that turn may move, and how stiff what they carry makes them, at most: for steps of explicit methods.
+"""Bounds of the velocity of bodies that turn, and of the stiffness by attached nodes, for steps of explicit methods.
 
 See `refweb.net.rotation`.
 """
@@ -91,7 +91,7 @@ def hardest_push(x: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations) -
 def beside_places(
     kick: float, drift: float, x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, turns: RigidRotations
 ) -> float:
-    """By how much points of bodies come elsewhere than their places do in a drift behind a kick, at most [m].
+    """Largest distance of points of bodies from their predicted positions in a drift behind a kick [m].
 
     Of the surface that is what it turns by; of nodes that bodies carry how far they are off the way that the velocities
     they have lead them.

@@ -1,4 +1,4 @@
-"""One cable, straight or hanging on an arc."""
+"""Single cables, straight or hanging on an arc."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PARALLEL = 1e-9
 
 @table
 class SingleCable(Table):
-    """One cable with both ends fixed, of lines of equal natural length.
+    """Single cable with both ends fixed, of lines of equal natural length.
 
     Groups of lines: ``anchors``, the first and the last; ``inner``, all others; one line alone is ``rim``, see
     `refweb.net.groups`.

@@ -188,7 +188,7 @@ class Web:
         return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
 
     def find_around(self, selection):
-        """As `find`, of nodes that go round: those of one name as they lie around their middle, counterclockwise."""
+        """Find nodes, as `find`, in their order around: nodes of one name counterclockwise around their middle."""
         found = self.find(selection)
         if not isinstance(selection, str) or len(found) < 3:
             return found

@@ -1,1 +1,1 @@
-"""One page of a run: what was simulated, found and drawn; it knows records, and nothing of what made them."""
+"""Pages of a run: its scene, results and pictures; they know records, and nothing of what made them."""

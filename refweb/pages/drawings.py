@@ -39,7 +39,7 @@ def space(record, found):
 
 
 def _on_frames(record, found, peak):
-    """What is shown of all frames, and how exactly."""
+    """Sentence on the frames that are shown, and on their accuracy."""
     shown, total = len(found.shown), len(record.times)
     words = [f"{shown} of {total} frames." if shown < total else f"All {total} frames." if total > 1 else "One frame."]
     left = total - shown - len(found.missing)

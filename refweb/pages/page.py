@@ -65,7 +65,7 @@ def report_of(solution, out=None, frames=None):
 
 
 def _unread(path):
-    """Why a ``run.json`` that gives no summary does not, in words."""
+    """Reason why a ``run.json`` gives no summary, in words."""
     if not path.exists():
         return "there is no run.json"
     try:
@@ -126,7 +126,7 @@ def _lacking(record, found, unread):
 
 
 def _status(record, unread):
-    """How the run ended, and what it was, as far as that is known."""
+    """Sentence on the end of a run and its subject, as far as that is known."""
     method = (record.summary.get("solver") or {}).get("method")
     known = [sections.KINDS.get(record.kind) or record.kind] if record.scene or record.kind != "dynamic" else []
     known += [str(method)] if method else []

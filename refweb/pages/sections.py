@@ -48,14 +48,14 @@ def results(record):
 
 
 def warnings(record, lacking=()):
-    """What a reader of the results has to know: warnings of the run, and sentences on what its folder lacks."""
+    """Warnings of the run, and sentences on the data that its folder lacks."""
     found = [*record.summary.get("warnings", []), *lacking]
     body = listing(found) if found else tag("p", "None.")
     return section("warnings", "Warnings", tag("div", body, class_="warned") if found else body)
 
 
 def simulated(record):
-    """What was simulated: sizes, cable, effects that are there and that are not, solver."""
+    """Model of the run: sizes, cable, effects that are there and that are not, solver."""
     scene = record.scene
     if not scene:
         return section("simulated", "What was simulated", tag("p", "This folder holds no scene.toml that can be read."))
@@ -82,7 +82,7 @@ def simulated(record):
 
 
 def cost(record):
-    """What the run cost, by effect."""
+    """Cost of the run, by effect."""
     spent = record.summary.get("cost")
     if not spent:
         return ""

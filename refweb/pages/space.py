@@ -178,7 +178,7 @@ def _supports(frames):
 
 
 def _fields(frames, arrays):
-    """What is known of each field, in the order in which it is offered; its levels become one of the arrays."""
+    """Data of each field, in the order of the menu; its levels become one of the arrays."""
     names = [name for name in frames[0].fields if name not in LEFT_OUT and all(name in f.fields for f in frames)]
     order = [name for name in FIRST if name in names]
     order += [name for name in names if name not in FIRST and name not in HIDDEN]
@@ -216,7 +216,7 @@ def _range(values):
 
 
 def _bodies(frames, arrays):
-    """What is known of each body: its name, its colour and where it is in each frame, as a rotation and a place."""
+    """Data of each body: its name, its colour and its rotation and position in each frame."""
     found = []
     for i, (name, body) in enumerate(frames[0].bodies.items()):
         there = [frame.bodies[name].points for frame in frames if name in frame.bodies]

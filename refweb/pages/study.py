@@ -50,7 +50,7 @@ def page_of(study, rows):
 
 
 def _together(summary):
-    """What the rows say together, group by group."""
+    """Statistics of all rows, group by group."""
     said = [tag("p", text) for text in summary["reasons"]]
     for entry in summary["chances"]:
         if of := words.of_group(entry["of"]):

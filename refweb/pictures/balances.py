@@ -42,7 +42,7 @@ class EnergyBalance(NamedTuple):
 
     @property
     def drift(self):
-        """What there is too much [J]."""
+        """Excess of energy [J]."""
         return self.top - self.given
 
 
@@ -142,7 +142,7 @@ def _drifts(shown, what, second, clock):
 
 
 def _share(s, key, what):
-    """How far a book is open, as ``run.json`` says it of a run that has ended."""
+    """Error of a balance, as ``run.json`` gives it for a run that has ended."""
     found = None if s.record.status == "running" else (s.record.summary.get("solver") or {}).get(key)
     return "" if found is None else f"{what} drift {found:.1e} of the largest {what}"
 
@@ -198,12 +198,12 @@ class MomentumBalancePlot(NamedTuple):
 
     @property
     def given(self):
-        """What was there at the start, and what came in."""
+        """Energy at the start, and work."""
         return self.momentum[:1] + np.sum(list(self.impulses.values()), axis=0)
 
     @property
     def drift(self):
-        """What there is too much."""
+        """Excess of momentum."""
         return self.momentum - self.given
 
 
@@ -221,7 +221,7 @@ def momentum_book(shown):
 
 
 def has_momentum(shown):
-    """Whether a run has a book of momentum."""
+    """Tell if a run has a momentum balance."""
     return all(f"momentum_{axis}" in shown.units for axis in AXES)
 
 

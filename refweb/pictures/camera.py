@@ -73,7 +73,7 @@ class View:
         return replace(self, half=tuple(half * factor for half in self.half)) if factor > 1 else self
 
     def shows(self, points):
-        """Whether some of what spans these points [m], shape (points, 3), lies within the frame."""
+        """Tell if a part of the span of these points [m], shape (points, 3), lies within the frame."""
         if not len(points):
             return False
         flat = (self.project(points)[0] - self.offset) / self.half

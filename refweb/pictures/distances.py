@@ -21,7 +21,7 @@ MANY = 4000
 
 
 class Spread(NamedTuple):
-    """What lines have, and how far away they are.
+    """Values of lines, and their distances.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def largest(record, field):
 
 
 def _place(record, frame, middles, values, field):
-    """Where a web was hit or loaded [m], else where the largest value is, its centre if all is slack; and its words."""
+    """Position of the hit or load [m], else of the largest value, its centre if all is slack; and its words."""
     numbers = np.asarray(frame.fields.get("line", np.arange(len(values))))
     touched = {
         name: body for name, body in (record.summary.get("bodies") or {}).items() if body.get("line") is not None
@@ -95,7 +95,7 @@ def _place(record, frame, middles, values, field):
 
 
 def _loaded(record, frame, numbers):
-    """Where the one node that is loaded stands, and its name; None where there is no such node."""
+    """Position of the one node that is loaded, and its name; None where there is no such node."""
     loads = record.scene.get("load") or []
     count = (record.summary.get("web") or {}).get("nodes", 0)
     nodes = np.zeros((int(frame.ends.max()) + 1, 3))

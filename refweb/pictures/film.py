@@ -138,7 +138,7 @@ class _Film:
         return Stage.of(seen, self._look, SIZE[0] / SIZE[1])
 
     def _page(self):
-        """What stands around the web, with transparency: an image, RGBA."""
+        """Image of everything around the web, with transparency, RGBA."""
         page = blank_page(self._stage, self._record.title, SIZE)
         for patch in (page.patch, *(axes.patch for axes in page.axes)):
             patch.set_alpha(0.0)

@@ -24,7 +24,7 @@ POINTS_ALONG_A_CURVE = 9
 
 
 class Frame(NamedTuple):
-    """What is drawn of one instant.
+    """Data of one instant for drawing.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ def number_of(frame, known):
 
 
 def read(folder, number, found=None):
-    """One frame of a result folder, whose `listed` frames may be given.
+    """Read one frame of a result folder, whose `listed` frames may be given.
 
     Raises
     ------
@@ -201,7 +201,7 @@ def frame_of(number, time, meshes, supported):
 
 
 def _amplitude(points, shape):
-    """What a mode's shape is drawn times [m], of points [m] to which it has been added, both of shape (points, 3).
+    """Factor [m] of a mode's shape, for points [m] to which it has been added, both of shape (points, 3).
 
     It is a share of the diagonal of the box of the points before: what fixes it is found by iteration.
     """
@@ -229,7 +229,7 @@ def _mesh(path):
 
 
 def _supported(folder, mesh):
-    """Which points are supported: as the checkpoint has it, else those where a reaction acts."""
+    """Mask of supported points: as the checkpoint has it, else those where a reaction acts."""
     count = len(mesh.points)
     try:
         with np.load(Path(folder) / "checkpoint.npz") as checkpoint:

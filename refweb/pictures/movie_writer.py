@@ -161,7 +161,7 @@ class Palette(NamedTuple):
 
 
 def _bin(colours):
-    """Which of 64³ bins a colour, shape (…, 3), uint8, is in."""
+    """Number of the bin, of 64³, of a colour, shape (…, 3), uint8."""
     red, green, blue = (colours[..., i].astype(np.int32) >> 2 for i in range(3))
     return (red << 12) | (green << 6) | blue
 

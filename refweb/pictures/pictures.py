@@ -111,7 +111,7 @@ def record_of(source):
 
 
 def look_of(record, frame, field, limits, scale, view):
-    """What is asked for, checked, as a `Look`; without limits [SI] they are those of all frames."""
+    """Check the options and make a `Look`; without limits [SI] they are those of all frames."""
     field = _field(frame, field)
     if not isinstance(scale, int | float) or not 0.0 < scale <= MOST_SCALED:
         raise InputError(f"scale = {shown(scale)} must be a number > 0 and ≤ {MOST_SCALED:g}")
@@ -131,7 +131,7 @@ def with_supports(record, frame):
 
 
 def clock_line(record, number, look, decimals=None):
-    """What stands below the title: when it is, what is exaggerated, and how a run that is not solved ended."""
+    """Line below the title: the time, the exaggeration, and how a run that is not solved ended."""
     parts = [record.clock(number, decimals)]
     if look.scale != 1:
         parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {look.scale:g}")

@@ -1,4 +1,4 @@
-"""What of a record is drawn in a plot: its history with units, its results with ±, and how it looks beside others."""
+"""Data of a record for plots: its history with units, its results with ±, and its style beside other records."""
 
 from __future__ import annotations
 

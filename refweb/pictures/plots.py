@@ -30,7 +30,7 @@ SPECTRUM, DISTANCE = "spectrum:", "-distance"
 
 
 def kinds(record):
-    """What there is to draw of a record: names that `draw` takes, and a line on each, the most telling first.
+    """Plots that a record has: names that `draw` takes, and a line on each, the most useful first.
 
     Besides these any column of its table can be drawn, and ``spectrum:`` before one of a dynamic run.
     """
@@ -135,7 +135,7 @@ def _refuse(shown, name, typed):
 
 
 def _meant(shown, name):
-    """What a name stands for in full: a spectrum is of the first observable there is, a field is over distance."""
+    """Full meaning of a name: a spectrum is of the first observable there is, a field is over distance."""
     if any(name in s.units for s in shown):
         return name
     if name == "spectrum":
@@ -169,7 +169,7 @@ def _beside(records):
 
 
 def _remark(s):
-    """What is to be said below of a run that is not solved: its message, and its status where others are shown."""
+    """Remark below a run that is not solved: its message, and its status where other runs are drawn."""
     message = str(s.record.summary.get("message") or "")[:200] if s.record.ending else ""
     return s.said(": ".join(filter(None, [s.record.ending if s.name else "", message])))
 
@@ -182,7 +182,7 @@ def _title(shown):
 
 
 def _has(s, name):
-    """Whether a record has what a name stands for."""
+    """Tell if a record has the data that a name stands for."""
     if name.startswith(SPECTRUM) and name not in s.units:
         return s.record.kind == "dynamic" and name.removeprefix(SPECTRUM) in list(s.units)[1:]
     return name in s.units or (name in kinds(s.record) and name != "spectrum")

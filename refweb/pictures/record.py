@@ -37,7 +37,7 @@ class Values(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is shown of a run.
+    """Data of a run for pictures, plots and pages.
 
     Attributes
     ----------
@@ -75,12 +75,12 @@ class Record(NamedTuple):
 
     @property
     def status(self):
-        """How it ended."""
+        """Status of the run."""
         return str(self.summary.get("status", "solved"))
 
     @property
     def ending(self):
-        """How a run ended that is not solved, in words; empty of one that is."""
+        """End of a run that is not solved, in words; empty for one that is."""
         return {"solved": "", "running": "run not ended"}.get(self.status, f"run {self.status}")
 
     def refuse_others(self, drawn):
@@ -90,7 +90,7 @@ class Record(NamedTuple):
             raise InputError(f"{self.name}: holds {short(str(kind))}, not a run: {words}")
 
     def clock(self, number, decimals=None):
-        """When a frame is, in words: its time or load step, of a mode its number and frequency with ±.
+        """Time of a frame, in words: its time or load step, of a mode its number and frequency with ±.
 
         ``decimals`` of a time are six digits less those before the point, or as many as are asked for.
         """

@@ -139,7 +139,7 @@ class Renderer:
         )
 
     def _answer(self, seconds, *sent):
-        """What the child makes of what is sent; it is killed where it takes longer."""
+        """Reply of the child process; it is killed where it takes longer."""
         limit = threading.Timer(seconds, self._child.kill)
         limit.start()
         try:

@@ -26,7 +26,7 @@ MOST = 1000
 
 
 class Ink(NamedTuple):
-    """How one of several things is drawn: colour, style of lines, marker."""
+    """Style of one of several curves: colour, style of lines, marker."""
 
     colour: str
     style: str | tuple
@@ -34,7 +34,7 @@ class Ink(NamedTuple):
 
     @classmethod
     def of(cls, number):
-        """That of a number from 0 on: beyond the colours, these with another style and marker."""
+        """Style of a number from 0 on: beyond the colours, these with another style and marker."""
         again, own = divmod(number, len(COLOURS))
         return cls(COLOURS[own], STYLES[(own + again) % len(STYLES)], MARKERS[(own + again) % len(MARKERS)])
 

@@ -86,7 +86,7 @@ def spectrum_of(time, values, name="history"):
 
 
 def _stands_out(amplitude, number):
-    """Whether both valleys between a peak and what is higher are low; frequency 0 is none, as the mean is left out."""
+    """Tell if both valleys between a peak and higher values are low; frequency 0 is none, as the mean is left out."""
     height = amplitude[number]
     for side in (amplitude[number - 1 : 0 : -1], amplitude[number + 1 :]):
         higher = np.flatnonzero(side > height)

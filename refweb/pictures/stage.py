@@ -27,7 +27,7 @@ MOST_UNDEFORMED = 20_000
 
 
 class Look(NamedTuple):
-    """What of frames is drawn, and how.
+    """Options of drawing frames.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Look(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What frames hold together.
+    """Limits of several frames together.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class Seen(NamedTuple):
 
     @classmethod
     def of(cls, frame, field):
-        """Of one frame."""
+        """Limits of one frame."""
         grey = _grey(frame, field)
         values = frame.fields[field][~grey]
         values = values[np.isfinite(values)]
@@ -115,7 +115,7 @@ class Seen(NamedTuple):
         return self._replace(points=outermost(self.points), supports=outermost(self.supports), bodies=bodies)
 
     def joined(self, other):
-        """What both hold."""
+        """Limits of both together."""
         bodies = {
             name: np.concatenate([*(seen.bodies[name] for seen in (self, other) if name in seen.bodies)])
             for name in {**self.bodies, **other.bodies}
@@ -134,7 +134,7 @@ class Seen(NamedTuple):
 
 @dataclass(frozen=True)
 class Stage:
-    """What all pages share.
+    """Common parts of all pages.
 
     The `look`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
     (lines, points, 3), empty where nothing has moved, and the `middle` of the web, shape (3,) [m]; what has been
@@ -165,7 +165,7 @@ class Stage:
 
     @property
     def beneath(self):
-        """Whether the undeformed web lies below the web: seen from above it would cover it."""
+        """True if the undeformed web lies below the web: seen from above it would cover it."""
         return self.look.view is not None
 
     def pixels(self, size):
@@ -288,7 +288,7 @@ def _cut(name, most=14):
 
 
 def _grey(frame, field):
-    """Which lines are drawn as slack, shape (lines,)."""
+    """Mask of the lines drawn as slack, shape (lines,)."""
     return frame.slack & (field in GREY_WHERE_SLACK)
 
 

@@ -24,7 +24,7 @@ MOST_GROUPS = 8
 
 
 class Rows(NamedTuple):
-    """What is drawn of a study.
+    """Data of a study for drawing.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Rows(NamedTuple):
 
 
 def _is_named(one):
-    """Whether a parameter is a list of several things that are no numbers."""
+    """Tell if a parameter is a list of several items that are no numbers."""
     return isinstance(one, list) and len(one) > 1 and not all(isinstance(v, int | float) for v in one)
 
 
@@ -103,7 +103,7 @@ def draw(study, result):
 
 
 def _is_number(one):
-    """Whether a parameter is several numbers."""
+    """Tell if a parameter is several numbers."""
     return isinstance(one, dict) or (len(one) > 1 and all(isinstance(v, int | float) for v in one))
 
 

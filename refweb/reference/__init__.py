@@ -1,1 +1,1 @@
-"""What a scene file may say: values by path, its tables in words and as a schema; it knows no scene."""
+"""Reference of scene files: values by path, its tables in words and as a schema; it knows no scene."""

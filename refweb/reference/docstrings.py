@@ -1,4 +1,4 @@
-"""What a docstring in the style of numpydoc says, part by part."""
+"""Parts of a docstring in the style of numpydoc."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def prose(documented):
 
 
 def parameters(documented):
-    """What is said of each parameter, by name."""
+    """Descriptions of parameters, by name."""
     found, names = {}, []
     for line in sections(documented).get("Parameters", []):
         if line and not line.startswith(" "):
@@ -58,7 +58,7 @@ def parameters(documented):
 
 
 def refusals(documented):
-    """What is refused with an InputError, without the places in the code that refuse it."""
+    """Inputs refused with an InputError, without the functions that refuse them."""
     _, *lines = sections(documented).get("Raises", [""])
     text = plain(" ".join(" ".join(lines).split()))
     return re.sub(r"from `[\w.]+`, ", "", text)

@@ -50,7 +50,7 @@ class Listing(NamedTuple):
 
 
 class Page(NamedTuple):
-    """What the reference says of one table, or of one kind of it.
+    """Reference page of one table, or of one kind of it.
 
     Attributes
     ----------
@@ -113,14 +113,14 @@ def pages_of(name):
 
 
 def line_of(name):
-    """What a table is, in a line."""
+    """Summary of a table, in a line."""
     if name == "scene":
         return summary(Head)
     return SUMMARIES.get(name) or summary(load({**PARTS, **LISTS, **EFFECTS}[name]))
 
 
 def header_of(name):
-    """How a table stands in a scene file."""
+    """Header of a table in a scene file."""
     if name == "scene":
         return "schema, title, seed"
     if name == "study":
@@ -153,7 +153,7 @@ def _toml(value):
 
 
 def takes(schema):
-    """What a schema accepts, in words."""
+    """Values that a schema accepts, in words."""
     if "anyOf" in schema:
         *first, last = schema["anyOf"]
         if last.get("items") == {"anyOf": first}:

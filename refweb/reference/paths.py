@@ -98,7 +98,7 @@ def _keys(path):
 
 
 def _put(here, keys, above, value) -> Any:
-    """What stands ``here``, below the keys ``above``, with a value put at ``keys``; None where nothing stands here."""
+    """Value ``here``, below the keys ``above``, with a value put at ``keys``; None where nothing stands here."""
     if not keys:
         return value
     key, rest = keys[0], keys[1:]

@@ -1,1 +1,1 @@
-"""One instant, its observables, the solution and the result folder; it does not know how they were computed."""
+"""Results: an instant, its observables, the solution and the folder; they do not know how they were computed."""

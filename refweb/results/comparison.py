@@ -85,13 +85,13 @@ def _results(folder, summary, several):
 
 
 def _has(folder, summary, results):
-    """What a run found, in words."""
+    """Content of a run, in words."""
     names = ", ".join(dict.fromkeys(name for name, _ in results))
     return f"{folder} has {names}" if names else f"the run in {folder} is {summary['status']} and has none"
 
 
 def _row(key, values):
-    """One result in all folders."""
+    """Row of one result in all folders."""
     there = [value for value in values if value is not None]
     first = there[0]
     return {
@@ -105,12 +105,12 @@ def _row(key, values):
 
 
 def _difference(value, first):
-    """Of two values of one unit; None of others."""
+    """Difference of two values of one unit; None for others."""
     return value["value"] - first["value"] if value and value["unit"] == first["unit"] else None
 
 
 def _agree(results):
-    """Whether some results may be one value."""
+    """Tell if some results may be one value."""
     if len({result["unit"] for result in results}) > 1:
         return False
     if len({result["value"] for result in results}) == 1:

@@ -45,7 +45,7 @@ def read_summary(folder):
 
 
 def is_alive(folder):
-    """Whether the run that writes a folder is alive, None where that cannot be told.
+    """True if the run that writes a folder is alive, None where that cannot be known.
 
     A run holds a lock on its history, which ends with its process, however that ends; not on Windows.
     """
@@ -64,12 +64,12 @@ def is_alive(folder):
 
 
 def fingerprint(folder):
-    """What tells the scene of a folder apart from others, that of an edited ``scene.toml`` among them."""
+    """Key that tells the scene of a folder apart from others, that of an edited ``scene.toml`` among them."""
     return hashlib.sha256((folder / "scene.toml").read_bytes()).hexdigest()
 
 
 def reached(folder):
-    """How far a run came by the last row of its history, in words; None where there is none."""
+    """Position of a run by the last row of its history, in words; None where there is none."""
     try:
         with open(folder / "history.csv", encoding="utf-8") as lines:
             name, *rows = (line.split(",")[0] for line in lines)
@@ -90,7 +90,7 @@ def so_far(folder, summary):
 
 
 def _rows(folder):
-    """How many rows the table of a study has, in words."""
+    """Number of rows of the table of a study, in words."""
     try:
         with open(folder / "results.csv", "rb") as lines:
             count = sum(line.endswith(b"\n") for line in lines) - 1

@@ -1,4 +1,4 @@
-"""What a notebook shows of a scene and of a solution, as HTML."""
+"""Display of a scene and of a solution in a notebook, as HTML."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ PLACE = 1
 
 
 class Probe(NamedTuple):
-    """One scalar of the state to look at.
+    """Scalar of the state that a run follows.
 
     Attributes
     ----------
@@ -135,7 +135,7 @@ def _size(x, q):
 
 
 def plain_of(probe):
-    """What a probe looks at, where that is so plain that a loop does without its kernel.
+    """Quantity of a probe that is so simple that a loop needs no kernel for it.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How far a run is: a bar in a terminal, a line in a notebook, for whatever lasts."""
+"""Progress of a run: a bar in a terminal, a line in a notebook."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LOADING = "loading"
 
 @contextlib.contextmanager
 def followed(progress, text=LOADING):
-    """What a run tells how far it is; shown where somebody looks, for as long as the block lasts.
+    """Show the progress of a run in a terminal or notebook, for as long as the block lasts.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def _compiling(tell):
 
 
 def _in_notebook():
-    """Whether this is the kernel of a notebook."""
+    """Tell if this is the kernel of a notebook."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     return shell is not None and hasattr(shell, "kernel")
 

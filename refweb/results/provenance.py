@@ -1,4 +1,4 @@
-"""What a result was made with: sizes of the web, versions of what solved it."""
+"""Provenance of a result: sizes of the web, versions of the libraries that solved it."""
 
 from __future__ import annotations
 

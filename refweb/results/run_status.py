@@ -1,4 +1,4 @@
-"""How a run ended and what it cost: status, message and time, however it is left."""
+"""End of a run and its cost: status, message and time, however it is left."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..errors import SolverError
 
 @functools.cache
 def _compiling():
-    """What tells how long numba has compiled so far in this process [s]."""
+    """Listener that measures the time of numba's compiling in this process [s]."""
     from numba.core import event
 
     class Compiling(event.Listener):
@@ -45,7 +45,7 @@ class Clock:
         self._cpu, self._wall, self._compiled = _cpu(), time.perf_counter(), _compiling().seconds
 
     def spent(self):
-        """What has passed since, ``cpu_s``, ``wall_s`` and ``compile_s`` [s]."""
+        """Time that has passed since, ``cpu_s``, ``wall_s`` and ``compile_s`` [s]."""
         return {
             "cpu_s": _cpu() - self._cpu,
             "wall_s": time.perf_counter() - self._wall,

@@ -64,7 +64,7 @@ class Result(NamedTuple):
         return self._replace(error=error, within=(max(low, least), min(high, most)) if cut else None)
 
     def plain(self):
-        """As a dict, without the errors that were not looked for; an end of an interval that is infinite is None."""
+        """Convert to a dict, without the errors that were not looked for; an infinite end of an interval is None."""
         extra = {key: value for key in OTHER_ERRORS if (value := getattr(self, key)) is not None}
         if self.where is not None:
             extra["at"] = self.at
@@ -94,7 +94,7 @@ def read_results(given):
 
 @dataclass(eq=False, repr=False)
 class SolutionData:
-    """What is known of a scene that is solved, or being solved.
+    """Data of a scene that is solved, or being solved.
 
     Attributes
     ----------

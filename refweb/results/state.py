@@ -1,4 +1,4 @@
-"""One instant of a net and everything that can be read off it."""
+"""State of a net at an instant, and everything that can be read off it."""
 
 from __future__ import annotations
 

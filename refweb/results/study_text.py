@@ -1,4 +1,4 @@
-"""What a study has found, in words: rows for each result, condition and index, for the console and the page."""
+"""Results of a study in words: rows for each result, condition and index, for the console and the page."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .units import readable, scale_of
 
 
 def on_count(summary):
-    """How many cases there are, and what became of them."""
+    """Number of cases, and their status."""
     words = {
         "solved": "solved",
         "failed": "failed",
@@ -22,7 +22,7 @@ def on_count(summary):
 
 
 def on_design(study):
-    """How the values of a study are chosen, in words."""
+    """Design of a study, in words."""
     varied = ", ".join(f"{path} ({_varied(one)})" for path, one in study["parameters"].items())
     how = {"grid": "each with each", "zip": "one beside the other"}.get(study["sample"])
     if how is None:
@@ -99,7 +99,7 @@ def rows_of_indices(entry):
 
 
 def on_indices(entry):
-    """Why results have no indices, and where ± is not small beside the spread."""
+    """Reason why results have no indices, and warning where ± is not small beside the spread."""
     for name, found in (entry.get("indices") or {}).items():
         if "reason" in found:
             yield f"{name} has no indices: {found['reason']}"
@@ -110,7 +110,7 @@ def on_indices(entry):
 
 
 def on_samples(study):
-    """What intervals are worth with the samples of a study."""
+    """Sentence on the confidence intervals with the samples of a study."""
     if study["sample"] not in ("grid", "zip", "random"):
         yield "samples are evenly spread: intervals are those of as many independent ones, and mostly too wide"
     if study["sample"] == "sobol" and study["count"] & (study["count"] - 1):

@@ -1,4 +1,4 @@
-"""What the summary of a run says, in words: rows of results, load steps and modes, and sentences on the rest.
+"""Summary of a run in words: rows of results, load steps and modes, and sentences on the rest.
 
 A summary is the content of ``run.json``. The console and the page of a run show the same.
 """
@@ -142,7 +142,7 @@ def on_solver(solver):
 
 
 def on_cost(cost):
-    """What a run cost; compiling, which happens once, apart."""
+    """Cost of a run; compiling, which happens once, apart."""
     text = f"{cost['cpu_s']:.2f} s CPU, {cost['wall_s']:.2f} s wall"
     compiling = cost.get("compile_s") or 0.0
     return text + (f", of which compiling {compiling:.1f} s, once" if compiling >= 0.1 else "")
@@ -180,7 +180,7 @@ def _of_throw(one):
 
 
 def _horizon(horizon):
-    """How long a motion is determined."""
+    """Sentence on the horizon of a motion."""
     ended = [(k, time) for k, time in horizon["digits"] if time is not None]
     text = f"a difference of {horizon['perturbation']:.0e} m"
     text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"

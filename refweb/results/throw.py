@@ -97,7 +97,7 @@ class Throw(Table):
             raise InputError(f"target = {shown(self.target)} is not a body, {hint}")
 
     def found(self, observables, rows, state, twin=None, factor=0.0, known=np.inf):
-        """What came of a throw, a dict of dicts for ``run.json``.
+        """Results of a throw, a dict of dicts for ``run.json``.
 
         Parameters
         ----------
@@ -155,7 +155,7 @@ class Throw(Table):
         return {**found, "effective_period": float(ends[1] - ends[0]), "bounds": bounds, "settled": settled}
 
     def _capture(self, state, mouth, largest):
-        """What the net has of the target in a state."""
+        """Capture of the target by the net in a state."""
         net = state.system.net
         (centre,) = (state.position[body.row] for body in net.bodies if body.name == self.target)
         outline, nodes = state.position[net.web.find_around(mouth)], state.position[: len(net.web.points)]
@@ -198,7 +198,7 @@ def _vertex(times, values):
 
 
 def in_hull(points, place):
-    """Whether a place is in the convex hull of points; that of points in a plane has no inside."""
+    """Tell if a position is in the convex hull of points; that of points in a plane has no inside."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

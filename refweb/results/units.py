@@ -68,7 +68,7 @@ def other_errors(results):
 
 
 def place(where, at):
-    """Where a result stands, in words: ``node 1757``; empty where it stands nowhere."""
+    """Position of a result, in words: ``node 1757``; empty where it has none."""
     return "" if where is None else f"{at} {where}"
 
 

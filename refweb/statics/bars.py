@@ -10,7 +10,7 @@ from ..net.net import AXIAL_STIFFNESS
 
 
 class Bars:
-    """What the bars of a net with the tension-only law are at a displacement: arrays over them.
+    """State of the bars of a net with the tension-only law at a displacement: arrays over them.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Bars:
         return np.where(slack, self.stiffness * 2.0 * width**2 / ((root + abs(self._strain)) * root), 0.0)
 
     def besides(self, tension, along):
-        """What other tensions make of the stiffness across the bars, and a stiffness ``along`` them that is added.
+        """Stiffness across the bars by other tensions, and a stiffness ``along`` them that is added.
 
         A block per element, shape (cells, 3 nodes, 3 nodes).
         """

@@ -169,14 +169,14 @@ class _Balance:
         return y
 
     def _unbalanced(self, force):
-        """What forces of the bars leave of the outer ones, shape (rows, 3)."""
+        """Outer forces that the forces of the bars do not balance, shape (rows, 3)."""
         rest = self._outer + self._resultant @ force
         rest[self._system.supported] = 0.0
         return rest
 
 
 def _gaps(bars, force, size):
-    """What each bar adds to the gap [J], for forces of that ``size``."""
+    """Part of each bar in the gap [J], for forces of that ``size``."""
     along = (force * bars.direction).sum(axis=1)
     across = force - along[:, None] * bars.direction
     turned = (across**2).sum(axis=1) / np.where(size + along > 0, size + along, 1.0)

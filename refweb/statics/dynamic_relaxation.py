@@ -147,7 +147,7 @@ class Relaxation:
         return state
 
     def _inverse_mass(self, t):
-        """What forces are multiplied by [m/N], shape (rows, 3): 0 where nothing moves."""
+        """Factor of the forces [m/N], shape (rows, 3): 0 where nothing moves."""
         system = self.system
         rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
         for family in system.at(t).families:

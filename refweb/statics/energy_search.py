@@ -1,4 +1,4 @@
-"""How far to go along a step where forces have a potential: down the energy.
+"""Line search down the energy, for forces with a potential.
 
 Near the end differences of the energy drown in rounding, and the slope, force times step, is looked at instead.
 """

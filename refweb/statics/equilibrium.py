@@ -1,4 +1,4 @@
-"""What an equilibrium is: its state, the residual that it is judged by, and the loads that have none.
+"""Equilibria: their states, the residual by which they are judged, and loads that have none.
 
 An equilibrium exists unless the net can be carried off, a part of it without support in a direction in which the forces
 on it do not balance, or turns too fast, see `refweb.statics.critical_speed`. `check_supported` looks before anything is
@@ -31,7 +31,7 @@ class NotFound(SolverError):
 
 
 class Stability(NamedTuple):
-    """What is known of the stability of an equilibrium.
+    """Stability of an equilibrium, as far as it is known.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Stability(NamedTuple):
 
 @dataclass(eq=False)
 class Equilibrium:
-    """One state of statics.
+    """Equilibrium of one load step.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ def check_supported(system, t):
 
 
 def carried_off(system, t, parts):
-    """Which of some parts the outer forces carry off, and what to do about it, in words; None where they balance."""
+    """Parts that the outer forces carry off, and the remedy, in words; None where forces balance."""
     outer = system.outer_force(t)
     for rows, axis, _ in parts:
         resultant = np.sum(outer[rows, axis])
@@ -141,7 +141,7 @@ def where_nothing_touches(system, t, error):
 
 
 def force_scale(system, t, x, tension):
-    """What residuals are measured against [N]: the largest of nodal load, weight and contact, and of tension.
+    """Scale of residuals [N]: the largest of nodal load, weight and contact, and of tension.
 
     At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
     under loads below 1e-7 EA.

@@ -1,4 +1,4 @@
-"""Where an equilibrium leaves positions open: what floats, in which directions, and how far it can go.
+"""Open positions of an equilibrium: the parts that float, their directions, and their range.
 
 For the tension-only law under dead loads the tensions of taut lines and their directions are unique. Two equilibria
 then differ by translations of *parts*, connected by lines whose tension is proven to be above 0; a part that no support
@@ -121,7 +121,7 @@ def _least_of_each(graph):
 
 
 def between_slack_lines(system, equilibrium):
-    """What floats in an equilibrium with a duality bound, a `Floating`; None where nothing does.
+    """Floating parts of an equilibrium with a duality bound, a `Floating`; None where nothing floats.
 
     A line is taut where the bound proves it: its tension exceeds its error, at each quadrature point.
     """
@@ -165,7 +165,7 @@ class NullSpace:
         self._factor, self._weight = factor, weight
 
     def part(self, p):
-        """What of a displacement of the unknowns costs nothing, shape (n,); None where the factor breaks down."""
+        """Part of a displacement of the unknowns that costs nothing, shape (n,); None where the factor breaks down."""
         for _ in range(2):
             p = self._factor.solve(self._weight @ p)
             if p is None:
@@ -183,7 +183,7 @@ class NullSpace:
         return p
 
     def floating(self, system):
-        """What may move at no cost, a `Floating`; None where nothing does."""
+        """Parts that may move at no cost, a `Floating`; None where there are none."""
         moves = np.zeros((SAMPLES, system.rows, 3))
         for move, p in zip(
             moves, np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, len(system.free))), strict=True

@@ -79,7 +79,7 @@ def by_interior_point(newton, t, x):
 
 
 class InteriorPoint:
-    """One load step of a net, followed along the central path; the lines of it are the bars of `Net.bars`.
+    """Load step of a net, followed along the central path; the lines of it are the bars of `Net.bars`.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class InteriorPoint:
         return tuple(value.copy() for value in (self.x, self._z, self._s, self._y))
 
     def _open(self):
-        """What is left of the equations: of force at rows [N], of tension of bars [N], of the vectors in cones [m]."""
+        """Residuals of the equations: of force at rows [N], of tension of bars [N], of the vectors in cones [m]."""
         force = self._outer + self._bars.T @ self._y[:, 1:]
         pull = self._y[:, 0] - self._stiffness * self._z
         return force, pull, np.column_stack([self._natural + self._z, self._lines()]) - self._s
@@ -167,7 +167,7 @@ class InteriorPoint:
         )
 
     def _go_on(self):
-        """One iteration; whether there was one."""
+        """Iterate once; return True if there was an iteration."""
         if min(_size(self._s).min(), _size(self._y).min()) < NEAREST:
             return False
         scaling = _Scaling(self._s, self._y)
@@ -230,7 +230,7 @@ class InteriorPoint:
 
 
 class _Eliminated:
-    """What W⁻² = a (2 ŵ ŵᵀ − J), ŵ = (w₀, −w), leaves of a line when its extension is eliminated, in sums of one sign.
+    """Terms of W⁻² = a (2 ŵ ŵᵀ − J), ŵ = (w₀, −w), of a line when its extension is eliminated, in sums of one sign.
 
     With k of the line, the extension's pivot k − a + 2 a w₀²; across the line the block is a, along it, unit t = w/|w|,
     a (k (2 w₀² − 1) + a)/(k + a (2 w₀² − 1)).

@@ -1,4 +1,4 @@
-"""How far a part that floats can go: a small convex problem.
+"""Range of a part that floats: a small convex problem.
 
 The equilibria of a net of tension-only lines under dead loads are the translations t of its floating parts that leave
 no slack line longer than it is, c = ½ (L² − |d + t_a − t_b|²) ≥ 0. The largest t of one part along an axis e satisfies,
@@ -25,7 +25,7 @@ SHARE = 0.1
 
 
 class Interval:
-    """How far one part can go along one axis.
+    """Range of one part along one axis.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class Interval:
         return ends if np.isfinite(ends).all() else None
 
     def _farthest(self, sign):
-        """How far it goes along ``sign`` times the axis [m]."""
+        """Largest distance along ``sign`` times the axis [m]."""
         goal, size = np.zeros(self._count), self._longest.max()
         goal[self._goal] = sign
         t, weight, rest = np.zeros(self._count), np.full(len(self._line), 1.0 / size), 0.1 * self._longest**2

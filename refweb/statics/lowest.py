@@ -1,4 +1,4 @@
-"""Whether an equilibrium is the one of the lowest energy, and the lower of two where that is not proven.
+"""Check if an equilibrium has the lowest energy; find the lower of two where that is not proven.
 
 Of a law whose tension rises with the strain ε and is 0 at ε = 0, the energy W(ε) is at least W(max(ε, 0)), which is
 convex in the positions. Under dead loads a state in which no line pushes is the lowest of that convex potential, and so
@@ -101,7 +101,7 @@ def _forces(system, plain):
 
 
 def _above(system, state, forces):
-    """How far a state may lie above the lowest one [J], by forces that balance the loads."""
+    """Bound of the energy of a state above the lowest one [J], by forces that balance the loads."""
     net = system.at(state.step).net
     axial, slackness, smoothing, g0 = map(net.per_bar, (AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0))
     law = Law("smooth")  # which without smoothing is that of lines that only pull

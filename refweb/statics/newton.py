@@ -191,7 +191,7 @@ class Newton:
         return Iterate(x, force, per_cell.tension.copy())
 
     def _scale(self, t, here):
-        """What the residual at an `Iterate` is measured against [N]."""
+        """Scale of the residual at an `Iterate` [N]."""
         return max(self.scale, force_scale(self.system, t, here.x, here.tension))
 
     def _search(self, t, x):
@@ -252,7 +252,7 @@ class Newton:
         return found.y if found.enough and r @ found.y > 0.0 else None
 
     def _can_use_again(self, tension):
-        """Whether a tangent is at hand, and that of lines in tension, without follower or centrifugal forces."""
+        """Tell if a tangent is at hand, and that of lines in tension, without follower or centrifugal forces."""
         return self.factor.held is not None and not (self.follows or self.turns or (tension < 0.0).any())
 
     def _by_factor_at_hand(self, values, b, tolerance):
@@ -261,13 +261,13 @@ class Newton:
         return conjugate_gradients.solve(times, self.factor.precondition, b, tolerance, self.factor.solutions)
 
     def _descends(self, r, p):
-        """Whether p is a step to take: one that exists, leads down, and, in a frame that turns, from no saddle."""
+        """Tell if p is a step to take: one that exists, leads down, and, in a frame that turns, from no saddle."""
         if p is None or self.follows:
             return p is not None
         return r @ p > 0.0 and not (self.turns and self.factor.negative_pivots() > self.drifting)
 
     def _polished(self, t, here, shift, error, scale, stats):
-        """One more step with the factorization at hand, kept where it lowers the residual."""
+        """Take one more step with the factorization at hand, kept where it lowers the residual."""
         r = here.force.ravel()[self.system.free]
         if self._can_use_again(here.tension):
             p = self._by_factor_at_hand(self._matrix(t, here.x, shift, False), r, np.clip(END / error, CLOSE, NEAR)).y

@@ -1,4 +1,4 @@
-"""Where the next load step starts: the last equilibria, extended.
+"""Start of the next load step: the last equilibria, extrapolated.
 
 The displacement of a flat web under a load F goes with F^(1/3), as tension goes with its square and the load with both;
 that of a prestressed web with F. Both are tried, from the last two equilibria and, where the loads are 0 at load step

@@ -1,4 +1,4 @@
-"""What a reader of load steps has to know: each kind of remark once, with the load steps that it is made at."""
+"""Remarks on load steps: each kind of remark once, with the load steps that it is made at."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def open_rows(state, equilibrium):
 
 
 def remark_on_open(state, equilibrium):
-    """What a reader has to know of positions that an equilibrium leaves open; empty where there are none."""
+    """Remark on positions that an equilibrium leaves open; empty where there are none."""
     open_ = open_rows(state, equilibrium)
     if not len(open_):
         return ""
@@ -47,7 +47,7 @@ def remark_on_open(state, equilibrium):
 
 
 def on_stability(state, equilibrium, subject="the equilibrium"):
-    """Whether an equilibrium is stable, and whether there may be others: pairs of a kind and a text."""
+    """Remarks on the stability of an equilibrium, and on other equilibria: pairs of a kind and a text."""
     found = equilibrium.stability
     if found is None:
         return
@@ -70,7 +70,7 @@ def on_stability(state, equilibrium, subject="the equilibrium"):
 
 
 def _way_out(state, found):
-    """What comes of a saddle, and what to do about it."""
+    """Consequence of a saddle, and the remedy."""
     system = state.system
     deflect = "start from a web that is deflected"
     if found.held:
@@ -86,7 +86,7 @@ def _way_out(state, found):
 
 
 def remarks_on(state, stats, utilisation, equilibrium):
-    """Of an equilibrium: pairs of a kind and a text."""
+    """Remarks on an equilibrium: pairs of a kind and a text."""
     net = state.system.net
     for text in floor_remark(net, float(state.stress.max())):
         yield "floor", text
@@ -117,7 +117,7 @@ def remarks_on(state, stats, utilisation, equilibrium):
 
 
 def _bars_push(state):
-    """Whether a line of the linear law pushes, or all lines have it."""
+    """Tell if a line of the linear law pushes, or all lines have that law."""
     bars = state.system.net.laws == LINEAR
     return bool((bars & (state.element_tension < 0.0)).any() or bars.all())
 

@@ -1,4 +1,4 @@
-"""How far to go along a step where forces have no potential: as long as it makes the next step shorter.
+"""Line search for forces without a potential: a step goes as far as it makes the next step shorter.
 
 Loads that turn with the net have no energy to search along. A step p = J⁻¹r, J the tangent with its prestress, is taken
 as long as |J⁻¹r(x + ap)| < |p|, the natural monotonicity test [1]_, a residual in units of displacement that neither
@@ -31,7 +31,7 @@ class ResidualSearch:
         self._system, self._factor, self._t = system, factor, t
 
     def along(self, p, x, r, shift, stats):
-        """As `EnergySearch.along`, with the first a = 1, 1/2, ... that makes the next step shorter."""
+        """Search as `EnergySearch.along`, for the first a = 1, 1/2, ... that makes the next step shorter."""
         system, a, size = self._system, 1.0, np.linalg.norm(p)
         start, y = x.ravel()[system.free], x.copy()
         for _ in range(40):

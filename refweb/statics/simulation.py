@@ -48,7 +48,7 @@ class Simulation:
 
     @property
     def done(self):
-        """How far it came."""
+        """Text that says how far the run came."""
         return f"{len(self.rows)} load steps"
 
     def follow(self, folder, tell):
@@ -69,7 +69,7 @@ class Simulation:
                 self._frame(folder)
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         yield from self._remarks.texts()
         yield from self.system.remarks()
         if self._passage is not None and self.rows:
@@ -78,7 +78,7 @@ class Simulation:
             yield f"lines may have passed through lines: {self._lines.why}"
 
     def _smoothing(self):
-        """What finds the error of smoothing, None where there is none to be found."""
+        """Function that finds the error of smoothing, None where there is none to be found."""
         scene = self.scene
         smooth = (self.system.net.laws == SMOOTH).any()
         if not smooth or scene.solve.method != "newton" or scene.accuracy.error == "none":

@@ -28,7 +28,7 @@ class Smoothing:
         self._newton = Newton(at_rest(self._system))
 
     def errors(self, equilibrium, values):
-        """Of each value in an equilibrium its distance from the value at η → 0; None where that was not found."""
+        """Distance of each value in an equilibrium from the value at η → 0; None where that was not found."""
         try:
             found = self._newton.solve(equilibrium.step, equilibrium.x, warm=True, most=60)
         except SolverError:

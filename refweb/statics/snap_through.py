@@ -1,4 +1,4 @@
-"""Whether a web of lines that can push may turn over, and have another equilibrium on another side.
+"""Check if a web of lines that can push may turn over, and have another equilibrium on another side.
 
 Such a web snaps through a state in which lines push. Which side of that an equilibrium is on, its own tensions do not
 say: pushed on the near side, the lines pull on the far one. So the web is looked at where unit tensions alone would
@@ -19,7 +19,7 @@ SHORTER = 1e-9
 
 
 def may_turn_over(rest, equilibrium):
-    """Whether lines that push without limit, which is how bars are, do so in an equilibrium, or might in another.
+    """Tell if lines that push without limit, as bars do, push in an equilibrium, or might in another.
 
     Parameters
     ----------

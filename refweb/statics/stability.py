@@ -1,4 +1,4 @@
-"""Whether an equilibrium is stable: whether a small disturbance of it grows by itself.
+"""Stability of equilibria: a small disturbance grows by itself, or it does not.
 
 With K = −∂f/∂x, C = −∂f/∂v and the mass M, disturbances are those of
 
@@ -109,7 +109,7 @@ def by_pivot(sign):
 
 
 class Question:
-    """Whether an equilibrium is stable; K is assembled where nothing else says it.
+    """Question of the stability of an equilibrium; K is assembled where nothing else decides it.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class Question:
 
     @property
     def _symmetric(self):
-        """Whether K is symmetric but for rounding."""
+        """Tell if K is symmetric but for rounding."""
         values, _, skew = self._parts
         return abs(skew).max(initial=0.0) <= ROUNDING * abs(values).max(initial=0.0)
 
@@ -177,7 +177,7 @@ class Question:
     # Matrices of the unknowns with mass
 
     def _massive(self):
-        """Which unknowns have mass, shape (n,)."""
+        """Mask of the unknowns with mass, shape (n,)."""
         return self.rest.mass.values[self.rest.pattern.diagonal] > 0.0
 
     def _velocity(self):
@@ -215,7 +215,7 @@ class Question:
     # Answers
 
     def _in_frame(self, what):
-        """Of a K that does not hold the web in a frame that turns."""
+        """Stability by a K that does not hold the web in a frame that turns."""
         if len(self.rest.free) > DENSE:
             slow = self._slowest(self._lu, self._velocity())
             grows = slow is not None and slow.grows.any()
@@ -225,7 +225,7 @@ class Question:
         return Stability(-1, what) if growth > 0.0 else Stability(-1, what, held=True)
 
     def _unsymmetric(self, solver):
-        """Of a K that is not symmetric."""
+        """Stability by a K that is not symmetric."""
         if len(self.rest.free) > DENSE:
             return self._of_many(solver)
         K, C, stands = self._reduced()
@@ -292,7 +292,7 @@ class Question:
         return (abs(self.rest.pattern.matrix(self._parts[0])).sum(axis=1) / M.diagonal()).max()
 
     def _damps(self, C, M):
-        """Whether C is symmetric and above α M, so that nothing grows; of lumped mass, which nothing lacks."""
+        """Tell if C is symmetric and above α M, so that nothing grows; of lumped mass, which nothing lacks."""
         if C is None or abs(C - C.T).max() > ROUNDING * abs(C).max():
             return False
         if not self._massive().all() or self.rest.net.consistent_minus_lumped is not None:
@@ -306,7 +306,7 @@ class Question:
 
 
 def _flutter(growth):
-    """What a vibration that grows is called."""
+    """Name of a vibration that grows."""
     return f"flutter: a vibration grows, by {growth:.2g} 1/s"
 
 
@@ -321,7 +321,7 @@ def _eigenvalues(A):
 
 
 def _negative(found, off):
-    """Which eigenvalues are real and negative."""
+    """Mask of the eigenvalues that are real and negative."""
     return (found.real < -off) & (abs(found.imag) <= off)
 
 

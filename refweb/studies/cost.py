@@ -1,4 +1,4 @@
-"""What digits cost, as a value: all runs, their references, the price of digits in words, and the result folder."""
+"""Cost of digits as a value: all runs, their references, the price of digits in words, and the result folder."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Cost:
 
     @property
     def sentence(self):
-        """What digits cost, in words."""
+        """Cost of digits, in words."""
         return " ".join(_sentence(self))
 
     def price(self, digits, method=None):
@@ -157,7 +157,7 @@ def _sentence(found):
 
 
 def _prices(found):
-    """What digits cost."""
+    """Prices of digits."""
     best = {}
     for digits in DIGITS:
         if (trial := found.price(digits)) is not None:
@@ -173,7 +173,7 @@ def _prices(found):
 
 
 def _agreement(found):
-    """How far the references agree, and what that is worth."""
+    """Agreement of the references, and its meaning."""
     one, other = (f"{t.method} ({t.setting})" for t in found.references)
     agreed, known = (
         max(-math.log10(max(off / found.scale, 1e-16)), 0.0) if found.scale else 0.0

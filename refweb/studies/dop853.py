@@ -14,7 +14,7 @@ NAME, TOLERANCES = "dop853", (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 
 
 class Followed(NamedTuple):
-    """What DOP853 has come to.
+    """State of a run of DOP853.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a reader of natural frequencies has to know: of each equilibrium, and what the modes leave out."""
+"""Remarks on natural frequencies: on each equilibrium, and on effects that the modes leave out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .pencil import STRAIN
 
 
 def remarks_on(here, state, equilibrium):
-    """What a reader of the modes of an equilibrium has to know: pairs of a kind and a text."""
+    """Remarks on the modes of an equilibrium: pairs of a kind and a text."""
     net = state.system.net
     if here.unstable:
         yield (
@@ -32,7 +32,7 @@ def remarks_on(here, state, equilibrium):
 
 
 def left_out(system):
-    """What the modes of a system leave out."""
+    """Effects that the modes of a system leave out."""
     if any(family.damping is not None and family not in system.rotating for family in system.families):
         yield "forces that depend on velocity, such as damping, are left out"
     if free := [body.name for body in system.net.bodies if not body.fixed]:

@@ -196,7 +196,7 @@ def _results(here):
 
 
 def _described(here):
-    """What ``run.json`` says of a spectrum besides its frequencies."""
+    """Data of a spectrum for ``run.json`` besides its frequencies."""
     names = ("squared", "bound", "residual", "modal_mass", "shares", "moving")
     return {"unstable": here.unstable, "zero": here.zero, **{name: getattr(here, name).tolist() for name in names}}
 

@@ -1,4 +1,4 @@
-"""How long a motion is determined: a twin that starts a little beside it.
+"""Horizon of a motion: a second run starts a little beside the first.
 
 A slack net is chaotic: the smallest difference grows, and at some time no digit of a position is left. The twin starts
 with every free unknown moved at random by up to `PERTURBATION` of the shortest element, and is solved with the same
@@ -19,7 +19,7 @@ PERTURBATION = 1e-12
 
 
 def horizon(simulation, results, ensemble=None, tell=None):
-    """What grows of a small difference.
+    """Find the growth of a small difference.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def horizon(simulation, results, ensemble=None, tell=None):
 
 
 def _integrator(simulation):
-    """One of the accuracy that the simulation has come to."""
+    """Integrator of the accuracy that the simulation has come to."""
     return simulation.integrator_at(simulation.standing.knob)
 
 

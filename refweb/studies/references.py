@@ -1,4 +1,4 @@
-"""What errors are measured with: of the finest runs of all methods, the two of different kinds that agree best.
+"""References of errors: of the finest runs of all methods, the two of different kinds that agree best.
 
 No method alone can set a reference. With one of the two all others are compared, and their difference is how far any
 error can be trusted. Where all finest runs are about as far apart, as they are where motions are chaotic, the best

@@ -164,14 +164,14 @@ def _described(pencil, squared, bound, residual, vectors, unstable, zero):
 
 
 def _rounding(pencil, vectors):
-    """What the rounding of K may make of ω²."""
+    """Effect of the rounding of K on ω²."""
     size = abs(vectors)
     rounding = 8.0 * (size * (abs(pencil.K) @ size)).sum(axis=0)
     return np.finfo(float).eps * (rounding + 2.0 * (vectors.conj() * (pencil.strained @ vectors)).sum(axis=0).real)
 
 
 def _left(pencil, vectors):
-    """What the error that is left in the equilibrium may make of ω²: K changes by another Newton step."""
+    """Effect of the error of the equilibrium on ω²: K changes by another Newton step."""
     system, there = pencil.system, pencil.x.copy()
     there.ravel()[system.free] += pencil.moved(system.force(pencil.t, pencil.x).ravel()[system.free])
     change = pencil.change(there)

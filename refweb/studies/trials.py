@@ -1,4 +1,4 @@
-"""One scene by every method that takes it, each from coarse to fine: what `refweb.studies.work_precision` compares.
+"""Trials of one scene by every method, each from coarse to fine, for `refweb.studies.work_precision`.
 
 A `Trial` is a method at one setting. The methods of dynamics are those of `refweb.registry.INTEGRATORS`, in all their
 `refweb.dynamics.integrators.integrator.Variant` s, and scipy's DOP853. They run with one probe, the observable, and
@@ -148,7 +148,7 @@ def dynamic_ladders():
 
 
 def label_of(solve):
-    """What the method of a `refweb.Dynamic` is called among the trials."""
+    """Name of the method of a `refweb.Dynamic` among the trials."""
     for label, variant in _variants(solve.method).items():
         if all(getattr(solve, key) == value for key, value in variant.keys.items()):
             return label

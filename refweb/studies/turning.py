@@ -207,7 +207,7 @@ def _all(gyroscopic, wanted, solve, attempt):
 
 
 def _some(gyroscopic, wanted, solve, attempt):
-    """As `_all`, by Lanczos iteration."""
+    """Solve as `_all`, by Lanczos iteration."""
     M, G, size = gyroscopic.M, gyroscopic.own, gyroscopic.M.shape[0]
     pencil, weigh = gyroscopic.pencil, gyroscopic._weigh
 

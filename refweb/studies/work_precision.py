@@ -1,4 +1,4 @@
-"""What digits cost: every method on one scene, its errors against its CPU time.
+"""Work and precision: every method on one scene, its errors against its CPU time.
 
 Trials of all methods, from coarse to fine, run within a budget, see `refweb.studies.budget`. Errors are differences to
 one of two references of different kinds, see `refweb.studies.references`; where there are runs of one kind alone, that
@@ -93,7 +93,7 @@ def cost(
 
 
 def _observable(scene, name):
-    """What is compared: the observable of a name, or the first that the state of an instant alone determines."""
+    """Observable of a name, or the first that the state of an instant alone determines."""
     if name is None:
         return next(o for o in (*scene.observables, *default()) if not (o.observable.booked or o.average))
     names = {o.name: o for o in scene.observables}

@@ -54,7 +54,7 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of a case: cells of its row, the content of its ``run.json``, its result folder as an archive."""
+    """Outcome of a case: cells of its row, the content of its ``run.json``, its result folder as an archive."""
 
     key: str
     cells: dict
@@ -197,7 +197,7 @@ def cells_of(summary):
 
 
 def kept_files(folder, job_key):
-    """Where a study keeps the ``run.json`` and the result folder of a case."""
+    """Paths where a study keeps the ``run.json`` and the result folder of a case."""
     cases = pathlib.Path(folder) / "cases"
     return cases / f"{job_key}.json", cases / job_key
 

@@ -1,4 +1,4 @@
-"""What the rows of a study say together: spread and numerical ± apart, chances with their confidence intervals.
+"""Statistics of the rows of a study: spread and numerical ± apart, probabilities with their confidence intervals.
 
 Two things are not known of the mean of a result. One is which cases there might have been: that is the spread, and its
 share in the mean falls with the number of samples. The other is how far the solution of each case is from the truth:
@@ -33,7 +33,7 @@ UNDONE = ("skipped", "waiting")
 
 
 def chances(study, rows, columns, names):
-    """What rows say together.
+    """Statistics of rows.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def bounds(row, results, values, sampled):
 
 
 def _share(study, condition, results, cases, sampled):
-    """Of how many cases a condition holds, and of samples its probability.
+    """Share of the cases for which a condition holds, and of samples its probability.
 
     ``true`` and ``false`` count cases that are decided whatever ± does, ``undecided`` those that it or the spread of
     an ensemble leaves open, and ``failed`` those without a result; ``unproven`` of the decided have a result without ±,

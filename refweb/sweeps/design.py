@@ -25,7 +25,7 @@ KEY = 16
 
 
 class Case(NamedTuple):
-    """One of the cases of a study.
+    """Case of a study.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ def cases_of(study, base):
 
 
 def key_of(scene, known=None):
-    """What tells a scene apart from all others, by whatever its results depend on.
+    """Key that tells a scene apart from all others, by whatever its results depend on.
 
     That is all of its tables with their defaults, the content of files that it reads, and the version of refweb; not
     its title, which a page or plot has and no result.

@@ -172,7 +172,7 @@ class Expression:
                 self._check(one, depth + 1)
 
     def __call__(self, values):
-        """Whether it holds of values by name: true, false, or None where intervals leave that undecided.
+        """Evaluate with values by name: true, false, or None where intervals leave that undecided.
 
         Raises
         ------
@@ -243,7 +243,7 @@ def _number(value):
 
 
 def _compared(op, a, b):
-    """Whether a comparison holds of all values, of none (false), or of some (None)."""
+    """Result of a comparison: true for all values, false for none, None for some."""
     if isinstance(op, ast.Eq | ast.NotEq):
         if isinstance(a, Interval) and isinstance(b, Interval):
             same = None if max(a.low, b.low) <= min(a.high, b.high) else False

@@ -1,4 +1,4 @@
-"""What a study is: a scene, the values in it that vary, how they are chosen, and what is asked of the results."""
+"""Studies: a scene, the values in it that vary, how they are chosen, and the results that are asked for."""
 
 from __future__ import annotations
 
@@ -48,14 +48,14 @@ class Distribution(NamedTuple):
 
     @property
     def frozen(self):
-        """That of `scipy.stats`, with its parameters."""
+        """Frozen distribution of `scipy.stats`, with its parameters."""
         from scipy import stats
 
         return getattr(stats, self.name)(**dict(self.keys))
 
     @property
     def discrete(self):
-        """Whether its values are whole numbers."""
+        """True if its values are whole numbers."""
         from scipy import stats
 
         return isinstance(getattr(stats, self.name), stats.rv_discrete)

@@ -1,4 +1,4 @@
-"""What a study has found, as a value: its rows, what they say together, and its ``run.json``."""
+"""Results of a study as a value: its rows, their statistics, and its ``run.json``."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Sweep:
 
     @property
     def count(self):
-        """How many rows have which status, a dict."""
+        """Number of rows of each status, a dict."""
         found = dict.fromkeys(("solved", "failed", "refused", "lost", "skipped", "waiting"), 0)
         for row in self.rows:
             found[row["status"]] += 1

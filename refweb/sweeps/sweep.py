@@ -239,7 +239,7 @@ class Kept:
             )
 
     def has(self, case):
-        """Whether a case has its row, and what it is to keep besides."""
+        """Tell if a case has its row, and the files that it is to keep besides."""
         row = self.rows.get(case.key)
         if row is None:
             return False
@@ -293,7 +293,7 @@ class Kept:
 
 
 def _check_folder(folder):
-    """Whether a folder holds a study already; refuses one that holds something else or cannot be written."""
+    """Tell if a folder holds a study already; refuse one that holds something else or cannot be written."""
     path = pathlib.Path(folder)
     if path.is_dir() and (read_summary(path) or {}).get("kind") == "sweep":
         if is_alive(path):

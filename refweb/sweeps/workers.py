@@ -1,4 +1,4 @@
-"""Who runs cases: processes of this machine, or any `concurrent.futures.Executor`, whose workers may die.
+"""Workers of cases: processes of this machine, or any `concurrent.futures.Executor`, whose workers may die.
 
 `through` hands jobs out and yields what comes of them, each once. A worker that dies takes with it whatever it was
 doing. What was in its hands is then tried again, one job at a time, so that one that kills its worker is told from
@@ -179,7 +179,7 @@ def cluster(address):
 
 
 def through(jobs, workers):
-    """What comes of jobs, each once, as it comes.
+    """Results of jobs, each once, in the order in which they come.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What nodes that bodies carry add to the tangent: they are no unknowns, but move with these.
+"""Tangents of attached nodes: they are no unknowns, but move with their bodies.
 
 With δx = δx_b + δθ × a of a node at the arm a, a force f on it is a force and the moment a × f on the body. A block of
 a cell that has such a node becomes L K T, T being what moves the cell's nodes and L what gathers their forces; and as
@@ -108,7 +108,7 @@ class Carried:
         self._entries = [_entries(cell.rows, pattern.size, number, keys) for cell in self._cells]
 
     def _state(self, x, v):
-        """Of each node its arm, and of its body ω, W, u and δθ by the quaternion, (3, 4) from that behind on."""
+        """Arm of each node, and ω, W, u and δθ by the quaternion of its body, (3, 4) from that behind on."""
         found = []
         for c, (_, n) in enumerate(self.turns.carried):
             _, spin, turn = self.turns.rows[n]

@@ -12,7 +12,7 @@ from ..net.net import AXIAL_STIFFNESS
 
 
 class Breaks(NamedTuple):
-    """What has broken, in the order in which it did.
+    """Broken lines, in the order in which they broke.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What bodies feel of contact: its force on each, how deep lines are in each, and how deep pairs are in each other.
+"""Contact of bodies: its force on each, the depth of lines in each, and the depth of pairs in each other.
 
 Each contact shows, in its cell, how deep it is and the force on the body that it touches, where two bodies touch that
 on the second of them, see `refweb.effects.base.Family.felt`. What a body feels is the sum over its cells, and nothing
@@ -20,7 +20,7 @@ of its first pair where it is the push of bodies, else −1; and where the numbe
 
 
 class ContactForces:
-    """What bodies of a system feel: a row for each of its rows behind the nodes, then one for each pair of bodies.
+    """Contact of the bodies of a system: a row for each row behind the nodes, then one for each pair of bodies.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class ContactForces:
         return [row for row in found if row is not None]
 
     def of(self, per_cell):
-        """What bodies feel where families show ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
+        """Contact of bodies where families write ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
         felt = np.empty((self.rows, FELT_COLUMNS))
         forget(felt)
         none = np.empty((0, 1), dtype=np.int32)

@@ -347,7 +347,7 @@ class Lu:
 
     @property
     def singular(self):
-        """Whether a pivot is exactly 0."""
+        """True if a pivot is exactly 0."""
         return self._solver is None
 
     def sign_of_determinant(self):
@@ -365,7 +365,7 @@ class Lu:
 
 
 def _is_odd(turned):
-    """Whether an odd number of exchanges makes a permutation."""
+    """Tell if an odd number of exchanges makes a permutation."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

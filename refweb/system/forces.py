@@ -1,4 +1,4 @@
-"""What an evaluation of all forces leaves: their sum on every row, and what each family observes per cell."""
+"""Result of an evaluation of all forces: their sum on every row, and the values of each family per cell."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..effects.base import TENSION
 
 
 class PerCell(list):
-    """What each family observes per cell, an array beside each of `System.families`.
+    """Values of each family per cell, an array beside each of `System.families`.
 
     Attributes
     ----------

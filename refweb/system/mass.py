@@ -69,7 +69,7 @@ class Mass:
 
     @cached_property
     def _consistent_minus_lumped(self):
-        """Of all rows, a sparse matrix [kg]; None where mass is lumped."""
+        """Difference of consistent and lumped mass of all rows, a sparse matrix [kg]; None where mass is lumped."""
         from scipy.sparse import coo_array
 
         net, rows = self._net, len(self._net.mass)
@@ -80,7 +80,7 @@ class Mass:
         return coo_array((net.consistent_minus_lumped.ravel(), pairs), shape=(rows, rows)).tocsr()
 
     def passed_on(self, acceleration):
-        """What consistent mass hands from row to row, consistent less lumped M of an acceleration [N], (rows, 3)."""
+        """Force of consistent less lumped M times an acceleration [N], (rows, 3)."""
         return self._consistent_minus_lumped @ acceleration
 
     def kick(self, jump):

@@ -1,4 +1,4 @@
-"""One fixed sparsity pattern for the tangent of a net."""
+"""Fixed sparsity pattern of the tangent of a net."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class Pattern:
 
     @cached_property
     def _lower_pattern(self):
-        """As `_upper_pattern`, of the lower triangle where unknowns are counted from the last one on: its upper one."""
+        """Pattern of the lower triangle with unknowns counted from the last one on, see `_upper_pattern`."""
         ends = np.searchsorted(self._columns[self.lower], np.arange(self.size + 1))
         starts = len(self.lower) - ends[::-1]
         return self.size - 1 - self.indices[self.lower][::-1], starts.astype(np.int32)

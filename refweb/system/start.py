@@ -1,4 +1,4 @@
-"""Where a system starts, as its effects and bodies have it."""
+"""Start of a system, as its effects and bodies have it."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ class System:
 
     @cached_property
     def library(self):
-        """What factorizes its symmetric matrices, a `refweb.system.factorization.Library`."""
+        """Library that factorizes its symmetric matrices, a `refweb.system.factorization.Library`."""
         from .factorization import Library
 
         return Library(self._factorization)
@@ -114,7 +114,7 @@ class System:
         return self.library.why if "library" in self.__dict__ else None
 
     def remarks(self):
-        """What a reader of results has to know of their factorizations, each a text."""
+        """Remarks on the factorizations, each a text."""
         return self.library.remarks if "library" in self.__dict__ else []
 
     @cached_property
@@ -185,7 +185,7 @@ class System:
 
     @property
     def working(self):
-        """Of each family 1 if its power counts as work, −1 if its power is energy lost, else 0."""
+        """Sign of each family: 1 if its power counts as work, −1 if its power is energy lost, else 0."""
         signs = {"work": 1, "dissipated_energy": -1}
         return np.array([signs[f.book] if f.power is not None else 0 for f in self.families], dtype=np.int64)
 
@@ -297,7 +297,7 @@ class System:
         return Forces(force, per_cell)
 
     def row_name(self, row):
-        """How a message calls a row: a node by its number, a body by its name."""
+        """Name of a row in messages: a node by its number, a body by its name."""
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
     def energy_of(self, family, t, x):
@@ -331,34 +331,34 @@ class System:
 
     @property
     def symmetric(self):
-        """Whether K and C are symmetric."""
+        """True if K and C are symmetric."""
         return all(f.symmetric for f in self.families) and not self.carried.any()
 
     @cached_property
     def turning(self):
-        """Whether there are bodies whose orientation counts."""
+        """True if there are bodies whose orientation counts."""
         return any(body.turn is not None for body in self.net.bodies)
 
     @property
     def conservative(self):
-        """Whether every force has a potential."""
+        """True if every force has a potential."""
         return self.symmetric and all(f.energy is not None for f in self.families)
 
     @property
     def dead(self):
-        """Whether the only internal forces are the tensions of the lines, and all others are dead loads."""
+        """True if the only internal forces are the tensions of the lines, and all others are dead loads."""
         outer = [f for f in self.families if not f.internal]
         inner = [f for f in self.families if f.internal]
         return all(f.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
 
     @property
     def convex(self):
-        """Whether the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
+        """True if the potential is convex and the loads are dead: `refweb.statics.duality_bound` then bounds errors."""
         return bool((self.net.laws == TENSION_ONLY).all()) and self.dead
 
     @property
     def contact(self):
-        """Whether the web may touch bodies."""
+        """True if the web may touch bodies."""
         return any(family.contact for family in self.families)
 
     @cached_property

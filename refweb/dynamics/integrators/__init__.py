@@ -1,4 +1,4 @@
-"""One system through time, seen by probes; it knows no scene, no files and no errors of results.
+"""Integrators: a system through time, seen by probes; they know no scene, no files and no errors of results.
 
 How to write an integrator
 --------------------------

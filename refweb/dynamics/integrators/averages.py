@@ -39,7 +39,7 @@ NEAR = 1e-12
 
 
 class Windows(Record):
-    """What means are asked for.
+    """Windows of the averages that are asked for.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Windows(Record):
 
 
 class Averages(Record):
-    """What is known of means at the last look.
+    """State of the averages at the last inspection.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ def coefficients(values, smooth):
 
 @kernel()
 def open_share(values):
-    """What the integral over a step leaves open, over the length of the step, by values at the ends of its parts.
+    """Uncertainty of the integral over a step, over the length of the step, by values at the ends of its parts.
 
     The fourth difference is what halving the step changes in Simpson's rule. Of a smooth value Boole's rule is better
     by the square of the step, which is what differences fall with from the second to the fourth; at a kink, where they
@@ -147,7 +147,7 @@ def open_share(values):
 
 @kernel()
 def open_mean(n, windows, averages):
-    """What the mean at the last look leaves open."""
+    """Uncertainty of the mean at the last inspection."""
     t, passed, width = averages.looked[0], averages.passed[n], windows.widths[n]
     if passed < CELLS:
         return averages.open[n] / t if t > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Whether bodies have come to the middle of each other in a step of any method, on its interpolant.
+"""Check if bodies have come to the middle of each other in a step of any method, on its interpolant.
 
 Pieces of steps are taken as `refweb.dynamics.integrators.line_line_ccd` takes them. In a piece two bodies come nearer
 by no more than their places do, and what points of either move by as it turns. Where that and their depth at its start
@@ -61,7 +61,7 @@ class FollowedPairs(Followed):
         return None
 
     def _nearer(self, pair, way):
-        """By how much two bodies come nearer on a way, at most [m]."""
+        """Largest decrease of the distance of two bodies along a path [m]."""
         one, other = pair
         turned = sum(
             2.0 * body.extent * np.hypot(np.linalg.norm(way[body.spin]), way[body.turn, 0])
@@ -71,7 +71,7 @@ class FollowedPairs(Followed):
         return float(np.linalg.norm(way[one.row] - way[other.row]) + turned)
 
     def _apart(self, pair, x):
-        """What the balls around two bodies are apart [m], below 0 where they overlap."""
+        """Distance of the balls around two bodies [m], below 0 where they overlap."""
         one, other = pair
         places = [self._net.points[body.row] + x[body.row] for body in pair]
         return float(np.linalg.norm(places[0] - places[1])) - one.extent - other.extent

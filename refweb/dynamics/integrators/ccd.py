@@ -1,4 +1,4 @@
-"""What keeps lines from passing: each drift of an explicit step is looked at before it is taken.
+"""Continuous collision detection: each drift of an explicit step is checked before it is taken.
 
 In a drift rows move in straight lines, behind the kick that gives them their velocities. Lines whose overlap and the
 way by which two rows may come nearer are together less than the distance of touch cannot meet. Where they are not, the
@@ -103,7 +103,7 @@ class Ccd(Record):
 
     @classmethod
     def of(cls, system):
-        """That of a system."""
+        """Make the record of a system."""
         found = [i for i, family in enumerate(system.families) if family.crossing is not None]
         own, near = [system.families[i].crossing for i in found], near_of(system)
         return cls(
@@ -205,7 +205,7 @@ def way_among(drift, kick, v, f, inverse):
 
 @kernel(leaf=True, apart=("guard",))
 def open_ahead(kick: float, drift: float, model: Model, running: Running) -> bool:
-    """Whether a drift behind a kick leads no further than the last look found open; rows are seen as going it then.
+    """Tell if a drift behind a kick stays within the distance that the last check found free, and use it up.
 
     The largest component of a velocity is written to the skin of what is near.
     """
@@ -243,7 +243,7 @@ def deepest_of(shown):
 
 @kernel(leaf=True, apart=("walls",))
 def calm(walls: BodyCcd, nearby: NeighbourList, families: Families) -> bool:
-    """Whether a drift behind another need not be looked at before, for bodies alone that do not turn."""
+    """Tell if a drift behind another needs no check before, for bodies alone that do not turn."""
     skin, left = nearby.skin[0], math.inf
     for m in range(walls.families.size):
         deep = deepest_of(families.outs[walls.families[m]])
@@ -272,7 +272,7 @@ def look_back_at_drift(time, model, running):
 
 @kernel(leaf=True, forceinline=True)
 def passes(time, kick, drift, stages, model, running):
-    """Whether the last drift of a step, behind a kick and some ``stages``, is not to be taken, see `comes_through`.
+    """Tell if the last drift of a step, behind a kick and some ``stages``, must be rejected, see `comes_through`.
 
     What a look finds open does for drifts in which rows go as their velocities say.
     """
@@ -287,7 +287,7 @@ def passes(time, kick, drift, stages, model, running):
 
 @kernel(forceinline=True)
 def reject_step(time, h, model, running):
-    """Whether a step of several drifts, of size h, is not to be begun."""
+    """Tell if a step of several drifts, of size h, must not begin."""
     if model.guard.families.size + model.walls.families.size == 0:
         return False
     return comes_through(time, 0.5 * h, h, FORESEEN, model, running)
@@ -295,7 +295,7 @@ def reject_step(time, h, model, running):
 
 @kernel(apart=("guarded",))
 def comes_through(time: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
-    """Whether lines would pass in a drift behind a kick, from a time on: each other, or the middle of a body.
+    """Tell if lines would pass through each other or a body's middle in a drift behind a kick, from a time on.
 
     What is ``then`` is one of `TOLD`, `KEPT_APART` and `FORESEEN`.
     """
@@ -316,7 +316,7 @@ def comes_through(time: float, kick: float, drift: float, then: int, model: Mode
 
 @kernel(apart=("guard",))
 def passes_lines(time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
-    """Whether lines that push each other would meet; where the drift is taken, it is found what is open behind it."""
+    """Tell if lines that push each other would meet; where the drift is taken, find the free distance behind it."""
     guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
     inverse, left = model.inertia.inverse, math.inf
     for m in range(guard.families.size):
@@ -344,7 +344,7 @@ def passes_lines(time: float, way: float, kick: float, drift: float, then: int, 
 def passes_bodies(
     time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running
 ) -> bool:
-    """Whether lines would come as deep in a body as its middle."""
+    """Tell if lines would come as deep in a body as its middle."""
     walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
     inverse, room = model.inertia.inverse, 0.0
     if model.inertia.turns.moment.size:

@@ -139,7 +139,7 @@ class CentralDifference(Integrator):
         return len(self.drifts) * self.finer * max(duration / step, float(corners))
 
     def spent(self, course):
-        """What a course has spent, for ``run.json``.
+        """Statistics of a course, for ``run.json``.
 
         The evaluations are those of forces that follow from displacement: others are evaluated more often in a step.
         What the first step is looked at inside with is not counted.
@@ -294,14 +294,14 @@ class CentralDifference(Integrator):
         return history
 
     def _way_out(self, x, step):
-        """What to do about too short a step [s]: speeds ask for it where at rest it would be over twice as long."""
+        """Remedy for too short a step [s]: velocities ask for it where at rest it would be over twice as long."""
         if self.bound(x) * self.safety * self.stretch > 2.0 * step:
             told = "nothing may pass through a body in one, at the speeds there are"
             return f"{told}; use a thicker body, slower ones or less damping"
         return "ask for shorter rows, or lower the stiffness, damping or friction that asks for the step"
 
     def _again(self, course, before, running):
-        """What takes steps from ``before`` [s] again: ``after(state, begun, count)``.
+        """Function that takes steps from ``before`` [s] again: ``after(state, begun, count)``.
 
         That is the state (3, rows, 3) which is ``count`` steps behind one that ``begun`` steps have led to.
         """

@@ -1,4 +1,4 @@
-"""What bodies feel of contact, as the compiled loop has it: the sum over the cells that are near in a step."""
+"""Contact forces on bodies in the compiled loop: the sum over the cells that are near in a step."""
 
 from __future__ import annotations
 

@@ -125,11 +125,11 @@ class Cvode(Sundials):
             self._factorize_step(gamma)
 
     def _nothing_moves(self, yp, gamma):
-        """Whether all that accelerations change within a step is far below the tolerance, as before a first contact."""
+        """Tell if accelerations change nothing within a step beyond the tolerance, as before a first contact."""
         return gamma * gamma * np.abs(yp[self.unknowns :]).max(initial=0.0) <= STILL * self.atol_position
 
     def _short(self, gamma):
-        """Whether corrector iterations converge well without a matrix, by a bound on γ|J| where anything moves."""
+        """Tell if corrector iterations converge well without a matrix, by a bound on γ|J| where anything moves."""
         if self._still:
             return True
 

@@ -1,4 +1,4 @@
-"""Where the energy of an explicit step does not close: the cell whose energy changes by other than its forces' work.
+"""Source of an energy drift: the cell whose energy changes by other than its forces' work.
 
 A kick, a drift and a kick change the kinetic energy by ½ (f₀ + f₁)·Δx of all forces at both ends of the drift, but for
 what two steps in turn give back. So what a cell leaves open in a step is ΔE + ½ (f₀ + f₁)·Δx, with f = −∂E/∂x its own
@@ -44,7 +44,7 @@ def source_of(system, places):
 
 
 def name_of(system, family, cell):
-    """What a cell of a family is of."""
+    """Name of the item that a cell of a family belongs to."""
     if family.pairs:
         return " and ".join(f'body "{body.name}"' for body in family.pairs[cell])
     if family.lines or family.elements is not None:

@@ -69,7 +69,7 @@ def event_rows(events):
 
 @kernel()
 def crosses(event, value):
-    """Whether an event happens with this value; notes the side it is on."""
+    """Tell if an event happens with this value, and record the side it is on."""
     side = 1.0 if value > event.level else -1.0
     before, event.side = event.side, side
     return side != before and (side > 0.0 or event.rising == 0)
@@ -113,7 +113,7 @@ def note_events(
 
 @kernel()
 def ended_by(events):
-    """Whether an event has ended the run."""
+    """Tell if an event has ended the run."""
     for e in range(events.shape[0]):
         if events[e].stop and events[e].time < math.inf:
             return True

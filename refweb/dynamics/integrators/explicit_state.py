@@ -1,4 +1,4 @@
-"""Where an explicit run is."""
+"""State of an explicit run."""
 
 from __future__ import annotations
 

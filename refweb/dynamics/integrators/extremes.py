@@ -106,7 +106,7 @@ def time_of_top(extremes, i, sign):
 
 @kernel()
 def correction(extremes, i, sign, t, value, smooth):
-    """What a value between the last three looks exceeds theirs by or, ``smooth``, differs from their parabola by."""
+    """Excess of a value between the last three inspections or, ``smooth``, its difference from their parabola."""
     recent = extremes.recent[i]
     if smooth:
         (slope, curve), late = parabola(extremes, i), t - extremes.looked[1]
@@ -184,7 +184,7 @@ def look(
 
 @kernel(apart=("books",))
 def look_at_sums(t: float, total: Vector, observed: Observed, extremes: Extremes, ending: bool) -> bool:
-    """As `look`, at sums of the energies ``total``; the time is to be noted before."""
+    """Inspect sums of the energies ``total`` as `look` does; the time is recorded before."""
     first, signs, turned = len(observed.probes), observed.signs, False
     for i in range(first, signs.size):
         value = inner(observed.sums[i - first], total)
@@ -203,7 +203,7 @@ def begin_anew(extremes):
 
 @kernel()
 def correct_within(extremes, signs):
-    """Where an extreme is between the last two looks, keep as correction what it exceeds both by."""
+    """Find an extreme between the last two inspections, and keep its excess over both as correction."""
     for i in range(signs.size):
         if extremes.looked[1] < extremes.times[i] < extremes.looked[2]:
             best = max(signs[i] * extremes.recent[i, 1], signs[i] * extremes.recent[i, 2])

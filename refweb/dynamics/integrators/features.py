@@ -1,4 +1,4 @@
-"""What a run has and not every run has: kernels for what it has not are neither compiled nor loaded."""
+"""Features of a run: kernels for features that it has not are neither compiled nor loaded."""
 
 from __future__ import annotations
 

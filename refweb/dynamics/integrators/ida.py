@@ -116,7 +116,7 @@ class Ida(Sundials):
         return v
 
     def _of_all(self, own):
-        """What has mass has, among all unknown displacements, where all else has 0."""
+        """Expand values of the unknowns with mass to all unknown displacements, with 0 elsewhere."""
         found = np.zeros(self.unknowns)
         found[self._heavy] = own
         return found
@@ -326,7 +326,7 @@ class Ida(Sundials):
             ) from None
 
     def spent(self, course):
-        """What a run has spent, and the `constraint_drift` of its steps: of lengths [1], and of their rates [m/s]."""
+        """Statistics of a run, and the `constraint_drift` of its steps: of lengths [1], and of their rates [m/s]."""
         drift = {"constraint_drift": course.constraint_drift.tolist()} if self._links else {}
         return {**super().spent(course), **drift}
 

@@ -1,4 +1,4 @@
-"""What an integrator is: one system taken through time, looked at by probes, with its books of energy and momentum.
+"""Interface of integrators: one system taken through time, inspected by probes, with balances of energy and momentum.
 
 A method is a class that has what `Integrator` lists; `refweb.registry.INTEGRATORS` gives it its name in scenes. It is
 made of a system and of what is to be looked at:
@@ -54,7 +54,7 @@ class Sum(NamedTuple):
 
 @dataclass(eq=False, kw_only=True)
 class IntegratorState:
-    """Where a run is: all that it takes to go on from there.
+    """State of a run: all that it takes to go on from there.
 
     Attributes
     ----------
@@ -114,7 +114,7 @@ class IntegratorState:
 
     @property
     def stopped(self):
-        """Whether an event has ended the run."""
+        """True if an event has ended the run."""
         return bool(ended_by(self.events))
 
     @property
@@ -124,7 +124,7 @@ class IntegratorState:
 
     @property
     def drifts(self):
-        """How far the books are open, for ``run.json``; None for angular momentum that is not kept."""
+        """Errors of the balances, for ``run.json``; None for angular momentum that is not kept."""
         linear, angular = self.ledger.drifts.tolist()
         angular = angular if self.ledger.largest[1] > 0.0 else None
         return dict(energy_drift=self.drift, momentum_drift=linear, angular_momentum_drift=angular)
@@ -190,7 +190,7 @@ class History:
 
     @property
     def sums(self):
-        """What a `Sum` weighs: energy of each family, kinetic energy [J], work [J], step size [s]."""
+        """Weights of a `Sum`: energy of each family, kinetic energy [J], work [J], step size [s]."""
         return self.values[:, 1 + self.probed : -3 * len(VECTORS)]
 
     @property
@@ -332,7 +332,7 @@ class Integrator(Protocol):
         ...
 
     def spent(self, course: IntegratorState) -> dict:
-        """What a course has spent, for ``run.json``.
+        """Statistics of a course, for ``run.json``.
 
         Returns
         -------

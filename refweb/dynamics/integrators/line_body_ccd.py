@@ -1,4 +1,4 @@
-"""Whether lines have come to the middle of a body in a step of any method, on its interpolant.
+"""Check if lines have come to the middle of a body in a step of any method, on its interpolant.
 
 Pieces of steps are taken as `refweb.dynamics.integrators.line_line_ccd` takes them. What points of a body move by as
 it turns is at most twice the difference of its quaternions times their distance from its place.
@@ -35,7 +35,7 @@ class FollowedBodies(FollowedLines):
             self._note(course, piece, at, THROUGH, (family.passing, family.cells, family.data))
 
     def _turned(self, way):
-        """By how much points of bodies move as these turn, at most [m]."""
+        """Largest movement of points of bodies as these turn [m]."""
         if not len(self._rows):
             return 0.0
         spin, turn = self._rows.T

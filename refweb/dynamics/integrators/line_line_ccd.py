@@ -1,4 +1,4 @@
-"""Whether lines have met in a step of any method, on its interpolant.
+"""Check if lines have met in a step of any method, on its interpolant.
 
 A piece of a step is known at its start, in its middle and at its end. From each to the next rows are taken to move in
 straight lines, and lines that come nearer than these leave open are not sure not to meet: two rows by as much as they
@@ -19,7 +19,7 @@ HALVINGS = 10
 
 
 class Place(NamedTuple):
-    """Where all rows are: time [s], and displacement [m], shape (rows, 3)."""
+    """Positions of all rows: time [s], and displacement [m], shape (rows, 3)."""
 
     time: float
     x: np.ndarray
@@ -31,7 +31,7 @@ class Followed:
     # What a subclass brings
 
     def _room(self, bend):
-        """What a bend of the middle leaves open."""
+        """Free distance that a bend of the middle leaves."""
         raise NotImplementedError
 
     def _met(self, looked_at, x, way, room) -> np.ndarray | None:
@@ -101,9 +101,9 @@ class FollowedLines(Followed):
         return self._rows_met if came else None
 
     def _spread(self, way):
-        """By how much places are further than the first is, at most [m]."""
+        """Largest distance of positions from the first [m]."""
         return float(np.linalg.norm(way[: self._places] - way[:1], axis=1).max(initial=0.0))
 
     def _turned(self, way):
-        """By how much points of what turns move beside that, at most [m]."""
+        """Largest movement of points of turning bodies beside that [m]."""
         return 0.0

@@ -1,4 +1,4 @@
-"""What a run is looked at with: its probes and sums, their values at a sample, and their extremes over all samples."""
+"""Measurements of a run: its probes and sums, their values at a sample, and their extremes over all samples."""
 
 from __future__ import annotations
 

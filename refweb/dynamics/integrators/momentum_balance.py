@@ -66,7 +66,7 @@ def allowed(rtol):
 
 
 class MomentumBalance(Record):
-    """What the book holds of a run.
+    """Momentum balance of a run.
 
     Attributes
     ----------
@@ -89,17 +89,17 @@ class MomentumBalance(Record):
 
     @classmethod
     def empty(cls):
-        """That of a run which has not begun."""
+        """Make the balance of a run that has not begun."""
         return cls(np.zeros((2, 3)), np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(2))
 
     @property
     def drifts(self):
-        """What is left over the largest, of momentum and of angular momentum [1]; 0 where there is none."""
+        """Residual over the largest value, of momentum and of angular momentum [1]; 0 where there is none."""
         return np.divide(self.left, self.largest, out=np.zeros(2), where=self.largest > 0.0)
 
 
 class Outside(Record):
-    """What acts from outside, as the book sees it.
+    """External forces, as the momentum balance needs them.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class Outside(Record):
 
     @classmethod
     def of(cls, system):
-        """That of a system."""
+        """Make the record of a system."""
         net, linear = system.net, system.rows - system.net.spins
         outer = [(i, family) for i, family in enumerate(system.families) if not family.internal]
         known = [family for _, family in outer if family.impulse is not None]

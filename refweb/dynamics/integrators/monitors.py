@@ -1,4 +1,4 @@
-"""What the compiled loop looks at: probes and sums, as a record."""
+"""Monitors of the compiled loop: probes and sums, as a record."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ProbeTable = Annotated[Functions, PROBE]
 
 
 class Observed(Record):
-    """What is looked at.
+    """Probes and sums that are inspected.
 
     Attributes
     ----------

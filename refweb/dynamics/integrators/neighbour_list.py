@@ -136,7 +136,7 @@ class NeighbourList(Record):
         return cls(swaps, np.array(near, dtype=np.int64), skin, at, Arrays(INDICES, cells), Arrays(MATRIX, data))
 
     def without(self):
-        """That of no families."""
+        """Make the record without families."""
         return replace(self, families=self.families[:0])
 
 
@@ -194,7 +194,7 @@ def swap_of(near):
 
 @functools.cache
 def swap_pairs_of(pairs):
-    """As `swap_of`, of a family whose cells are elements: they are swapped for the pairs that ``pairs`` finds."""
+    """Make the swap of a family whose cells are elements, for the pairs that ``pairs`` finds; see `swap_of`."""
 
     @kernel(SWAP)
     def swap(i, m, depth, x, cells, data, outs, stored):
@@ -300,7 +300,7 @@ def reach_all(reach, x, nearby, families):
 
 @kernel(leaf=True, apart=("pairs",))
 def covered(way: float, x: Matrix, nearby: NeighbourList, families: Families) -> bool:
-    """Whether the pairs that are listed are all that can touch by coming nearer by a way [m].
+    """Tell if the listed pairs are all that can touch by coming nearer by a distance [m].
 
     They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
     bounds look at the elements themselves, see
@@ -324,7 +324,7 @@ def covered(way: float, x: Matrix, nearby: NeighbourList, families: Families) ->
 
 @kernel(leaf=True, forceinline=True)
 def goes_freely(model):
-    """Whether lines push each other, and all places go as their velocities say: none is moved or carried."""
+    """Tell if lines push each other, and all rows move as their velocities say: none is moved or carried."""
     inertia = model.inertia
     return model.guard.families.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
 

@@ -1,4 +1,4 @@
-"""Where a run of a method of somebody's own steps is."""
+"""State of a run of a method with steps of its own."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def aligned(values):
 
 
 class Scheme(Record):
-    """How steps are made.
+    """Coefficients of the steps.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Scheme(Record):
 
 
 class Inertia(Record):
-    """What resists.
+    """Masses and constraints of the rows.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Inertia(Record):
 
     @classmethod
     def of(cls, system):
-        """That of a system with lumped mass."""
+        """Make the record of a system with lumped mass."""
         net, free = system.net, ~system.supported
         inverse = aligned(np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0))
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
@@ -160,7 +160,7 @@ class Inertia(Record):
 
 
 class Families(Record):
-    """What acts; that of the lines is the first family.
+    """Force terms; that of the lines is the first family.
 
     Of those that act only near something, lists have the cells that are looked at; all stand behind all families.
 
@@ -233,7 +233,7 @@ class Motions(Record):
 
     @classmethod
     def of(cls, system):
-        """That of a system."""
+        """Make the record of a system."""
         drives = system.drives
         return cls(
             kernels=Functions(k.FORCE, [drive.kernel for drive in drives]),
@@ -311,7 +311,7 @@ class Model(Record):
 
     @classmethod
     def of(cls, system, outs):
-        """That of a `refweb.system.system.System`, whose families write their values per cell to arrays ``outs``."""
+        """Make the record of a `refweb.system.system.System`, whose families write their values per cell to ``outs``."""
         inertia, families, implicit_contacts = (
             Inertia.of(system),
             Families.of(system, outs),
@@ -323,7 +323,7 @@ class Model(Record):
 
 
 class Running(Record):
-    """What the loop writes; arrays of an explicit course, and numbers that pass from one part of a row to the next.
+    """Arrays that the loop writes, of an explicit course, and numbers that pass from one part of a row to the next.
 
     Attributes
     ----------

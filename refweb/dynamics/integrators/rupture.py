@@ -65,7 +65,7 @@ class Rupturing:
 
     @property
     def on_progress(self):
-        """As in `refweb.dynamics.integrators.integrator.Integrator`."""
+        """Report progress as `refweb.dynamics.integrators.integrator.Integrator` does."""
         return self.inner.on_progress
 
     @on_progress.setter
@@ -141,13 +141,13 @@ class Rupturing:
         return None
 
     def _holding(self, broken):
-        """Whether the line of an element has none that is ``broken``, a function of the element."""
+        """Function that tells if the line of an element has no element that is ``broken``."""
         line = self._whole.net.line
         gone = set(line[broken])
         return lambda element: line[element] not in gone
 
     def _torn_now(self, course):
-        """Whether the event of a break, and no other, has ended the run."""
+        """Tell if the event of a break, and no other, has ended the run."""
         watched = self._weakness.watched and len(course.events) > 0
         return watched and course.events[-1]["time"] < np.inf and not ended_by(course.events[:-1])
 

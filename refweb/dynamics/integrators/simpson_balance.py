@@ -51,7 +51,7 @@ class Sample(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """What is integrated.
+    """Rates that are integrated.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Booked(NamedTuple):
 
 
 class Jump(NamedTuple):
-    """What a jump of velocities at the corner of a motion takes: energy [J] and momentum [N s], shape (3,)."""
+    """Energy [J] and momentum [N s], shape (3,), of a jump of velocities at the corner of a motion."""
 
     energy: float
     momentum: np.ndarray
@@ -115,7 +115,7 @@ class Piece(NamedTuple):
     jump: Jump | None
 
     def booked(self, t):
-        """What is `Booked` until a time within."""
+        """Make the `Booked` values until a time within."""
         width = self.end.time - self.begin
         s = (t - self.begin) / width
         a, b, c = s - 1.5 * s**2 + s**3 / 1.5, 2.0 * s**2 - s**3 / 0.75, s**3 / 1.5 - 0.5 * s**2
@@ -182,7 +182,7 @@ class SimpsonBalance:
         return Sample(t, x, v, force, out.lines.copy(), power, {i: self._show(out, i) for i in self._shown})
 
     def _show(self, out, number):
-        """What probes read of families that show ``out``."""
+        """Values that probes read of families that write ``out``."""
         return self.system.contact_forces.of(out) if number == CONTACT else out[number].copy()
 
     def refuse_endless(self, t, force):
@@ -226,7 +226,7 @@ class SimpsonBalance:
         return Piece(course.time, before, course.step, middle, end, rates, behind, jump)
 
     def uneven(self, course, piece):
-        """Whether powers change too much within a piece."""
+        """Tell if powers change too much within a piece."""
         apart = piece.unevenness
         return apart > UNEVEN * course.largest and apart > UNEVEN * self.kinetic(piece.end.x, piece.end.v)
 

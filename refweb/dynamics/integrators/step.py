@@ -43,7 +43,7 @@ def kick_and_drift(kick, drift, inverse, x, v, f):
 
 @kernel(leaf=True, forceinline=True)
 def move(kick, drift, inverse, flat_x, flat_v, flat_f, x, v, turns):
-    """As `kick_and_drift`, where bodies may turn."""
+    """Kick and drift as `kick_and_drift` does, where bodies may turn."""
     if turns.moment.size:
         note_turns(x, turns)
     kick_and_drift(kick, drift, inverse, flat_x, flat_v, flat_f)
@@ -60,7 +60,7 @@ def last_kick(kick, inverse, v, f):
 
 @kernel(leaf=True, forceinline=True)
 def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
-    """As `last_kick`, where bodies may carry nodes."""
+    """Kick as `last_kick` does, where bodies may carry nodes."""
     last_kick(kick, inverse, flat_v, flat_f)
     update_attached_nodes(x, v, turns)
 
@@ -158,7 +158,7 @@ def contact_kick(
     room: MatrixTable,
     model: Model,
 ) -> None:
-    """As `viscous_kick`, where losses of contact are solved for: they need no bound.
+    """Kick as `viscous_kick` does, with losses of contact that are solved for: they need no bound.
 
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
     the first begins without a memory of another. It writes the power of what rubs; ``room`` holds what touches.
@@ -315,7 +315,7 @@ def interpolate(s, h, old, x, v, inverse, f, here, speed):
 
 @kernel(forceinline=True)
 def interpolate_kicks(s, h, old, x, v, inverse, f, here, speed):
-    """As `interpolate`, for a kick, a drift and a kick.
+    """Interpolate a kick, a drift and a kick, see `interpolate`.
 
     Velocities at its ends are no rates of positions there, but of order 2 off. So positions lie on the cubic through
     those at either end with the accelerations there, and velocities on that through velocities and accelerations.

@@ -68,7 +68,7 @@ def safe_step(
 def step_by_elements(
     start: float, end: float, changing: bool, reach: float, speed: float, model: Model, running: Running
 ) -> float:
-    """As `safe_step`, where pairs that are listed are not all that can touch: by the elements themselves."""
+    """Bound the step as `safe_step` does, by the elements themselves where the pairs are not all that can touch."""
     nearby, families = model.nearby, model.families
     first = 2 * len(families.data) - len(families.cells)  # see `refweb.dynamics.integrators.records.Families`
     for m in range(nearby.families.size):

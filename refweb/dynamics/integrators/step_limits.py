@@ -1,4 +1,4 @@
-"""How far a step may go: to the next corner of a table, and not so far that bodies or lines pass through something."""
+"""Limits of a step: the next corner of a table, and the distance to a passage through bodies or lines."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class StepLimits:
         self._rows = np.array([body.row for body in bodies], dtype=np.int64)
 
     def at_corner(self, t):
-        """Whether a table has a corner at a time [s]."""
+        """Tell if a table has a corner at a time [s]."""
         at = np.searchsorted(self._corners, t * (1.0 - SAME))
         return at < len(self._corners) and bool(self._corners[at] <= t * (1.0 + SAME))
 

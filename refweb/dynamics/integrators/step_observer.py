@@ -200,7 +200,7 @@ class StepObserver(Integrator):
     # What is made of them
 
     def spent(self, course):
-        """What a run has spent, for ``run.json``."""
+        """Statistics of a run, for ``run.json``."""
         return dict(self.stats)
 
     def start(self, x=None, v=None):
@@ -279,7 +279,7 @@ class StepObserver(Integrator):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
     def _take_step(self, course: ObservedState, end):
-        """One step of the method, not beyond a corner of a table, nor further than a body can be passed."""
+        """Take a step of the method, not beyond a corner of a table, nor further than a body can be passed."""
         stop = self._limits.stop(course.time, course.x, course.v, end)
         ahead = max(end, course.time + 1e-3 * end)  # from a corner it may be too near for a first step to be chosen
         if self.restarts and course.nsteps and self._limits.at_corner(course.time):

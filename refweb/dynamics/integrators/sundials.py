@@ -1,4 +1,4 @@
-"""What CVODE and IDA share: a solver of SUNDIALS that takes the steps, and the linear systems in them.
+"""Common part of CVODE and IDA: a solver of SUNDIALS that takes the steps, and the linear systems in them.
 
 `LINEAR_SOLVERS` says how these are solved. By "block" displacements are eliminated by hand, and what is left, a matrix
 of half the size or less, is factorized as the preconditioner of GMRES. Where that inverts the Jacobian exactly, one
@@ -73,7 +73,7 @@ class Sundials(StepObserver):
         raise NotImplementedError
 
     def _initial(self, t, x, v):
-        """What ``init_step`` of the solver takes."""
+        """Arguments of ``init_step`` of the solver."""
         raise NotImplementedError
 
     def _linear_options(self) -> dict:
@@ -83,7 +83,7 @@ class Sundials(StepObserver):
     # What is made of it
 
     def spent(self, course):
-        """What a run has spent, and the linear solver with the reason for it, for ``run.json``."""
+        """Statistics of a run, and the linear solver with the reason for it, for ``run.json``."""
         made = {"linear_solver": self.choice, "factorization": self.system.factorized_by}
         return {**super().spent(course), **made}
 
@@ -161,7 +161,7 @@ class Sundials(StepObserver):
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._solver))
 
     def step(self, stop, end):
-        """One step of the solver, not beyond ``stop``, on the way to ``end``."""
+        """Take a step of the solver, not beyond ``stop``, on the way to ``end``."""
         with _heard():
             reached = self._one_step(stop, end)
             if reached == self._reached:  # SUNDIALS first returns the end of the step that it was last asked inside of
@@ -177,7 +177,7 @@ class Sundials(StepObserver):
         return float(self._found(end, "onestep", float(stop) if np.isfinite(stop) else None).t)
 
     def _found(self, t, mode="normal", stop=None):
-        """What the solver finds at a time, or at the end of a step towards it."""
+        """Solution of the solver at a time, or at the end of a step towards it."""
         return _checked(self._solver.step(t, mode, stop))
 
 

@@ -1,4 +1,4 @@
-"""What tolerances of displacements and velocities are relative to, where the state itself is near zero."""
+"""Scales of the tolerances of displacements and velocities where the state itself is near zero."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How unlike rows of vectors are: no two differ by more than their spread."""
+"""Spread of rows of vectors: no two differ by more."""
 
 from __future__ import annotations
 

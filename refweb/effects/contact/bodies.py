@@ -102,7 +102,7 @@ def _friction(net, depths, group):
 
 
 def _shared(net, group) -> dict:
-    """What a `Family` has of some pairs."""
+    """Common arguments of the `Family` of some pairs."""
     cells, data = zip(*(_pair(net, *pair) for pair in group), strict=True)
     room = np.zeros((len(data), max(len(row) for row in data)))
     for row, own in zip(room, data, strict=True):

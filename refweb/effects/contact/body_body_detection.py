@@ -1,4 +1,4 @@
-"""Where two bodies touch: the skeleton of each held against the depth in the other.
+"""Contact points of two bodies: the skeleton of each against the depth in the other.
 
 A part of a skeleton, see `refweb.net.skeleton`, has a thickness τ: it touches a body where it is inside of that body
 grown by τ. A straight line touches as an element of the web does, see `refweb.effects.contact.contact_points`, a point
@@ -47,7 +47,7 @@ point, along G, the bodies touch [m]; whether its place moves."""
 
 
 class Frame(NamedTuple):
-    """How a body stands.
+    """Position and orientation of a body.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ def arcs(depth):
 
     @kernel()
     def rising(power, place, deep, slope, curve):
-        """What vanishes at the deepest place, positive before it, and its slope: as of straight lines."""
+        """Function that vanishes at the deepest position, positive before it, and its slope: as of straight lines."""
         if deep <= 0.0:
             return slope, curve
         w = math.sin(math.pi * place) ** 2

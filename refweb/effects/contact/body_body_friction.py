@@ -114,7 +114,7 @@ def apply_force(touches, n, p, q, s, f):
 
 @kernel()
 def place_of(contacts, n, s):
-    """Where two bodies touch, from the row of one of them [m]."""
+    """Contact point of two bodies, from the row of one of them [m]."""
     g = vector_at(contacts, n, NORMAL)
     size = math.sqrt(dot(g, g))
     y, way = vector_at(contacts, n, FIRST if s == 0 else SECOND), contacts[n, DOWN] / size if size > 0.0 else 0.0

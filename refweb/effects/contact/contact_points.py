@@ -1,4 +1,4 @@
-"""Where a line touches a body of any shape.
+"""Contact points of a line on a body of any shape.
 
 A line that lies on a face, or along a ring or a cylinder, has no single nearest point: a force at the deepest one would
 jump from end to end. All shapes but spheres touch each element at both ends and once in between, at the place ξ where
@@ -94,7 +94,7 @@ def window(once, place, inner):
 
 @kernel(forceinline=True)
 def rise(pair, place, spot):
-    """What vanishes at the deepest place of an element, positive before it, and its slope.
+    """Function that vanishes at the deepest position of an element, positive before it, and its slope.
 
     W' δ + (p + 1) W δ', or where nothing is touched δ'; of a sphere the rate of −½ |y|², which is linear.
     """

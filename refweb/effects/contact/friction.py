@@ -38,7 +38,7 @@ from .rotational_stiffness import add_push, add_rotation, add_velocities, set_ar
 
 
 class Slip(NamedTuple):
-    """How the line moves at a contact, along the axes of the body.
+    """Velocity of a line at a contact, along the axes of the body.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Loss(NamedTuple):
 
 @kernel(forceinline=True)
 def turned_by(planar, w):
-    """What of an angular velocity, or a moment, turns the body: of a ring that about its normal."""
+    """Part of an angular velocity, or a moment, that turns the body: of a ring that about its normal."""
     return (0.0, 0.0, w[2]) if planar else w
 
 

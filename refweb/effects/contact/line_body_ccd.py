@@ -1,4 +1,4 @@
-"""Whether lines come as deep in a body as its middle while nodes and bodies move in straight lines.
+"""Check if lines come as deep in a body as its middle while nodes and bodies move in straight lines.
 
 The push of a body turns over in its middle, where depth is largest: what comes there may leave on the other side. No
 point of a line comes deeper in a drift than it is, and the way of the line towards the body: that of the nodes of its

@@ -1,4 +1,4 @@
-"""Where a line touches a sphere.
+"""Contact point of a line on a sphere.
 
 A sphere touches a line once, at the line's point nearest its centre, however finely the line is divided.
 
@@ -67,7 +67,7 @@ def lightness(mass, cells, c, nodes):
 
 @kernel(forceinline=True)
 def far(x, cells, data, c, nodes):
-    """Whether the whole of cell c is certainly out of reach: its first node is, by more than twice its length."""
+    """Tell if the whole of cell c is certainly out of reach: its first node is, by more than twice its length."""
     b, first, length = cells[c, nodes], 0.0, 0.0
     for k in range(3):
         here = data[c, AWAY + k] + x[cells[c, 0], k] - x[b, k]
@@ -131,7 +131,7 @@ def touched(x, cells, data, first, pieces, nodes, functions):
 
 @kernel(forceinline=True)
 def in_sphere(skin, x, cells, data, c, nodes, functions):
-    """Whether cell c may touch, within a skin, the sphere around its body."""
+    """Tell if cell c may touch, within a skin, the sphere around its body."""
     reach = data[c, RADIUS] + skin
     return not closest(x, cells, data, c, nodes, functions)[1] >= reach * reach
 

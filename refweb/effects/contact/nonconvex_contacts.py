@@ -1,4 +1,4 @@
-"""Where a line touches a body that is not convex.
+"""Contact points of a line on a body that is not convex.
 
 There F = W(ξ) δ(ξ)^(p + 1), see `refweb.effects.contact.contact_points`, may have several maxima along an element, with
 minima in between. Its energy is k/(p + 1) times what F rises by along the element: the sum of its maxima less that of
@@ -52,7 +52,7 @@ def note(found, n, c, place, inner, weight, rise):
 
 @kernel()
 def least_between(begin, slope, end, last):
-    """Where a cubic polynomial on (0, 1) has an extremum, of which ends and slopes there are known, of unlike signs."""
+    """Extremum of a cubic polynomial on (0, 1) whose ends and slopes there are known, of unlike signs."""
     mean = end - begin
     b, a = 6.0 * mean - 4.0 * slope - 2.0 * last, 3.0 * (slope + last - 2.0 * mean)
     root = math.sqrt(max(b * b - 4.0 * a * slope, 0.0))

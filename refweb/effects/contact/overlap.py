@@ -1,4 +1,4 @@
-"""How deep lines may be in a body, and the stiffness of contact that holds them there.
+"""Allowed penetration of lines into bodies, and the stiffness of contact that keeps it.
 
 A penalty lets lines in, and a weak one lets them through. An overlap is held against the size of the body: the radius
 of a sphere, of a ring in its plane, or the smallest edge or diameter of another shape. Above `SHARE` of it contact is
@@ -133,17 +133,17 @@ class Deepest(NamedTuple):
 
     @property
     def too_deep(self):
-        """Whether it is deeper than allowed."""
+        """True if it is deeper than allowed."""
         return self.overlap > allowed(self.body)
 
     @property
     def at_start(self):
-        """Whether it is deepest where it starts."""
+        """True if it is deepest where it starts."""
         return self.moving and self.overlap <= self.initial
 
     @property
     def in_core(self):
-        """Whether the line is in the core."""
+        """True if the line is in the core."""
         return self.overlap > CORE * self.body.thickness
 
     @property
@@ -157,7 +157,7 @@ class Deepest(NamedTuple):
         return rounded_up(max(own, self.least) if self.in_core else own)
 
     def plain(self):
-        """As ``run.json`` has it."""
+        """Convert to values for ``run.json``."""
         size = allowed(self.body)
         own = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
         own |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
@@ -190,7 +190,7 @@ class Deepest(NamedTuple):
             )
 
     def remarks(self, what="the web"):
-        """What a reader of the results has to know; ``what`` is all that it might have touched."""
+        """Remarks for a reader of the results; ``what`` is all that it might have touched."""
         if self.overlap <= 0.0:
             yield f'body "{self.body.name}" never touches {what}, though there is a [contact]'
         elif self.too_deep:
@@ -264,11 +264,11 @@ class Overlaps:
             self.pairs.refuse()
 
     def plain(self):
-        """As ``run.json`` has it, by name."""
+        """Convert to values for ``run.json``, by name."""
         return {deepest.body.name: deepest.plain() for deepest in self.found}
 
     def _pushed_along(self, deepest):
-        """What a reader has to know of pushes along lines, see `push_along`."""
+        """Remark on pushes along lines, see `push_along`."""
         net, body = self.system.net, deepest.body
         if deepest.line is None:
             return
@@ -282,7 +282,7 @@ class Overlaps:
             )
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         elsewhere = self.pairs.touched if self.pairs is not None else ()
         what = "the web" if self.pairs is None else "anything"
         for deepest in self.found:

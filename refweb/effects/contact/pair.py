@@ -24,7 +24,7 @@ _FINE, _THICK, _FIELD, _MOBILITY, _LEVER, _OFFSET = 20, 21, 22, 23, 29, 30
 
 
 class Pair(NamedTuple):
-    """What is known of an element and a body.
+    """Data of an element and a body.
 
     Attributes
     ----------
@@ -88,13 +88,13 @@ def lever(body):
 
 @kernel(forceinline=True)
 def lever_of(data, c, nodes):
-    """What `lever` says of the body of cell c."""
+    """Data of `lever` for the body of cell c."""
     return data[c, AWAY + 3 * nodes + _LEVER]
 
 
 @kernel(forceinline=True)
 def from_shape(p, data, c, nodes):
-    """What is at p from the row of the body of cell c, from the centre of its shape; along its axes."""
+    """Vector at p, from the row of the body of cell c, from the centre of its shape; along its axes."""
     at = AWAY + 3 * nodes + _OFFSET
     return p[0] - data[c, at], p[1] - data[c, at + 1], p[2] - data[c, at + 2]
 

@@ -1,4 +1,4 @@
-"""How deep bodies may be in each other, the stiffness that holds them there, and what shows that none passes.
+"""Allowed penetration of bodies into each other, the stiffness that keeps it, and the proof that none passes.
 
 An overlap is held against the smaller of two bodies, as that of a line is against one, see
 `refweb.effects.contact.overlap`. Nothing has passed through a body unless its middle was passed, between two steps or
@@ -68,7 +68,7 @@ class DeepestPair(NamedTuple):
 
     @property
     def in_core(self):
-        """Whether one is in the core of the other."""
+        """True if one is in the core of the other."""
         return self.overlap > CORE * self.thickness
 
     @property
@@ -78,7 +78,7 @@ class DeepestPair(NamedTuple):
         return rounded_up(max(own, self.least) if self.in_core else own)
 
     def plain(self):
-        """As ``run.json`` has it."""
+        """Convert to values for ``run.json``."""
         when = self.time if self.overlap > 0.0 else None
         return {"overlap": self.overlap, "time": when, "allowed": self.allowed, "stiffness": self.stiffness}
 
@@ -107,7 +107,7 @@ class DeepestPair(NamedTuple):
             )
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         if self.overlap > self.allowed:
             remedy = "there they start" if self.overlap <= self.initial else self._remedy
             share = 100.0 * self.overlap / min(map(size_of, self.bodies))
@@ -171,7 +171,7 @@ class PairOverlaps:
             deepest.refuse()
 
     def plain(self):
-        """As ``run.json`` has it, by names: the pairs that have touched."""
+        """Convert to values for ``run.json``, by names: the pairs that have touched."""
         return {", ".join(b.name for b in pair.bodies): pair.plain() for pair in self.found if pair.overlap > 0.0}
 
     def passage(self):
@@ -205,6 +205,6 @@ class PairOverlaps:
         return {body.name for pair in self.found if pair.overlap > 0.0 for body in pair.bodies}
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         for deepest in self.found:
             yield from deepest.remarks()

@@ -79,7 +79,7 @@ def thickness(shape):
 
 
 class Foreseen(NamedTuple):
-    """What may become of an element before it has moved by a reach.
+    """Largest stiffness and depth of an element before it has moved by a reach.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Whether lines can have passed through bodies.
+"""Check if lines can have passed through bodies.
 
 A line passes a body through its middle, where the push turns over. Methods follow how deep every line comes, see
 `refweb.effects.contact.line_body_ccd`: explicit ones before each drift, in which nodes and bodies move in straight
@@ -21,7 +21,7 @@ def named(system, met):
 
 
 def would_pass(system, met):
-    """That a line would come to the middle of a body in any step."""
+    """Message that a line would come to the middle of a body in any step."""
     line, body = named(system, met)
     return (
         f'line {line} would come to the middle of body "{body.name}", {body.thickness:.3g} m below its surface: use a '
@@ -30,7 +30,7 @@ def would_pass(system, met):
 
 
 class BodyPassage:
-    """What is known of lines that may have passed through bodies.
+    """Record of lines that may have passed through bodies.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class BodyPassage:
         self._met = met
 
     def told(self):
-        """Whether nothing can have passed, as ``run.json`` has it."""
+        """True if nothing can have passed, as ``run.json`` has it."""
         if not self._followed:
             return "not certified: curved elements are not followed"
         time, *met = self._met
@@ -60,6 +60,6 @@ class BodyPassage:
         )
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         if np.isfinite(self._met[0]):
             yield f"lines may have passed through bodies, {self.told()}"

@@ -1,4 +1,4 @@
-"""What turning adds to the tangents of contact, as compiled kernels.
+"""Tangents of contact by rotation, as compiled kernels.
 
 Forces at a contact depend on how the body stands to the line alone: to turn the body by δθ, and the line and all
 velocities with it, turns the forces. With the blocks K_b = −∂f/∂x_b and C_b = −∂f/∂v_b of the nodes b, whose arms from

@@ -36,7 +36,7 @@ def _exponent(name, value):
 
 @table
 class BodyContact(Table):
-    """What differs for one body; the keys are those of `Contact`.
+    """Keys of one body that differ; they are those of `Contact`.
 
     Examples
     --------
@@ -196,7 +196,9 @@ class Contact(Table):
         return tuple(map(max, *laws))
 
     def _pairs(self, net, bodies, spins=0) -> dict:
-        """What a `Family` has of every element with each of some bodies, with ``spins`` rows of their rotations."""
+        """Common arguments of a `Family` of every element with each of some bodies, with ``spins`` rows of their
+        rotations.
+        """
         along = net.cells[:, net.along]
         rows = [[body.row, body.spin, body.turn][: 1 + spins] for body in bodies]
         cells = [np.hstack([along, np.tile(row, (len(along), 1))]) for row in rows]

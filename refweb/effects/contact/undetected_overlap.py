@@ -59,7 +59,7 @@ class Silent:
                     self._found[n] = deep, time
 
     def kept(self):
-        """What is known so far, shape (pairs, 3): number of a pair, depth [m] and time [s]."""
+        """Known overlaps, shape (pairs, 3): number of a pair, depth [m] and time [s]."""
         return np.array([(n, *seen) for n, seen in self._found.items()]).reshape(-1, 3)
 
     def take(self, kept):
@@ -67,7 +67,7 @@ class Silent:
         self._found = {int(n): (float(deep), float(time)) for n, deep, time in kept}
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         for n, (deep, time) in itertools.islice(self._found.items(), MOST):
             a, b = self._pairs[n]
             yield (
@@ -79,7 +79,7 @@ class Silent:
 
 
 def _depth(body, other, places, x):
-    """How deep the skeleton of a body is in another one [m]."""
+    """Depth of the skeleton of a body in another one [m]."""
     parts = body.shape.skeleton()
     if parts is None:
         return 0.0

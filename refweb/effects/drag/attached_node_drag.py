@@ -47,7 +47,7 @@ def at_arm(touches, n, force, moment, inverse):
 
 @kernel()
 def speeds_up(touches, n, f, inverse):
-    """As `refweb.effects.drag.implicit_drag.speeds_up`."""
+    """Tell if speeds grow, as `refweb.effects.drag.implicit_drag.speeds_up` does."""
     row, spin = int(touches[n, BODY]), int(touches[n, SPIN])
     if row < 0:
         return implicit_drag.speeds_up(touches, n, f, inverse)
@@ -57,7 +57,7 @@ def speeds_up(touches, n, f, inverse):
 
 @kernel()
 def answer(touches, n, p, inverse):
-    """As `refweb.effects.drag.implicit_drag.answer`."""
+    """Compute the response, as `refweb.effects.drag.implicit_drag.answer` does."""
     if touches[n, BODY] < 0.0:
         return implicit_drag.answer(touches, n, p, inverse)
     return at_arm(touches, n, p, cross(arm(touches, n), p), inverse)
@@ -65,7 +65,7 @@ def answer(touches, n, p, inverse):
 
 @kernel()
 def push(touches, n, p, f):
-    """As `refweb.effects.drag.implicit_drag.push`; the force stands at the node as well."""
+    """Add the force as `refweb.effects.drag.implicit_drag.push` does; it stands at the node as well."""
     implicit_drag.push(touches, n, p, f)
     if touches[n, BODY] >= 0.0:
         row, spin, moment = int(touches[n, BODY]), int(touches[n, SPIN]), cross(arm(touches, n), p)

@@ -24,7 +24,7 @@ SPHERE = 0.47
 
 @table
 class BodyDrag(Table):
-    """What one body has of drag, ½ ρ C A |u|², whichever way it moves.
+    """Drag of one body, ½ ρ C A |u|², whichever way it moves.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether centre lines meet while nodes move in straight lines, and how long none can come through another.
+"""Check if centre lines meet while nodes move in straight lines, and find the time in which none can pass.
 
 Points of two elements come nearer to each other by no more than the largest of the four differences of the ways of
 their nodes, for such a difference is linear along either element. A pair whose distance is above that does not meet. Of
@@ -63,7 +63,7 @@ def longest_of(p, u, w):
 
 @kernel(forceinline=True)
 def ways_of(cells, c, kick, drift, v, f, inverse):
-    """What the vectors (p, u, w) of pair c change by in a drift, behind a kick."""
+    """Change of the vectors (p, u, w) of pair c in a drift, behind a kick."""
     i, j, k, m = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3]
     a0, a1 = drift * (v[i, 0] + kick * inverse[i, 0] * f[i, 0]), drift * (v[i, 1] + kick * inverse[i, 1] * f[i, 1])
     b0, b1 = drift * (v[j, 0] + kick * inverse[j, 0] * f[j, 0]), drift * (v[j, 1] + kick * inverse[j, 1] * f[j, 1])

@@ -1,4 +1,4 @@
-"""What damping takes where lines touch, as compiled kernels.
+"""Damping forces between lines that touch, as compiled kernels.
 
 With the forces f of `refweb.effects.self_contact.line_line_penalty` on the four nodes of a pair, their velocities v,
 and |f| the root of the sum of the squares of all components, damping adds

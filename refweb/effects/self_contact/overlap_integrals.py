@@ -71,7 +71,7 @@ def along(p, u, w):
 
 @kernel(forceinline=True)
 def comes_near(quadratic):
-    """Whether c² − D, by its numbers, see `pieces`, may be above 0 within a length of 1 to either side."""
+    """Tell if c² − D, by its numbers, see `pieces`, may be above 0 within a length of 1 to either side."""
     deep, half, square = quadratic
     return deep > 0.0 or (deep + 2.0 * abs(half) > 0.0 and half * half + square * deep > 0.0)
 

@@ -27,7 +27,7 @@ ROUNDING = 1e-15
 
 
 class Place(NamedTuple):
-    """Where a pair is: vectors u and w of both elements, p from the first node of the other to that of the first."""
+    """Geometry of a pair: vectors u and w of both elements, p from the first node of the second to that of the first."""
 
     p: tuple
     u: tuple
@@ -35,7 +35,7 @@ class Place(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """Of a pair: the distance at which it touches, κ, and natural lengths, as in its data."""
+    """Constants of a pair: the distance at which it touches, κ, and natural lengths, as in its data."""
 
     touch: float
     scale: float
@@ -73,7 +73,7 @@ def place_of(x, cells, data, c):
 
 @kernel(forceinline=True)
 def apart(place, touch):
-    """Whether a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to.
+    """Tell if a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to.
 
     Of lines parallel to rounding u × w is what rounding leaves, in any direction. An error of `ROUNDING` |u||w|
     is allowed for, by (a + b)² ≤ 1.01 a² + 101 b².

@@ -1,4 +1,4 @@
-"""Whether lines can have passed through lines, and which stiffness would hold them.
+"""Check if lines can have passed through lines, and find a stiffness that would hold them.
 
 Lines pass where their centre lines meet. Methods follow the motion of every pair, see
 `refweb.effects.self_contact.line_line_ccd`: explicit ones before each drift, in which nodes move in straight lines, and
@@ -51,7 +51,7 @@ def holding(energy, radius):
 
 
 def would_pass(system, v, nodes):
-    """That two lines would pass, and which stiffness would hold them; ``nodes (4,)`` are those of both.
+    """Message that two lines would pass, with the stiffness that would hold them; ``nodes (4,)`` are those of both.
 
     It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v. A node that a body
     carries comes with the mass of the body.
@@ -98,7 +98,7 @@ def first_stiffness(system):
 
 
 class Passage:
-    """What is known of lines that may have passed each other.
+    """Record of lines that may have passed each other.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ class Passage:
         return {**own, "chosen": self._chosen}
 
     def told(self):
-        """Whether nothing can have passed, as ``run.json`` has it."""
+        """True if nothing can have passed, as ``run.json`` has it."""
         if self._unfollowed is not None:
             return f"not certified: {self._unfollowed}"
         net, ((time, *nodes), (folded, *beside)) = self._system.net, self._crossings
@@ -140,7 +140,7 @@ class Passage:
         return "certified"
 
     def remarks(self):
-        """What a reader of the results has to know."""
+        """Remarks for a reader of the results."""
         if (told := self.told()) != "certified":
             yield f"lines may have passed through lines, {told}"
 

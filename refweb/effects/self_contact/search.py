@@ -1,4 +1,4 @@
-"""Which elements are near each other: pairs of a list, or of all elements by a grid of cells.
+"""Search for elements that are near each other: pairs of a list, or of all elements by a grid of cells.
 
 The grid is as wide as the longest element and the distance looked for together. So what is near an element has its
 middle in the same cell or in one beside it, and the time goes with the number of elements. Elements that share a node
@@ -97,7 +97,7 @@ def sorted_by_box(low, width, count, room):
 
 @kernel(forceinline=True)
 def nonadjacent(a, b, cells, data):
-    """Whether two elements share no node, and are not near along the net."""
+    """Tell if two elements share no node, and are not near along the net."""
     i, j, k, m = cells[a, 0], cells[a, 1], cells[b, 0], cells[b, 1]
     if i == k or i == m or j == k or j == m:
         return False
@@ -111,7 +111,7 @@ def nonadjacent(a, b, cells, data):
 
 @kernel(forceinline=True)
 def boxes_meet(reach, m, n, rows):
-    """Whether the boxes of two elements are nearer than a reach."""
+    """Tell if the boxes of two elements are nearer than a reach."""
     out = abs(rows[m, 0] - rows[n, 0]) > reach + abs(rows[m, 3]) + abs(rows[n, 3])
     out |= abs(rows[m, 1] - rows[n, 1]) > reach + abs(rows[m, 4]) + abs(rows[n, 4])  # three looks and one branch
     out |= abs(rows[m, 2] - rows[n, 2]) > reach + abs(rows[m, 5]) + abs(rows[n, 5])
@@ -120,7 +120,7 @@ def boxes_meet(reach, m, n, rows):
 
 @kernel(forceinline=True)
 def segments_meet(reach, m, n, rows):
-    """Whether two elements are nearer than a reach."""
+    """Tell if two elements are nearer than a reach."""
     g, h = (rows[m, 3], rows[m, 4], rows[m, 5]), (rows[n, 3], rows[n, 4], rows[n, 5])
     d = rows[m, 0] - rows[n, 0], rows[m, 1] - rows[n, 1], rows[m, 2] - rows[n, 2]
     p = d[0] - g[0] + h[0], d[1] - g[1] + h[1], d[2] - g[2] + h[2]

@@ -234,7 +234,7 @@ def _graph(net):
 
 
 def _reached(graph, nodes, distance):
-    """Which nodes are within a distance of some nodes along the net, shape (nodes given, nodes)."""
+    """Mask of nodes within a distance of some nodes along the net, shape (nodes given, nodes)."""
     from scipy.sparse.csgraph import dijkstra
 
     return np.isfinite(dijkstra(graph, directed=False, indices=nodes, limit=distance * (1.0 + ROUNDING)))

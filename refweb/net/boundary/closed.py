@@ -53,7 +53,7 @@ class Closed(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """Of a uniform solid.
+    """Volume, centre and second moments of a uniform solid.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ def moments(points, triangles):
 
 
 def is_convex(points, volume):
-    """Whether a solid with some corners and volume [m³] fills their hull."""
+    """Tell if a solid with some corners and volume [m³] fills their hull."""
     return bool(ConvexHull(points).volume <= (1.0 + DENT) * volume)
 
 
@@ -177,7 +177,7 @@ def _oriented(points, triangles, pairs, along):
 
 
 def _inward(points, triangles, piece, least):
-    """Whether each piece is to be turned: what is inside another one bounds a hollow."""
+    """Mask of pieces to turn round: a piece inside another one bounds a hollow."""
     volume = np.array([
         moments(points, triangles[piece == i]).volume if _is_thick(points, triangles[piece == i]) else 0.0
         for i in range(piece.max() + 1)
@@ -197,7 +197,7 @@ def _is_thick(points, triangles):
 
 
 def _turns(p, points, triangles):
-    """How often a surface goes around a point: the solid angle that it fills, over 4π."""
+    """Winding number of a surface around a point: the solid angle that it fills, over 4π."""
     a, b, c = (points[triangles[:, k]] - p for k in range(3))
     i, j, k = (np.linalg.norm(q, axis=1) for q in (a, b, c))
     above = np.einsum("ij,ij->i", a, np.cross(b, c))

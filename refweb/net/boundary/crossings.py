@@ -29,7 +29,7 @@ def _volume(points, a, b, c, d):
 
 @kernel()
 def _passes(points, a, b, triangles, t):
-    """Whether the line from corner a to corner b passes through triangle t, from one side to the other."""
+    """Tell if the line from corner a to corner b passes through triangle t, from one side to the other."""
     i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     if a == i or a == j or a == k or b == i or b == j or b == k:
         return False

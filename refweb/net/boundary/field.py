@@ -67,7 +67,7 @@ def _weights(t):
 
 @kernel()
 def _outside(u, v, w, fine, most0, most1, most2, margin):
-    """As `depth`, where no field is: no nearer than the body can be."""
+    """Depth outside of the field, as `depth`: no nearer than the body can be."""
     a, b, c = u - min(max(u, 1.0), most0), v - min(max(v, 1.0), most1), w - min(max(w, 1.0), most2)
     off = math.sqrt(a * a + b * b + c * c)
     return -margin - off / fine, (-a / off, -b / off, -c / off), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -75,7 +75,7 @@ def _outside(u, v, w, fine, most0, most1, most2, margin):
 
 @kernel(forceinline=True)
 def depth_at(p, address):
-    """As `depth`, of a field whose numbers stand at an address."""
+    """Depth, as `depth`, by a field whose numbers stand at an address."""
     at = int(address)
     fine = number_at(at, FINE)
     u = (p[0] - number_at(at, ORIGIN)) * fine
@@ -108,7 +108,7 @@ def depth_at(p, address):
 
 @kernel()
 def depth(p, grown):
-    """As `refweb.net.grown_core.depth`, of the field whose numbers stand at ``grown.field``, grown by the radius."""
+    """Depth, as `refweb.net.grown_core.depth`, by the field at ``grown.field``, grown by the radius."""
     deep, gradient, hessian = depth_at(p, grown.field)
     return deep + grown.radius, gradient, hessian
 
@@ -151,12 +151,12 @@ class Field:
 
     @property
     def margin(self):
-        """How far from the body it reaches [m]."""
+        """Distance from the body that it reaches [m]."""
         return float(self.numbers[MARGIN])
 
     @property
     def address(self):
-        """Where its numbers stand in memory, which kernels read as long as there is this field."""
+        """Address of its numbers in memory, which kernels read as long as there is this field."""
         return float(self.numbers.ctypes.data)
 
     def at(self, places):

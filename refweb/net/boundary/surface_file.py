@@ -1,4 +1,4 @@
-"""What surface a file holds: corners and triangles, from STL, OBJ and VTP.
+"""Surfaces from files: corners and triangles, from STL, OBJ and VTP.
 
 meshio reads STL and OBJ, and VTK, in a process of its own, VTP and what of OBJ meshio does not know.
 """

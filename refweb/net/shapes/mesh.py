@@ -28,7 +28,7 @@ SIZES = 1e-6, 1e6
 
 
 class Solid(NamedTuple):
-    """What a file holds, about the centre of mass.
+    """Solid of a file, about the centre of mass.
 
     Attributes
     ----------
@@ -189,11 +189,11 @@ class Mesh(Shape):
         return self.solid.points, self.solid.triangles
 
     def remarks(self):
-        """What of its file was mended."""
+        """Remarks on repairs of its file."""
         return self.solid.remarks
 
     def told(self):
-        """How large it is, where in its file the centre of mass is, and how far its field misses the surface."""
+        """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
         solid, field = self.solid, self.solid.field
         centre = ", ".join(f"{x:.4g}" for x in solid.centre)
         grid = " × ".join(map(str, field.counts))

@@ -67,7 +67,7 @@ class Ring(Shape):
         raise InputError('density has no meaning for shape = "ring", which has no thickness: give mass = ... [kg]')
 
     def inertia(self, mass):
-        """Of a thin ring, m r² about its normal and half of it across."""
+        """Moments of inertia of a thin ring: m r² about its normal and half of it across."""
         about = mass * self.radius**2
         return np.diag([0.5 * about, 0.5 * about, about])
 

@@ -43,5 +43,5 @@ class Sphere(Shape):
         return of_box(self.grown())
 
     def inertia(self, mass):
-        """Of a solid sphere, 2/5 m r²."""
+        """Moments of inertia of a solid sphere, 2/5 m r²."""
         return 0.4 * mass * self.radius**2 * np.eye(3)

@@ -36,7 +36,7 @@ class TotalAngularMomentum(Nodal):
         return np.column_stack([masses, net.points[:linear]]), counted, [(b.spin, b.moment) for b in turning]
 
     def of(self, state):
-        """By sums over rows."""
+        """Compute it by sums over rows."""
         numbers, counted, spins = self._parts(state.system)
         mass, linear = numbers[:, :1], len(numbers)
         place, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
@@ -50,7 +50,7 @@ class TotalAngularMomentum(Nodal):
         return None
 
     def probe(self, system):
-        """Of x and v."""
+        """Make the probe of x and v."""
         numbers, counted, spins = self._parts(system)
         component = MAGNITUDE if self.observe.component is None else self.observe.component
         moments = np.array([[moment, 0.0, 0.0, 0.0] for _, moment in spins]).reshape(-1, 4)

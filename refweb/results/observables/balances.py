@@ -1,4 +1,4 @@
-"""What the book of a run holds: energies, work and the length of its steps, sums that need no probe."""
+"""Observables of the energy balance: energies, work and step size, sums that need no probe."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ class Booked(Observable):
         return Value(state.energies[self.observe.quantity], None)
 
     def weights(self, system):
-        """What it is of (energy of each family, kinetic energy, work, step size)."""
+        """Weights of (energy of each family, kinetic energy, work, step size)."""
         return weights(system, self.observe.quantity)
 
 
 class KineticEnergy(Booked):
-    """Of all that moves."""
+    """Kinetic energy of all rows."""
 
     signed = False
     dynamic = True
 
 
 class StrainEnergy(Booked):
-    """Of the lines."""
+    """Strain energy of the lines."""
 
     signed = False
 
@@ -71,53 +71,53 @@ class StrainEnergy(Booked):
 
 
 class PotentialEnergy(Booked):
-    """Of gravity."""
+    """Potential energy of gravity."""
 
     needs = "[gravity]"
 
 
 class ContactEnergy(Booked):
-    """Of touching bodies."""
+    """Energy of contact of lines with bodies."""
 
     signed = False
     needs = "[contact]"
 
 
 class BodyContactEnergy(Booked):
-    """Of contact between bodies."""
+    """Energy of contact between bodies."""
 
     signed = False
     needs = "[contact] with between_bodies = true"
 
 
 class SelfContactEnergy(Booked):
-    """Of touching lines."""
+    """Energy of contact of lines with lines."""
 
     signed = False
     needs = "[self_contact]"
 
 
 class BendingEnergy(Booked):
-    """Of bent lines."""
+    """Energy of bent lines."""
 
     signed = False
     needs = "[bending]"
 
 
 class FrameEnergy(Booked):
-    """Of a frame that turns."""
+    """Potential energy in a frame that turns."""
 
     needs = "[frame]"
 
 
 class OrbitEnergy(Booked):
-    """Of place in an orbit."""
+    """Potential energy by position in an orbit."""
 
     needs = "[orbit]"
 
 
 class RuptureEnergy(Booked):
-    """What lines held when they broke."""
+    """Energy that lines held when they broke."""
 
     signed = False
     dynamic = True
@@ -125,7 +125,7 @@ class RuptureEnergy(Booked):
 
 
 class DissipatedEnergy(Booked):
-    """What damping and friction have taken."""
+    """Energy lost by damping and friction."""
 
     signed = False
     dynamic = True
@@ -137,7 +137,7 @@ class TotalEnergy(Booked):
 
 
 class Work(Booked):
-    """Of loads, and of what moves nodes or lengths."""
+    """Work of loads, and of devices that move nodes or change lengths."""
 
     needs = "[[load]], [[motion]] or another effect that does work"
 

@@ -1,4 +1,4 @@
-"""What lies between nodes: their distance, and the mouth of a net that some of them go round."""
+"""Observables between nodes: their distance, and the mouth of a net that some of them surround."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Between(Observable):
         return NOT_NEGATIVE if self.observe.component is None else ANY
 
     def of(self, state):
-        """By the kernel of its probe."""
+        """Compute it by the kernel of its probe."""
         value = self.probe(state.system)
         rows, data = np.array(value.rows, dtype=np.int64), np.ascontiguousarray(value.data, dtype=float)
         none = np.zeros((0, 0))
@@ -65,13 +65,13 @@ class Distance(Between):
         return np.array(found)
 
     def probe(self, system):
-        """Of x and the reference position."""
+        """Make the probe of x and the reference position."""
         rows = self.rows(system)
         return Probe(distance, rows, system.net.points[rows])
 
 
 class Mouth(Between):
-    """What nodes go round, see `Web.find_around`; the last is followed by the first."""
+    """Polygon of nodes around a mouth, see `Web.find_around`; the last is followed by the first."""
 
     keys = ("node",)
 
@@ -90,7 +90,7 @@ class MouthPerimeter(Mouth):
     """Sum of the distances from node to node, the last to the first."""
 
     def probe(self, system):
-        """Of x and the reference position."""
+        """Make the probe of x and the reference position."""
         rows = self.rows(system)
         return Probe(perimeter, rows, system.net.points[rows])
 
@@ -106,7 +106,7 @@ class MouthArea(Mouth):
     unit, keys = "m²", ("node", "component")
 
     def probe(self, system):
-        """Of x and the reference position."""
+        """Make the probe of x and the reference position."""
         rows, component = self.rows(system), self.observe.component
         component = MAGNITUDE if component is None else component
         return Probe(area, [component, *rows], system.net.points[rows])
@@ -122,13 +122,13 @@ def _apart(x, data, i, j, m, n):
 
 @kernel(PROBE)
 def distance(t, x, v, f, lines, rows, data, where):
-    """Of two rows."""
+    """Distance of two rows."""
     return _apart(x, data, rows[0], rows[1], 0, 1)
 
 
 @kernel(PROBE)
 def perimeter(t, x, v, f, lines, rows, data, where):
-    """Of the closed polygon of rows."""
+    """Length of the closed polygon of rows."""
     total = 0.0
     for n in range(rows.size):
         m = n - 1 if n > 0 else rows.size - 1

@@ -20,7 +20,7 @@ class Line(Observable):
     column = 0
 
     def values(self, state):
-        """What each line shows in a state, shape (lines,)."""
+        """Value of each line in a state, shape (lines,)."""
         raise NotImplementedError
 
     def bound(self, tension, net):
@@ -48,7 +48,7 @@ class Line(Observable):
         return Value(float(values[at]), at)
 
     def probe(self, system):
-        """Of the elements of its lines, or of all."""
+        """Make the probe of the elements of its lines, or of all."""
         from ..probes import Probe, line, line_of
 
         elements, scale = self.elements(system.net), self.scale(system.net)[:, None]
@@ -104,11 +104,11 @@ class Stress(Line):
         return state.stress
 
     def scale(self, net):
-        """One over the area [1/m²], shape (cells,)."""
+        """Inverse of the area [1/m²], shape (cells,)."""
         return 1.0 / net.area
 
     def bound(self, tension, net):
-        """That of tension over the area [Pa], shape (cells,)."""
+        """Error bound of tension over the area [Pa], shape (cells,)."""
         return tension / net.area
 
 
@@ -122,7 +122,7 @@ class Strain(Line):
         return state.strain
 
     def bound(self, tension, net):
-        """That of tension over EA [1], shape (cells,)."""
+        """Error bound of tension over EA [1], shape (cells,)."""
         return tension / net.line_data[:, AXIAL_STIFFNESS]
 
     def error(self, state, equilibrium):

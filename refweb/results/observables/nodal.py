@@ -18,7 +18,7 @@ class Nodal(Observable):
     keys = ("node", "body", "component")
 
     def vectors(self, state):
-        """What each row shows in a state, shape (rows, 3)."""
+        """Vector of each row in a state, shape (rows, 3)."""
         raise NotImplementedError
 
     def on(self, system):
@@ -65,7 +65,7 @@ class Place(Nodal):
     """A vector of each row that its position makes: open where the row floats."""
 
     def floats(self, state, equilibrium):
-        """Whether the row with the largest value may move at no cost, or another one pass it."""
+        """Tell if the row with the largest value may move at no cost, or another one pass it."""
         floating = equilibrium.floating
         if floating is None:
             return bool(np.isin(self.rows(state.system), state.slack_nodes).any())
@@ -82,7 +82,7 @@ class Place(Nodal):
         return bool((most[open_] > sizes.max()).any())
 
     def interval(self, state, equilibrium):
-        """How far one row can go along one axis, see `refweb.statics.floating.Parts.limits`."""
+        """Range of one row along one axis, see `refweb.statics.floating.Parts.limits`."""
         rows, axis, floating = self.rows(state.system), self.observe.component, equilibrium.floating
         if floating is None or floating.parts is None or axis is None or len(rows) > 1 or not floating.free[rows, axis]:
             return None
@@ -103,7 +103,7 @@ class Displacement(Place):
         return state.x
 
     def probe(self, system):
-        """Of x alone."""
+        """Make the probe of x alone."""
         from ..probes import Probe, displacement
 
         rows = self.rows(system)
@@ -120,7 +120,7 @@ class Position(Place):
         return state.position
 
     def probe(self, system):
-        """Of x and the reference position."""
+        """Make the probe of x and the reference position."""
         from ..probes import Probe, displacement
 
         rows = self.rows(system)
@@ -138,7 +138,7 @@ class Velocity(Nodal):
         return state.v
 
     def probe(self, system):
-        """Of v alone."""
+        """Make the probe of v alone."""
         from ..probes import Probe, velocity
 
         rows = self.rows(system)

@@ -1,4 +1,4 @@
-"""What an observable is: a value at an instant, and the probe that follows it through the steps of a run."""
+"""Observables: a value at an instant, and the probe that follows it through the steps of a run."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Observable:
         return abs(self.of(there).value - self.of(state).value) / share
 
     def of_held_lines(self, state):
-        """What rounding of their strains by `ROUNDING` makes of the value by lines that both ends hold.
+        """Effect on the value of rounding the strains, by `ROUNDING`, of lines that both ends hold.
 
         No move of a node balances these.
         """
@@ -125,7 +125,7 @@ class Observable:
         return max(changes) / SHARE * ROUNDING
 
     def floats(self, state, equilibrium):
-        """Whether moves at no cost change the value, beside what other moves of their size change."""
+        """Tell if moves at no cost change the value, beside the changes by other moves of their size."""
         if equilibrium.floating is None:
             return False
         some = np.random.default_rng(0).uniform(-1.0, 1.0, state.x.shape) * ~state.system.supported

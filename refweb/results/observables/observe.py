@@ -148,7 +148,7 @@ class Observe(Table):
 
 
 def default():
-    """What a scene without ``[[observe]]`` observes."""
+    """Observables of a scene without ``[[observe]]``."""
     return (
         Observe(name="deflection", quantity="displacement", reduce="max"),
         Observe(name="max_stress", quantity="stress", reduce="max"),

@@ -1,4 +1,4 @@
-"""How deep lines are in a body."""
+"""Depth of lines in a body."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Overlap(Observable):
         return NOT_NEGATIVE
 
     def probe(self, system):
-        """Of what its body feels."""
+        """Make the probe of the contact of its body."""
         return probe_of(system, self.body(system.net))
 
     def place(self, system, at):

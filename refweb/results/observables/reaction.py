@@ -29,7 +29,7 @@ class Reaction(Nodal):
         return super().place(system, at) if len(self.rows(system)) == 1 else None
 
     def probe(self, system):
-        """Of what is supported on nodes, of all that contact does to a body."""
+        """Make the probe of the support forces on nodes, or of all contact forces on a body."""
         from ..probes import Probe, contact_force, reaction
 
         rows = self.rows(system)

@@ -1,4 +1,4 @@
-"""How a body turns: its orientation, its angular velocity and its angular momentum about its centre.
+"""Rotation of a body: its orientation, its angular velocity and its angular momentum about its centre.
 
 All are along the axes x, y and z of the scene.
 """
@@ -20,7 +20,7 @@ W = 3
 
 
 class Turning(Observable):
-    """What one body has."""
+    """Rotation of one body."""
 
     keys = ("body", "component")
     dynamic = True
@@ -68,13 +68,13 @@ class Orientation(Turning):
             )
 
     def of(self, state):
-        """By the rotation of the body."""
+        """Compute it by the rotation of the body."""
         value = self.probe(state.system)
         rows = np.array(value.rows, dtype=np.int64)
         return Value(float(orientation_of(state.x, rows, np.ascontiguousarray(value.data, dtype=float))), None)
 
     def probe(self, system):
-        """Of x alone."""
+        """Make the probe of x alone."""
         body, component = self.body(system.net), self.observe.component
         component = -1 if component is None else component
         return Probe(
@@ -90,11 +90,11 @@ class AngularVelocity(Turning):
     unit = "rad/s"
 
     def of(self, state):
-        """By momentum and inertia."""
+        """Compute it by momentum and inertia."""
         return self._sized(self.body(state.system.net).turning(state.x, state.v))
 
     def probe(self, system):
-        """Of x and v."""
+        """Make the probe of x and v."""
         body = self.body(system.net)
         whirl = np.eye(3) if body.turn is None else body.axes.T @ body.mobility @ body.axes
         return Probe(angular_velocity, self.rows(system), whirl)
@@ -106,12 +106,12 @@ class AngularMomentum(Turning):
     unit = "N m s"
 
     def of(self, state):
-        """By the velocity of its row of rotation."""
+        """Compute it by the velocity of its row of rotation."""
         body = self.body(state.system.net)
         return self._sized(np.zeros(3) if body.spin is None else body.moment * state.v[body.spin])
 
     def probe(self, system):
-        """Of v alone."""
+        """Make the probe of v alone."""
         body = self.body(system.net)
         return Probe(angular_momentum, self.rows(system), np.array([[body.moment if body.spin is not None else 0.0]]))
 
@@ -142,7 +142,7 @@ def orientation_of(x, rows, data):
 
 @kernel(PROBE)
 def orientation(t, x, v, f, lines, rows, data, where):
-    """What `orientation_of` says."""
+    """Kernel of `orientation_of`."""
     return orientation_of(x, rows, data)
 
 
@@ -155,7 +155,7 @@ def _sized(component, w):
 
 @kernel(PROBE)
 def angular_velocity(t, x, v, f, lines, rows, data, where):
-    """Of R W Rᵀ v; ``rows`` is (component, rows of rotation), data W along the axes of space at the start."""
+    """Kernel of R W Rᵀ v; ``rows`` is (component, rows of rotation), data W along the axes of space at the start."""
     s = rows[1]
     if s < 0:
         return 0.0
@@ -174,6 +174,6 @@ def angular_velocity(t, x, v, f, lines, rows, data, where):
 
 @kernel(PROBE)
 def angular_momentum(t, x, v, f, lines, rows, data, where):
-    """Of data times v."""
+    """Kernel of data times v."""
     s = rows[1]
     return 0.0 if s < 0 else data[0, 0] * _sized(rows[0], (v[s, 0], v[s, 1], v[s, 2]))

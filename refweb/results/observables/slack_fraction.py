@@ -9,7 +9,7 @@ class SlackFraction(Observable):
     """Slack elements over all elements."""
 
     def of(self, state):
-        """Of elements that are slack all along."""
+        """Share of the elements that are slack all along."""
         return Value(float(state.element_slack.mean()), None)
 
     def bounds(self, system):

@@ -1,0 +1,38 @@
+"""Names and docstrings in plain words: nouns of the field, verbs with an object, no bare filler words.
+
+The glossary of the reference has the words; here is what no name and no first line of a docstring may be.
+"""
+
+import ast
+
+import pytest
+from import_graph import MODULES
+
+BARE = set(
+    "told found own one other most least whole way room place look note give take meet keep held shown seen here "
+    "there".split()
+)
+"""Words that are no name by themselves."""
+VAGUE = {"What", "Whether", "Of", "That", "How", "Where", "Which", "Who", "Why", "As", "One", "When", "If", "By"}
+"""Words that begin no docstring: it begins with a verb, or with the quantity."""
+
+
+def defined(tree):
+    """Names that a module defines, with their lines."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.id if isinstance(node, ast.Name) else node.attr, node.lineno
+        elif isinstance(node, ast.arg):
+            yield node.arg, node.lineno
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield node.name, node.lineno
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_names_and_docstrings_say_what_they_are(name):
+    tree = MODULES[name]
+    bare = [f"{word} in line {line}" for word, line in defined(tree) if word.strip("_") in BARE]
+    assert not bare
+    parts = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module))
+    vague = [text for node in parts if (text := ast.get_docstring(node)) and text.split()[0].rstrip(",") in VAGUE]
+    assert not vague, vague[0].splitlines()[0]
