@@ -126,7 +126,7 @@ def run_within_drift(simulation, folder, tell):
 
 
 def _throw(simulation, run, ended, rows, known):
-    """Results of a throw, with ± where the step refinement has ended, for all that is settled before a ``known`` time."""
+    """Results of a throw, with ± where the step refinement has ended, for events before a ``known`` time."""
     scene, watch = simulation.scene, simulation.watch
     state, twin, factor = watch.state(run.course), None, 0.0
     if ended is not None:

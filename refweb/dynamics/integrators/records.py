@@ -311,7 +311,7 @@ class Model(Record):
 
     @classmethod
     def of(cls, system, outs):
-        """Make the record of a `refweb.system.system.System`, whose families write their values per cell to ``outs``."""
+        """Make the record of a `refweb.system.system.System`, whose families write their values to ``outs``."""
         inertia, families, implicit_contacts = (
             Inertia.of(system),
             Families.of(system, outs),

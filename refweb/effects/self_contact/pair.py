@@ -27,7 +27,7 @@ ROUNDING = 1e-15
 
 
 class Place(NamedTuple):
-    """Geometry of a pair: vectors u and w of both elements, p from the first node of the second to that of the first."""
+    """Geometry of a pair: vectors u and w of both elements, p from the second's first node to that of the first."""
 
     p: tuple
     u: tuple
