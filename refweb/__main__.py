@@ -89,8 +89,8 @@ def _reason(error):
     last = error.__traceback__
     while last.tb_next is not None:
         last = last.tb_next
-    place = f"{os.path.basename(last.tb_frame.f_code.co_filename)}:{last.tb_lineno}"
-    return f"internal error, {type(error).__name__}: {error} ({place}); please report it with the scene"
+    location = f"{os.path.basename(last.tb_frame.f_code.co_filename)}:{last.tb_lineno}"
+    return f"internal error, {type(error).__name__}: {error} ({location}); please report it with the scene"
 
 
 def alone():

@@ -18,15 +18,15 @@ def accepts(schema):
 
 def limits(kind, above=None, at_least=None, below=None, at_most=None):
     """Numbers of a kind, "number" or "integer", within bounds."""
-    least, most = at_least if above is None else above, at_most if below is None else below
-    ends = {"minimum": least, "exclusiveMinimum": above is not None or None, "maximum": most}
+    lower, upper = at_least if above is None else above, at_most if below is None else below
+    ends = {"minimum": lower, "exclusiveMinimum": above is not None or None, "maximum": upper}
     given = {"type": kind, **ends, "exclusiveMaximum": below is not None or None}
     return {key: value for key, value in given.items() if value is not None}
 
 
-def array(items, least=0, most=None):
+def array(items, minimum=0, maximum=None):
     """Lists of so many items."""
-    return {"type": "array", "items": items, "minItems": least} | ({"maxItems": most} if most else {})
+    return {"type": "array", "items": items, "minItems": minimum} | ({"maxItems": maximum} if maximum else {})
 
 
 def by_name(items):

@@ -146,8 +146,8 @@ def _supported(net, supports, support):
         supported[net.web.rim] = True
     else:
         tables.insert(0, ("[supports]", supports))
-    for place, table in tables:
-        with refused_at(place):
+    for key, table in tables:
+        with refused_at(key):
             supported[np.ix_(net.find(table.nodes, "nodes"), table.components)] = True
     return supported
 
@@ -155,8 +155,8 @@ def _supported(net, supports, support):
 class _Placed:
     """An effect whose refusals begin with its table."""
 
-    def __init__(self, place, effect):
-        self.place, self.effect = place, effect
+    def __init__(self, key, effect):
+        self.place, self.effect = key, effect
 
     def __getattr__(self, name):
         method = getattr(self.effect, name)
@@ -173,10 +173,10 @@ def _acting(effects):
     names = [name_of(EFFECTS, effect) for effect in effects]
     tables = list(dict.fromkeys(["body", *names]))
     acting, count = [], {}
-    for name, effect in sorted(zip(names, effects, strict=True), key=lambda one: tables.index(one[0])):
+    for name, effect in sorted(zip(names, effects, strict=True), key=lambda pair: tables.index(pair[0])):
         count[name] = count.get(name, 0) + 1
-        for other in (other for other in effect.excludes if other in names):
-            raise InputError(f"[{name}] has what [{other}] would bring: leave out one of them")
+        for excluded in (excluded for excluded in effect.excludes if excluded in names):
+            raise InputError(f"[{name}] has what [{excluded}] would bring: leave out one of them")
         if not effect.several and count[name] > 1:
             raise InputError(f"[{name}] is listed {count[name]} times: a scene has one")
         acting.append(_Placed(f"[[{name}]] {count[name]}" if effect.several else f"[{name}]", effect))
@@ -217,9 +217,9 @@ def _takes_links(method):
 def _check_links(solve):
     """Refuse links for what cannot hold them."""
     if solve.method != "auto" and not _takes_links(solve.method):
-        here = f'kind = "{solve.kind}" and method = "{solve.method}"'
+        method_keys = f'kind = "{solve.kind}" and method = "{solve.method}"'
         able = " or ".join(f'"{method}"' for method in INTEGRATORS if _takes_links(method))
-        raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = {able}, not {here}')
+        raise InputError(f'[[link]] needs [solve] kind = "dynamic" and method = {able}, not {method_keys}')
     if solve.start == "equilibrium":
         raise InputError('[solve] start = "equilibrium" knows no [[link]]: it must be "web" or a result folder')
 
@@ -257,9 +257,9 @@ def _check_names(events, system):
     named = [(f"[[event]] {i} name = ", event.name) for i, event in enumerate(events, 1)]
     named += [("[[body]] name = ", body.name) for body in system.net.bodies]
     named += [*(("[web] group ", group) for group in web.groups), *(("[web] node ", node) for node in web.names)]
-    for place, name in named:
+    for key, name in named:
         if name in columns:
-            raise InputError(f"{place}{shown(name)} is {columns[name]} of history.csv: names are unique")
+            raise InputError(f"{key}{shown(name)} is {columns[name]} of history.csv: names are unique")
 
 
 def _check_average(average, solve):

@@ -43,12 +43,12 @@ class PenetrationError(SolverError):
 
 
 @contextlib.contextmanager
-def refused_at(place):
+def refused_at(location):
     """Begin what is refused inside with its place, such as ``[web]`` or ``net.toml:``."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{place} {error}") from None
+        raise InputError(f"{location} {error}") from None
 
 
 def in_file(name):

@@ -126,11 +126,11 @@ def copy_rows(source, target):
 
 
 @kernel(leaf=True)
-def inner(one, other):
+def inner(first, second):
     """Inner product of two vectors; to read a kernel with numba's own, or its sum or ``in``, imports scipy.linalg."""
     total = 0.0
-    for n in range(one.shape[0]):
-        total += one[n] * other[n]
+    for n in range(first.shape[0]):
+        total += first[n] * second[n]
     return total
 
 

@@ -32,8 +32,8 @@ def closest(name, known):
     import difflib
 
     plain = {k.casefold(): k for k in reversed(known)}
-    found = difflib.get_close_matches(str(name).casefold(), plain, n=1, cutoff=0.5)
-    return plain[found[0]] if found else None
+    matches = difflib.get_close_matches(str(name).casefold(), plain, n=1, cutoff=0.5)
+    return plain[matches[0]] if matches else None
 
 
 def nearest(name, known):

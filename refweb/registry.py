@@ -210,34 +210,34 @@ def exports():
 def load(reference) -> Any:
     """Object that a ``"module:name"`` or a ``"module"`` stands for."""
     module, _, name = reference.partition(":")
-    found = importlib.import_module(module)
-    return getattr(found, name) if name else found
+    loaded = importlib.import_module(module)
+    return getattr(loaded, name) if name else loaded
 
 
 def name_of(table, value):
     """Name under which the class of a value stands in a table, None where it is not in it."""
-    own = f"{type(value).__module__}:{type(value).__qualname__}"
-    return next((name for name, reference in table.items() if reference == own), None)
+    own_reference = f"{type(value).__module__}:{type(value).__qualname__}"
+    return next((name for name, reference in table.items() if reference == own_reference), None)
 
 
 FILES = {"web": ("path", "lines"), "body": ("file",), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 
-def with_files(given, place, tables=tuple(FILES)):
-    """A copy of the dict of a scene with ``place(path)`` for each path of a file in some tables."""
+def with_files(given, folder, tables=tuple(FILES)):
+    """A copy of the dict of a scene with ``folder(path)`` for each path of a file in some tables."""
 
     def placed(table, keys):
         if not isinstance(table, dict):
             return table
-        return {k: place(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
+        return {k: folder(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
 
     given, changed = with_fold(given), {}
     for name in tables:
-        if isinstance(own := given.get(name), list):
-            changed[name] = [placed(one, FILES[name]) for one in own]
-        elif isinstance(own, dict):
-            changed[name] = placed(own, FILES[name])
+        if isinstance(values := given.get(name), list):
+            changed[name] = [placed(entry, FILES[name]) for entry in values]
+        elif isinstance(values, dict):
+            changed[name] = placed(values, FILES[name])
     return {**given, **changed}
 
 
@@ -251,13 +251,13 @@ def with_fold(given):
         from .errors import InputError
 
         raise InputError(f"[web] {said[0]}: the web is folded twice, leave one out")
-    own = {"kind": "positions", "file": web["positions"]} if said == ["positions"] else web["fold"]
+    fold = {"kind": "positions", "file": web["positions"]} if said == ["positions"] else web["fold"]
     rest = {key: value for key, value in web.items() if key not in said}
-    return {**given, "web": rest, "fold": own if isinstance(own, dict) else {"kind": own}}
+    return {**given, "web": rest, "fold": fold if isinstance(fold, dict) else {"kind": fold}}
 
 
 def paths_of(given):
     """Paths of the files that the dict of a scene names."""
-    found = []
-    with_files(given, found.append)
-    return found
+    paths = []
+    with_files(given, paths.append)
+    return paths

@@ -109,22 +109,23 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
 
 def _solve(scene, out, progress, announce, kept=None, summary=None):
     """Solve a scene, with a stiffer contact as often as one that refweb chose is too soft; see `_attempt`."""
-    clock, scene, told = Clock(), scene.settled(), []
+    clock, scene, messages = Clock(), scene.settled(), []
     with followed(progress) as tell:
         while True:
             try:
-                return _attempt(scene, out, tell, announce, clock, told, kept, summary)
+                return _attempt(scene, out, tell, announce, clock, messages, kept, summary)
             except PenetrationError as soft:
-                told.append(str(soft))
+                messages.append(str(soft))
                 scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
-                if len(told) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
+                if len(messages) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
                     scene = scene.replace(chosen=())
 
 
-def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
+def _attempt(scene, out, tell, announce, clock, messages, kept=None, summary=None):
     """Solve a scene as it stands.
 
-    ``told`` are warnings to begin with; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes on.
+    ``messages`` are warnings to begin with; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes
+    on.
     """
     system = scene.build()
     if out is None:
@@ -133,7 +134,7 @@ def _attempt(scene, out, tell, announce, clock, told, kept=None, summary=None):
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=versions())
     if kept is None:
-        solution.warnings += [*told, *notices(scene, system)]
+        solution.warnings += [*messages, *notices(scene, system)]
     else:
         solution.warnings += _before(kept, summary, system, solution.versions)
     simulation = simulation_of(scene, system, solution, kept)
@@ -179,12 +180,12 @@ def _refine(scene, solution):
     def results(solution):
         return [step["results"] for step in solution.steps] or [solution.reduced]
 
-    found = discretisation_errors(
+    changed = discretisation_errors(
         scene.replace(chosen=()), results(solution), lambda finer: results(run(finer, progress=False))
     )
     if not solution.steps:
-        solution.reduced = found[0]
-    for step, with_errors in zip(solution.steps, found, strict=False):
+        solution.reduced = changed[0]
+    for step, with_errors in zip(solution.steps, changed, strict=False):
         step["results"] = with_errors
 
 
@@ -195,8 +196,8 @@ def _before(kept, summary, system, versions):
         raise InputError("checkpoint.npz is not that of a run that scene.toml leads to: use refweb run")
     yield from summary["warnings"]
     begun = summary["versions"]
-    if other := [name for name in versions if begun.get(name) != versions[name]]:
-        changes = ", ".join(f"{name} {versions[name]} after {begun.get(name)}" for name in other)
+    if differing := [name for name in versions if begun.get(name) != versions[name]]:
+        changes = ", ".join(f"{name} {versions[name]} after {begun.get(name)}" for name in differing)
         yield f"resumed with {changes}: what follows may differ in its last digits"
 
 
@@ -235,7 +236,7 @@ def _idle(system, times):
         if family.internal or family.angular_velocity is not None:
             continue
         times = sorted({*times, *family.times})
-        between = [0.5 * (one + other) for one, other in itertools.pairwise(times)]
+        between = [0.5 * (before + after) for before, after in itertools.pairwise(times)]
         felt = [system.force_of(family, t, np.zeros((system.rows, 3))) != 0.0 for t in (*times, *between)[:MOST_TIMES]]
         acts = np.any(felt, axis=0)
         if acts.any() and not (acts & ~system.held).any():  # a node that a free body carries moves with it

@@ -114,11 +114,11 @@ class Scene:
                 raise InputError(f"{kind} is not an effect, {nearest(kind, EFFECTS)}")
         for key, kinds in CLASSES_OF_PARTS.items():
             value = getattr(self, key)
-            for one in value if isinstance(value, tuple) else [value]:
-                if type(one).__name__ not in kinds:
+            for item in value if isinstance(value, tuple) else [value]:
+                if type(item).__name__ not in kinds:
                     names = " or ".join(f"refweb.{kind}" for kind in kinds if kind != "NoneType")
                     several = f"{names}: a list of them is support" if key == "supports" else names
-                    raise InputError(f"{key} = {shown(one)} must be {several}")
+                    raise InputError(f"{key} = {shown(item)} must be {several}")
         if type(self.web).__name__ != "Web" and not (isinstance(self.web, Table) and hasattr(self.web, "web")):
             raise InputError(f"web = {shown(self.web)} must be a refweb.Web, or one of the tables that make one")
         self._fill()
@@ -252,8 +252,8 @@ class Scene:
         from .results.notebook import of_scene
 
         web = self.web
-        told = web.to_dict() if isinstance(web, Table) else {"nodes": len(web.points), "lines": len(web.lines)}
-        return of_scene({"web": told, **self._tables()}, self.title)
+        content = web.to_dict() if isinstance(web, Table) else {"nodes": len(web.points), "lines": len(web.lines)}
+        return of_scene({"web": content, **self._tables()}, self.title)
 
     @property
     def observables(self):
@@ -280,8 +280,8 @@ class Scene:
     def with_stiffness(self, stiffness):
         """The scene with another stiffness of contact for some bodies, by name, or "self_contact", as its choice."""
         bodies = {name: value for name, value in stiffness.items() if name != "self_contact"}
-        own = {"contact": bodies, "self_contact": stiffness.get("self_contact")}
-        given = ((own.get(str(name_of(EFFECTS, effect))), effect) for effect in self.effects)
+        tables = {"contact": bodies, "self_contact": stiffness.get("self_contact")}
+        given = ((tables.get(str(name_of(EFFECTS, effect))), effect) for effect in self.effects)
         effects = tuple(effect.with_stiffness(value) if value else effect for value, effect in given)
         return self.replace(effects=effects, chosen=tuple(dict.fromkeys([*self.chosen, *stiffness])))
 
@@ -380,7 +380,7 @@ def _each(key, table, given):
         raise InputError(f"[{key}] = {shown(given)} must be a list of tables: write [[{key}]]")
     if not given:
         raise InputError(f"{key} = [] must hold at least one table: write [[{key}]] or leave it out")
-    return tuple(table.read(f"[[{key}]] {i + 1}", one) for i, one in enumerate(given))
+    return tuple(table.read(f"[[{key}]] {i + 1}", entry) for i, entry in enumerate(given))
 
 
 def _by_kind(key, given, kinds):

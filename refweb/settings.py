@@ -33,7 +33,7 @@ class Head(Table):
     """
 
     schema: int = choice(1, default=1)
-    title: str = text(default="scene", most=200)
+    title: str = text(default="scene", limit=200)
     seed: int = integer(default=0, at_least=0, at_most=2**63 - 1)
 
 
@@ -177,9 +177,9 @@ class Dynamic(Table):
 
     def check(self):
         """Refuse keys of another method, and fill in the defaults of this one."""
-        own = () if self.method == "auto" else INTEGRATORS[self.method].keys
+        keys = () if self.method == "auto" else INTEGRATORS[self.method].keys
         for key in dict.fromkeys(key for method in INTEGRATORS.values() for key in method.keys):
-            if getattr(self, key) is not None and key not in own:
+            if getattr(self, key) is not None and key not in keys:
                 methods = " or ".join(f'"{name}"' for name, method in INTEGRATORS.items() if key in method.keys)
                 value = shown(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning with method = "{self.method}", only with {methods}')
@@ -188,7 +188,7 @@ class Dynamic(Table):
         defaults = {"safety": 0.5, "order": 6, "rtol": 1e-6, "family": "bdf", "linear_solver": "auto"}
         defaults["max_order"] = 12 if self.family == "adams" else 2
         for key, value in defaults.items():
-            if getattr(self, key) is None and key in own:
+            if getattr(self, key) is None and key in keys:
                 object.__setattr__(self, key, value)
         if self.family != "adams" and (self.max_order or 0) > 5:
             raise InputError(f"max_order = {self.max_order} must be ≤ 5 for BDF")
@@ -236,7 +236,7 @@ class Event(Table):
         stop = true
     """
 
-    name: str = text(most=80)
+    name: str = text(limit=80)
     kind: str = choice("contact", "taut", "threshold")
     body: str | None = text(default=None)
     with_: str | None = text(default=None)

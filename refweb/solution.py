@@ -75,8 +75,8 @@ class Solution(SolutionData):
         return self.state.reaction[: self.state.system.net.nodes]
 
     def __repr__(self):
-        found = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
-        return f'<Solution of "{self.scene.title}": {self.status}; {found}>'
+        values = ", ".join(f"{name} = {result.value:.6g} {result.unit}" for name, result in self.results.items())
+        return f'<Solution of "{self.scene.title}": {self.status}; {values}>'
 
     def _repr_html_(self):
         from .results.notebook import of_solution
@@ -109,13 +109,13 @@ class Solution(SolutionData):
         from .results.vtu import meshes
 
         if self.frames:
-            found = dict(self.frames)
-            state = found[number_of(frame, list(found))]
-            time, found = state.time, meshes(state)
-            blocks = {name: pyvista.from_meshio(meshio.Mesh(*mesh)) for name, mesh in found.items()}
+            frames = dict(self.frames)
+            state = frames[number_of(frame, list(frames))]
+            time, frames = state.time, meshes(state)
+            blocks = {name: pyvista.from_meshio(meshio.Mesh(*mesh)) for name, mesh in frames.items()}
         else:
-            found = listed(self.path)
-            time, paths = found[number_of(frame, list(found))]
+            frames = listed(self.path)
+            time, paths = frames[number_of(frame, list(frames))]
             blocks = {name: pyvista.read(path) for name, path in paths.items()}
         result = pyvista.MultiBlock(blocks)
         result.add_field_data([time], "TimeValue")
@@ -178,8 +178,8 @@ class Solution(SolutionData):
             keys = ["value", "error", "unit", "time", "at", "where"]
             keys += [key for key in OTHER_ERRORS if any(getattr(r, key) is not None for r in self.results.values())]
             rows = {name: [getattr(result, key) for key in keys] for name, result in self.results.items()}
-            found = pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
-            return found.astype({"where": "Int64"})
+            frame = pandas.DataFrame.from_dict(rows, orient="index", columns=keys)
+            return frame.astype({"where": "Int64"})
         table = pandas.DataFrame(dict(self.history))
         table = table.set_index(table.columns[0])
         table.attrs = {"title": self.scene.title, "units": dict(map(_named, self.columns))}
@@ -212,7 +212,7 @@ class Solution(SolutionData):
         from .pictures.record import of_solution
 
         path = None if out is None else target(out, ENDINGS)
-        figure = draw(of_solution(self, seen=False), quantity)
+        figure = draw(of_solution(self, with_frames=False), quantity)
         if path is not None:
             write(figure, path)
         return figure
@@ -295,21 +295,23 @@ def load(folder) -> Solution:
         raise InputError(f"result folder {short(str(folder))}: holds {summary['kind']}, not a run")
     scene = scene_of(folder, summary)
     try:
-        found = Solution(scene, path=folder)
+        solution = Solution(scene, path=folder)
         for key in ("status", "message", "web", "events", "solver", "cost", "versions", "warnings"):
-            setattr(found, key, summary[key])
-        found.bodies, found.horizon = summary.get("bodies", {}), summary.get("horizon", {})
-        found.pairs, found.lines, found.passage = (summary.get(key, {}) for key in ("pairs", "lines", "passage"))
-        found.broken_before = summary.get("broken_before", [])
-        found.breaks, found.throw = summary.get("breaks"), summary.get("throw", {})
+            setattr(solution, key, summary[key])
+        solution.bodies, solution.horizon = summary.get("bodies", {}), summary.get("horizon", {})
+        solution.pairs, solution.lines, solution.passage = (
+            summary.get(key, {}) for key in ("pairs", "lines", "passage")
+        )
+        solution.broken_before = summary.get("broken_before", [])
+        solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
-            found.utilisation = used["value"], used["line"]
-        found.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
-        found.reduced = {} if found.steps else read_results(summary["results"])
+            solution.utilisation = used["value"], used["line"]
+        solution.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
+        solution.reduced = {} if solution.steps else read_results(summary["results"])
     except (KeyError, TypeError, ValueError, AttributeError):
         raise InputError(f"{short(str(folder))}/run.json: is not what a run of refweb writes") from None
-    found.columns, found.state = _columns(folder), _last_state(folder, scene)
-    return found
+    solution.columns, solution.state = _columns(folder), _last_state(folder, scene)
+    return solution
 
 
 def summary_of(folder):

@@ -51,10 +51,10 @@ def _number(name, value, unit=""):
 def _whole(name, value, what="a whole number"):
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
         _refuse(name, value, what)
-    whole = int(value)
-    if abs(whole) > _WHOLE:
+    number = int(value)
+    if abs(number) > _WHOLE:
         _refuse(name, value, f"{what} below 2⁶³")
-    return whole
+    return number
 
 
 def _bounded(name, value, unit, above, at_least, below, at_most):
@@ -67,8 +67,8 @@ def _bounded(name, value, unit, above, at_least, below, at_most):
         if bad:
             _refuse(name, value, f"{sign} {bound:g}" + (f" [{unit}]" if unit else ""))
     if 0.0 in (above, at_least) and 0 < value < SMALLEST:
-        least = f"≥ {SMALLEST:g}" if above == 0.0 else f"0 or ≥ {SMALLEST:g}"
-        _refuse(name, value, least + (f" [{unit}]" if unit else ""))
+        lower = f"≥ {SMALLEST:g}" if above == 0.0 else f"0 or ≥ {SMALLEST:g}"
+        _refuse(name, value, lower + (f" [{unit}]" if unit else ""))
     return value
 
 
@@ -115,7 +115,7 @@ def choice(*names, default=MISSING) -> Any:
     """Accept one of a few names (or numbers); a dict among them stands for the names it has when a value is read."""
 
     def valid():
-        return [one for given in names for one in (given if isinstance(given, dict) else [given])]
+        return [name_i for given in names for name_i in (given if isinstance(given, dict) else [given])]
 
     @accepts(lambda: {"type": "string" if isinstance(valid()[0], str) else "integer", "enum": valid()})
     def read(name, value):
@@ -141,15 +141,15 @@ def boolean(default=MISSING) -> Any:
     return field(read, default=default)
 
 
-def text(default=MISSING, *, most=4096) -> Any:
-    """A string that is not empty, stands on one line and has at most ``most`` characters."""
+def text(default=MISSING, *, limit=4096) -> Any:
+    """A string that is not empty, stands on one line and has at most ``limit`` characters."""
 
-    @accepts({"type": "string", "pattern": r"\S", "maxLength": most})
+    @accepts({"type": "string", "pattern": r"\S", "maxLength": limit})
     def read(name, value):
         if not isinstance(value, str) or not value.strip() or not value.isprintable():
             _refuse(name, value, "a printable text on one line")
-        if len(value) > most:
-            _refuse(name, value, f"a text of at most {most} characters, not {len(value)}")
+        if len(value) > limit:
+            _refuse(name, value, f"a text of at most {limit} characters, not {len(value)}")
         return value
 
     return field(read, default=default)
@@ -337,13 +337,13 @@ def table(cls):
         From the class, where a key is unknown or missing.
     """
     made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-    own, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
+    initial, keys = made.__init__, {f.name: key_of(f) for f in dataclasses.fields(made)}
 
-    @functools.wraps(own)
+    @functools.wraps(initial)
     def __init__(self, **given):
         given = {keys.get(name, name): value for name, value in given.items()}
         refuse_keys(made, given)
-        own(self, **{f"{key}_" if f"{key}_" in keys else key: value for key, value in given.items()})
+        initial(self, **{f"{key}_" if f"{key}_" in keys else key: value for key, value in given.items()})
 
     made.__init__ = __init__
     return made

@@ -204,7 +204,7 @@ MUTANTS = [
     Mutant("net/single_cable", "scale * np.sin((n - k) * phi)", "-scale * np.sin((n - k) * phi)"),
     Mutant("net/grown_core", "past < WIDENING * width", "past < width"),
     Mutant("net/grown_core", "by_tt = g1 * g1 *", "by_tt = g1 *"),
-    Mutant("effects/contact/contact_points", " or abs(step - place) > 0.5 * moved", ""),
+    Mutant("effects/contact/contact_points", " or abs(step - xi) > 0.5 * moved", ""),
     Mutant("net/shapes/rounding", "ROUNDING = 0.02", "ROUNDING = 0.03"),
     Mutant("net/discretisation", "quadrature=gauss(element.maxdeg))", "quadrature=gauss(element.maxdeg + 1))"),
     Mutant("net/discretisation", "np.array([0.5, 0.5])", "np.array([0.6, 0.4])"),
@@ -223,7 +223,7 @@ MUTANTS = [
     ),
     Mutant("effects/elasticity", "d * (along - across) * p[i] * p[j]", "d * along * p[i] * p[j]"),
     Mutant("effects/elasticity", "pulled = (1.0 + e) * stress", "pulled = stress"),
-    Mutant("effects/damping", "max(pull, least)", "pull"),
+    Mutant("effects/damping", "max(pull, smallest)", "pull"),
     Mutant(
         "effects/damping",
         "power -= weights[q] * data[c, LENGTH] * pull * rate",
@@ -241,17 +241,17 @@ MUTANTS = [
     ),
     Mutant("effects/drag/implicit_drag", "touches[n, START + k] + 0.5 * h", "touches[n, START + k] + h"),
     Mutant("effects/drag/table", "[self.normal, math.pi * self.tangential]", "[self.normal, self.tangential]"),
-    Mutant("system/contact_forces", "felt[other, FORCE] -= x", "felt[other, FORCE] += x"),
+    Mutant("system/contact_forces", "felt[partner_row, FORCE] -= x", "felt[partner_row, FORCE] += x"),
     Mutant("system/contact_forces", "float(cell % known[ELEMENTS])", "float(cell)"),
     Mutant("dynamics/integrators/contacts", "if known[FAMILY] in near:", "if False:"),
-    Mutant("results/observables/overlap", "else forces.pair_rows(other, bodies))", "else [forces.row(other)])"),
-    Mutant("results/observables/overlap", "if other is None else", "if body is None else"),
+    Mutant("results/observables/overlap", "forces.pair_rows(body_b, bodies)", "[forces.row(body_b)]"),
+    Mutant("results/observables/overlap", "if body_b is None else", "if body is None else"),
     Mutant("effects/contact/penalty", "out[c, FELT + k] += push * g[k]", "out[c, FELT + k] -= push * g[k]"),
     Mutant("effects/contact_solver", "out[c, FELT + k] -= memory", "out[c, FELT + k] += memory"),
     Mutant("results/observables/distances", "m = n - 1 if n > 0 else rows.size - 1", "m = n - 1 if n > 0 else 0"),
     Mutant("results/observables/angular_momentum", "(moment * state.v[row] for", "(state.v[row] for"),
     Mutant("effects/orbit", "np.diag([3.0, 0.0, -1.0])", "np.diag([2.0, 0.0, -1.0])"),
-    Mutant("effects/pressure", "d0 += couple * x[other, 0]", "d0 -= couple * x[other, 0]"),
+    Mutant("effects/pressure", "d0 += couple * x[column, 0]", "d0 -= couple * x[column, 0]"),
     Mutant(
         "effects/outer_load",
         "(0.0, 1.0) if net.quasi_static else (1.0, 0.0)",
@@ -268,7 +268,9 @@ MUTANTS = [
     Mutant(
         "effects/contact/table", "slip_velocity: float = real(default=1e-2", "slip_velocity: float = real(default=1e-3"
     ),
-    Mutant("effects/contact/table", "return getattr(self, key) if own is None else own", "return getattr(self, key)"),
+    Mutant(
+        "effects/contact/table", "return getattr(self, key) if given is None else given", "return getattr(self, key)"
+    ),
     Mutant(
         "effects/contact/friction",
         "damped, rate = max(pair.damping * dot(g, u), -1.0)",
@@ -281,30 +283,30 @@ MUTANTS = [
     ),
     Mutant(
         "effects/contact/overlap",
-        "self.exponent + self.moving)\n        return rounded_up(max(own",
-        "self.exponent)\n        return rounded_up(max(own",
+        "self.exponent + self.moving)\n        return rounded_up(max(factor",
+        "self.exponent)\n        return rounded_up(max(factor",
     ),
     Mutant("effects/contact/overlap", "1.0 if body.shape.once or body.shape.planar else 2.0", "1.0"),
     Mutant("effects/contact/sphere", "out[c, 0] = data[c, RADIUS] - distance", "out[c, 0] = distance"),
-    Mutant("effects/contact/line_body_ccd", "if most < limit:", "if seen < limit:"),
+    Mutant("effects/contact/line_body_ccd", "if largest < limit:", "if seen < limit:"),
     Mutant(
         "effects/contact/line_body_ccd",
-        "square += (own - v[b, k] - kick * inverse[b, k] * f[b, k]) ** 2",
-        "square += own**2",
+        "square += (velocity - v[b, k] - kick * inverse[b, k] * f[b, k]) ** 2",
+        "square += velocity**2",
     ),
     Mutant(
         "effects/contact/line_body_ccd",
-        "return abs(drift) * math.sqrt(most)",
-        "return 0.5 * abs(drift) * math.sqrt(most)",
+        "return abs(drift) * math.sqrt(fastest)",
+        "return 0.5 * abs(drift) * math.sqrt(fastest)",
     ),
     Mutant("effects/contact/line_body_ccd", "met[3] = 0 if below", "met[3] = 1 if below"),
     Mutant(
         "dynamics/integrators/ccd", "if then != TOLD and walls.met[3] == 0:", "if walls.met[3] == 0 and then == TOLD:"
     ),
-    Mutant("dynamics/integrators/ccd", "    left[0] -= way\n", ""),
+    Mutant("dynamics/integrators/ccd", "    left[0] -= path\n", ""),
     Mutant("effects/self_contact/line_line_friction", "(1.0 - a, a, b - 1.0, -b)", "(1.0 - a, a, -b, b - 1.0)"),
     Mutant("effects/self_contact/line_line_penalty", "if square > (REACH * of.touch) ** 2", "if square > of.touch**2"),
-    Mutant("dynamics/integrators/ccd", "min(left, room, due[DUE] - due[PAST])", "min(left, room)"),
+    Mutant("dynamics/integrators/ccd", "min(left, margin, due[DUE] - due[PAST])", "min(left, margin)"),
     Mutant("dynamics/integrators/ccd", "due[PAST] += guard.left[1]", "due[PAST] += 0.0"),
     Mutant("dynamics/integrators/ccd", "CALM * skin.last < left", "CALM * skin.last < 20.0 * left"),
     Mutant(
@@ -312,7 +314,7 @@ MUTANTS = [
     ),
     Mutant("dynamics/integrators/body_body_ccd", "if not (depth + nearer <", "if not (depth <"),
     Mutant("dynamics/integrators/body_body_ccd", "or nearer < self._apart(pair, x)", "or 0.0 < self._apart(pair, x)"),
-    Mutant("dynamics/integrators/body_body_ccd", "+ self._nearer(pair, room)", ""),
+    Mutant("dynamics/integrators/body_body_ccd", "+ self._nearer(pair, margin)", ""),
     Mutant("dynamics/integrators/line_body_ccd", "2.0 * self._extent * np.hypot", "0.0 * self._extent * np.hypot"),
     Mutant("statics/body_penetration", "around[(around > 0.0) & (around < 1.0)]", "around[around > 1.0]"),
     Mutant("effects/contact_solver", "1.0 / (1.0 - math.exp(-z)) - 1.0 / z", "1.0 / (1.0 - math.exp(-z))"),
@@ -330,7 +332,7 @@ MUTANTS = [
         "cross(p, arm(touches, n))\n        for",
     ),
     Mutant("effects/attached_nodes", "across = cross(turning, arm)", "across = cross(arm, turning)"),
-    Mutant("effects/contact/nearest_point", "if least > 0.0 else 1.0", "if least > 0.0 else 0.0"),
+    Mutant("effects/contact/nearest_point", "if lightest > 0.0 else 1.0", "if lightest > 0.0 else 0.0"),
     Mutant("net/rotation", "q1 += a * u0 + c * u2 - d * u1", "q1 += a * u0 - c * u2 + d * u1"),
     Mutant("net/solid", "c * c * ball + 2.0 * c * first + second", "c * c * ball + c * first + second"),
     Mutant(
@@ -339,13 +341,13 @@ MUTANTS = [
         "add_cross(block, at, at, moment, -1.0)",
     ),
     Mutant("effects/contact/body_body_detection", "(thickness - 0.5 * deep)", "thickness"),
-    Mutant("effects/contact/body_body_penalty", "steep * total / own", "steep / own"),
+    Mutant("effects/contact/body_body_penalty", "steep * total / lever", "steep / lever"),
     Mutant("effects/contact/body_body_friction", "-own.lever[k], -own.arm[k]", "own.lever[k], own.arm[k]"),
     Mutant(
-        "effects/contact/pair_overlap", "if not pair.overlap + (way := self._way(pair)) < pair.thickness", "if False"
+        "effects/contact/pair_overlap", "if not pair.overlap + (path := self._way(pair)) < pair.thickness", "if False"
     ),
     Mutant("effects/contact/undetected_overlap", "if deep > LEAST * min(a.thickness, b.thickness)", "if False"),
-    Mutant("net/skeleton", "found[:, OWNS] + 2.0 * math.pi / ARCS", "found[:, OWNS] + 1.9 * math.pi / ARCS"),
+    Mutant("net/skeleton", "rows[:, OWNS] + 2.0 * math.pi / ARCS", "rows[:, OWNS] + 1.9 * math.pi / ARCS"),
     Mutant("effects/contact/pair", "across = np.sqrt((reach**2).sum() - reach**2)", "across = 0.3 * reach"),
     Mutant("effects/contact/line_body_friction", "arm = cross(axis, y)", "arm = cross(y, axis)"),
     # Systems and links
@@ -373,7 +375,7 @@ MUTANTS = [
         "statics/duality_bound", "np.where(bars.tension > 0.0, 0.0, bars.natural - bars.length)", "0.0 * bars.length"
     ),
     Mutant("statics/floating", "tension > equilibrium.duality_bound.tension[:, None]", "tension > -1.0"),
-    Mutant("statics/floating", "found[side, open_, axis] = sign * far[open_]", "pass"),
+    Mutant("statics/floating", "limits[side, open_, axis] = sign * far[open_]", "pass"),
     Mutant("statics/interval", "between = (ends[:, 0] != ends[:, 1])", "between = (ends[:, 0] < ends[:, 1])"),
     Mutant("statics/lowest", "starts[1] < starts[0] - none", "starts[1] > starts[0] + none"),
     Mutant("results/observables/observable", "/ SHARE * ROUNDING", "/ SHARE * ROUNDING / 27.0"),
@@ -383,7 +385,7 @@ MUTANTS = [
         "statics/stability", "0 if self.definite >= 0 else int(_negative", "0 if self.definite >= -1 else int(_negative"
     ),
     Mutant("statics/stability", "-K / scale**2, -C / scale", "-K / scale**2, C / scale"),
-    Mutant("statics/stability", "complex_ = abs(found.imag) > off", "complex_ = abs(found.imag) > 1e99"),
+    Mutant("statics/stability", "complex_ = abs(values.imag) > off", "complex_ = abs(values.imag) > 1e99"),
     Mutant(
         "statics/slowest_vibrations", "[-self.omega * self._root * self.soft", "[self.omega * self._root * self.soft"
     ),
@@ -394,7 +396,7 @@ MUTANTS = [
         "0.0 * (np.abs(state.tension) + stiffness * moved)",
     ),
     Mutant("statics/newton", "None if self.system.pattern.size < SMALL else shift", "None"),
-    Mutant("statics/predictor", "if energy < least:", "if energy > least:"),
+    Mutant("statics/predictor", "if energy < lowest:", "if energy > lowest:"),
     Mutant("system/conjugate_gradients", "p = z + _over(size, last) * p", "p = z"),
     # Dynamics, its books and its ±
     Mutant("dynamics/integrators/simpson_balance", "np.where(self._held, 0.0, v)", "v"),
@@ -412,9 +414,11 @@ MUTANTS = [
     Mutant("dynamics/integrators/step_limits", "stop = self._corners[ahead] if", "stop = self._corners[-1] if"),
     Mutant("dynamics/history", "SPREAD = 3.0", "SPREAD = 1.5"),
     Mutant("dynamics/twin_error", "MOST_CHANCE, TELLING = 10.0", "MOST_CHANCE, TELLING = 1.0"),
-    Mutant("dynamics/history", "found[name] = 0.5 * time * float(along)", "found[name] = 0.0"),
+    Mutant("dynamics/history", "distances[name] = 0.5 * time * float(along)", "distances[name] = 0.0"),
     Mutant(
-        "dynamics/twin_error", "factor = 1.0 / (1.0 - simulation.integrator.error_share(one, other))", "factor = 1.0"
+        "dynamics/twin_error",
+        "factor = 1.0 / (1.0 - simulation.integrator.error_share(first_run, refined))",
+        "factor = 1.0",
     ),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
     Mutant("dynamics/history", 'scales["stress"] = 0, 1.0 / net.area', 'scales["stress"] = 0, net.area'),
@@ -438,7 +442,7 @@ MUTANTS = [
     Mutant("dynamics/budget", "last.price * (last.knob / knob) ** power", "last.price"),
     Mutant("dynamics/budget", "max(LEAST, RUNS * first)", "LEAST"),
     Mutant("results/units", "scale_of(larger(value, error), unit)", "scale_of(value, unit)"),
-    Mutant("results/solution", "max(self.value - least, most - self.value, 0.0)", "np.inf"),
+    Mutant("results/solution", "max(self.value - lower, upper - self.value, 0.0)", "np.inf"),
     Mutant("results/columns", ", *dynamic_energies(system), *components(VECTORS)]", ", *dynamic_energies(system)]"),
     Mutant("build", 'named += [("[[body]] name = ", body.name) for body in system.net.bodies]', "pass"),
     Mutant("runner", "acts & ~system.held", "acts & ~system.supported"),
@@ -464,7 +468,7 @@ MUTANTS = [
     Mutant("results/folder", 'timestep="{number(time)}"', 'timestep="{number(row)}"'),
     Mutant("results/files", "return repr(float(value))", 'return f"{value:.9g}"'),
     Mutant("pictures/frames", "paths=self.paths + (scale * phase - 1.0)", "paths=self.paths + (scale * phase + 1.0)"),
-    Mutant("pictures/record", "max(found, key=lambda pair: pair[0])[1]", "found[-1][1]"),
+    Mutant("pictures/record", "max(candidates, key=lambda pair: pair[0])[1]", "candidates[-1][1]"),
     Mutant(
         "pictures/movie_writer",
         "part = np.where(differs, numbers, COLOURS)",
@@ -532,7 +536,7 @@ MUTANTS = [
     Mutant("compiled/tables", "for _ in range(2):  # what", "for _ in range(1):  # what"),
     # Values by path, new scenes and comparisons
     Mutant("reference/paths", "int(key) <= last + tables", "int(key) < last + tables"),
-    Mutant("reference/paths", "return {**here, key: _put", "return {key: _put"),
+    Mutant("reference/paths", "return {**value_here, key: _put", "return {key: _put"),
     Mutant("commands/new", "os.path.relpath(folder / value, target)", "os.path.relpath(folder / value, folder)"),
     Mutant("pages/packed", "[changes >> 8, changes & 0xFF]", "[changes & 0xFF, changes >> 8]"),
     Mutant("pages/packed", "size = written.nbytes + -written.nbytes % 4", "size = written.nbytes"),
@@ -543,22 +547,22 @@ MUTANTS = [
     Mutant("pages/page", "hashlib.sha256(script.encode())", "hashlib.sha256(script[1:].encode())"),
     Mutant("pages/page", "if not len(next(iter(history.values()), [])):", "if history is None:"),
     Mutant("pages/markup", "zip(columns, cells, strict=True)", "zip(columns[::-1], cells, strict=True)"),
-    Mutant("pictures/paraview", '"vector": points.get(look.field, 1) > 1', '"vector": look.field in points'),
+    Mutant("pictures/paraview", '"vector": points.get(options.field, 1) > 1', '"vector": options.field in points'),
     Mutant("net/mesh_file", "np.flatnonzero(broken[of])", "np.zeros(0, dtype=np.int64)"),
     Mutant(
         "system/system",
         "self.per_cell() if per_cell is",
         "self.__dict__.setdefault('one', self.per_cell()) if per_cell is",
     ),
-    Mutant("system/broken_lines", "other.families.append(held(net))", "pass"),
+    Mutant("system/broken_lines", "changed.families.append(held(net))", "pass"),
     Mutant(
         "dynamics/integrators/rupture", "_holding(self.inner.system.net.broken)", "_holding(course.breaks.elements)"
     ),
     Mutant("solution", "out.keep_twin(self.twin_end)", "pass"),
     Mutant("accepted", '"exclusiveMinimum": above is not None or None', '"exclusiveMinimum": None'),
-    Mutant("reference/schema", "without=every - set(own)", "without=()"),
+    Mutant("reference/schema", "without=every - set(keys_of)", "without=()"),
     Mutant("reference/pages", 'f"[[{name}]]" if several', 'f"[[{name}]]" if not several'),
-    Mutant("results/comparison", "for least, _ in spans) <= min(", "for least, _ in spans) < min("),
+    Mutant("results/comparison", "for lower, _ in spans) <= min(", "for lower, _ in spans) < min("),
     Mutant("results/comparison", "len(spans) == len(results) and max", "max"),
 ]
 

@@ -13,11 +13,11 @@ def run(arguments):
     """Print results and what differs between the scenes; 1 where results differ."""
     from ..results.comparison import compare
 
-    found = compare(arguments.folders)
+    comparison = compare(arguments.folders)
     if arguments.json:
-        print_json(found)
+        print_json(comparison)
     else:
         from .console import print_comparison
 
-        print_comparison(found)
-    return 0 if found["agree"] else 1
+        print_comparison(comparison)
+    return 0 if comparison["agree"] else 1

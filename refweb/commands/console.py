@@ -73,7 +73,7 @@ def print_scene(scene, system):
         if len(system.corners) > FEW_CORNERS:
             from ..dynamics.breakpoints import remarks_on_corners
 
-            corners = [("corners", told) for told in remarks_on_corners(scene.replace(solve=solve), system)]
+            corners = [("corners", remark) for remark in remarks_on_corners(scene.replace(solve=solve), system)]
     if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
         from ..dynamics.expected_cost import expected_cost
 
@@ -108,18 +108,18 @@ def _stiffness(scene, system):
     if "self_contact" in scene.chosen:
         from ..effects.self_contact.penetration import Passage
 
-        own = Passage(system).plain()
-        text = f"stiffness {own['stiffness']:.3g} N/m for lines on lines, chosen for an overlap of at most "
-        yield "contact", text + readable(own["radius"], None, "m")
+        overlaps = Passage(system).plain()
+        text = f"stiffness {overlaps['stiffness']:.3g} N/m for lines on lines, chosen for an overlap of at most "
+        yield "contact", text + readable(overlaps["radius"], None, "m")
 
 
 def _results_of_steps(steps):
     """A row for each load step, of results in columns of one unit each, and last where they stand."""
-    found = rows_of_steps(steps)
+    table = rows_of_steps(steps)
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in found.columns:
+    for name in table.columns:
         grid.add_column(Text(name), justify="right")
-    for row in (*found.rows, *([found.last] if found.last else [])):
+    for row in (*table.rows, *([table.last] if table.last else [])):
         grid.add_row(*map(Text, row))
     return grid
 
@@ -168,11 +168,11 @@ def print_modes(summary):
 
 
 def _modes(step):
-    found = rows_of_modes(step)
+    table = rows_of_modes(step)
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for name in found.columns:
+    for name in table.columns:
         grid.add_column(Text(name), justify="right" if name else "left", no_wrap=bool(name))
-    for row in found.rows:
+    for row in table.rows:
         grid.add_row(*map(Text, row))
     return grid
 
@@ -189,10 +189,10 @@ def print_cost(summary):
         work = (str(run[key]) for key in ("nfev", "nsteps"))
         grid.add_row(run["method"], run["setting"], *errors, number(run["cpu_s"], ".3f"), *work)
     rows: list = [("runs", grid)] if grid.rows else []
-    told = {}
+    parts = {}
     for run in (run for run in runs if run["status"] != "solved"):
-        told.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
-    for (status, method, message), settings in told.items():
+        parts.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
+    for (status, method, message), settings in parts.items():
         which = "" if status == "refused" else f", {settings[0]}" + (" and finer" if len(settings) > 1 else "")
         rows.append(({"budget": "left out"}.get(status, status), f"{method}{which}: {message or 'there was no time'}"))
     rows.append(("price", summary["sentence"]))
@@ -200,36 +200,36 @@ def print_cost(summary):
     _box(f"{summary['scene']}: what digits cost", rows)
 
 
-def print_comparison(found):
+def print_comparison(comparison):
     """Print results side by side, and what differs between their scenes, from what `compare` finds."""
-    folders, rows = found["folders"], []
+    folders, rows = comparison["folders"], []
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
     for name in ("result", *folders, "difference", ""):
         grid.add_column(Text(name), justify="left" if name in ("result", "") else "right")
-    for row in found["results"]:
+    for row in comparison["results"]:
         name = row["name"] + ("" if row["step"] is None else f", step {row['step']:g}")
-        there = [difference for difference in row["differences"] if difference is not None]
-        apart = there[-1] if len(folders) == 2 else max(there) - min(there)
+        differing = [difference for difference in row["differences"] if difference is not None]
+        apart = differing[-1] if len(folders) == 2 else max(differing) - min(differing)
         said = "agree" if row["agree"] else "differ"
         if row["agree"] is None:
             said = "only in " + next(f for f, value in zip(folders, row["values"], strict=True) if value is not None)
-        difference = "" if len(there) < 2 else readable(apart, None, row["unit"])
+        difference = "" if len(differing) < 2 else readable(apart, None, row["unit"])
         grid.add_row(Text(name), *map(_compared, row["values"]), Text(difference), Text(said))
     rows.append(("results", grid))
-    known = (value is None or value["error"] is not None for row in found["results"] for value in row["values"])
+    known = (value is None or value["error"] is not None for row in comparison["results"] for value in row["values"])
     if not all(known):
         rows.append(("", "a value without ± has no known error, and agrees with equal ones alone"))
-    rows += [(s, f"is the run in {f}") for f, s in zip(folders, found["status"], strict=True) if s != "solved"]
-    if found["scene"]:
+    rows += [(s, f"is the run in {f}") for f, s in zip(folders, comparison["status"], strict=True) if s != "solved"]
+    if comparison["scene"]:
         grid = Grid(box=None, padding=(0, 2), pad_edge=False)
         for name in ("key", *folders):
             grid.add_column(Text(name))
-        for row in found["scene"]:
+        for row in comparison["scene"]:
             grid.add_row(Text(row["path"]), *(Text("" if value is None else shown(value)) for value in row["values"]))
         rows.append(("scenes", grid))
     else:
         rows.append(("scenes", "are the same"))
-    _box("the results agree" if found["agree"] else "the results differ", rows)
+    _box("the results agree" if comparison["agree"] else "the results differ", rows)
 
 
 def _compared(value):
@@ -241,19 +241,19 @@ def _compared(value):
     return Text(readable(value["value"], value["error"], value["unit"]))
 
 
-def print_sweep_begins(found):
+def print_sweep_begins(study_rows):
     """Print what a study is about to run."""
     from ..results.study_text import on_design
 
-    study = found.study.to_dict()
+    study = study_rows.study.to_dict()
     varied, how = on_design(study)
-    there = sum(row["status"] not in ("waiting", "skipped") for row in found.rows)
-    rows = [("scene", found.title), ("varied", varied), ("cases", f"{len(found.cases)}, {how}")]
-    rows += [("", text) for text in found.reasons]
-    rows += [("", f"{there} of them have rows already")] if there else []
+    done = sum(row["status"] not in ("waiting", "skipped") for row in study_rows.rows)
+    rows = [("scene", study_rows.title), ("varied", varied), ("cases", f"{len(study_rows.cases)}, {how}")]
+    rows += [("", text) for text in study_rows.reasons]
+    rows += [("", f"{done} of them have rows already")] if done else []
     kept = {"json": "run.json of each", "all": "result folders of all"}
     rows += [("keeps", kept[study["keep"]])] if study["keep"] in kept else []
-    _box(found.study.title, rows)
+    _box(study_rows.study.title, rows)
 
 
 def print_sweep(summary):
@@ -270,9 +270,9 @@ def print_sweep(summary):
             "indices": words.rows_of_indices,
         }
         for name, make in parts.items():
-            found = make(entry)
-            if found.rows:
-                rows.append((name, _columns(found)))
+            made = make(entry)
+            if made.rows:
+                rows.append((name, _columns(made)))
         rows += [("", text) for text in (*words.on_spread(entry), *words.on_indices(entry))]
     rows += [("samples", text) for text in words.on_samples(summary["study"])]
     cost = summary["cost"]
@@ -283,11 +283,11 @@ def print_sweep(summary):
     _box(f"{summary['title']}: {summary['status']}", rows)
 
 
-def _columns(found):
+def _columns(rows):
     """Rows below names of columns, as a grid."""
     grid = Grid(box=None, padding=(0, 2), pad_edge=False)
-    for number, name in enumerate(found.columns):
+    for number, name in enumerate(rows.columns):
         grid.add_column(Text(name), justify="right" if number else "left")
-    for row in found.rows:
+    for row in rows.rows:
         grid.add_row(*map(Text, row))
     return grid

@@ -24,8 +24,8 @@ def run(arguments):
     scene, out = scene_of(arguments), arguments.out
     options = {"observe": arguments.observe, "budget": arguments.budget, "out": out, "force": arguments.force}
     with followed(True) as tell:
-        found = cost(scene, progress=tell, announce=print_scene, **options)
-    show(found.summary())
+        costs = cost(scene, progress=tell, announce=print_scene, **options)
+    show(costs.summary())
     if out is not None:
         print(f"diagram in {pathlib.Path(out) / 'cost.png'}")
 

@@ -24,8 +24,8 @@ def run(arguments):
     scene = scene_of(arguments)
     out = pathlib.Path(arguments.out if arguments.out is not None else f"{slug(scene.title)}-modes")
     with followed(True) as tell:
-        found = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=print_scene)
-    show(found.summary())
+        spectra = modes(scene, arguments.number, out=out, force=arguments.force, progress=tell, announce=print_scene)
+    show(spectra.summary())
     print(f"modes in {out}")
 
 

@@ -149,5 +149,5 @@ def _moved(given, folder, target):
 def _with_text(text, path, value):
     """A scene file with another text at a path, where the key begins a line and its text ends on it; else as it is."""
     key = path.rpartition(".")[2]
-    found = rf"""(?m)^([ \t]*{key}[ \t]*=[ \t]*)("(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
-    return re.sub(found, lambda line: line[1] + json.dumps(value, ensure_ascii=False), text)
+    pattern = rf"""(?m)^([ \t]*{key}[ \t]*=[ \t]*)("(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
+    return re.sub(pattern, lambda line: line[1] + json.dumps(value, ensure_ascii=False), text)

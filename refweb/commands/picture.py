@@ -28,9 +28,9 @@ def add_arguments(parser):
 class _Words(argparse.Action):
     """A name, or up to some numbers; a word that follows them is the folder, which usage has at the end."""
 
-    def __init__(self, *args, most, folder, **options):
+    def __init__(self, *args, maximum, folder, **options):
         super().__init__(*args, **options)
-        self._most, self._folder = most, folder
+        self._most, self._folder = maximum, folder
 
     def __call__(self, parser, namespace, values, option_string=None):
         words = list(values or ())

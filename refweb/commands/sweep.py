@@ -34,11 +34,11 @@ def run(arguments):
             f"--workers {arguments.workers} has no meaning with --scheduler, whose workers are there: leave it out"
         )
     with contextlib.ExitStack() as stack:
-        there = stack.enter_context(workers.cluster(arguments.scheduler)) if arguments.scheduler else None
+        executor = stack.enter_context(workers.cluster(arguments.scheduler)) if arguments.scheduler else None
         with followed(True, "starting workers") as tell:
-            options = {"executor": there, "workers": arguments.workers, "progress": tell}
-            found = sweep.sweep(asked, out=out, announce=print_sweep_begins, **options)
-    print_sweep(found.summary())
+            options = {"executor": executor, "workers": arguments.workers, "progress": tell}
+            outcome = sweep.sweep(asked, out=out, announce=print_sweep_begins, **options)
+    print_sweep(outcome.summary())
     plot(out)
     print(f"rows in {out / 'results.csv'}, page in {report(out)}")
 

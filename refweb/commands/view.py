@@ -9,9 +9,9 @@ from ..errors import InputError
 def add_arguments(parser):
     """The folder, and what shows it."""
     parser.add_argument("folder", metavar="DIR")
-    other = parser.add_mutually_exclusive_group()
-    other.add_argument("--window", action="store_true", help="a window of pyvista, with a slider over the frames")
-    other.add_argument("--paraview", action="store_true", help="write a script for paraview --script=FILE")
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--window", action="store_true", help="a window of pyvista, with a slider over the frames")
+    group.add_argument("--paraview", action="store_true", help="write a script for paraview --script=FILE")
     parser.add_argument("--field", metavar="NAME", help="what the colours of --window and --paraview show")
     parser.add_argument("--out", metavar="FILE", help="where --paraview writes it (default: DIR/web_in_paraview.py)")
 

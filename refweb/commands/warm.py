@@ -29,7 +29,9 @@ def run(arguments):
     scenes |= {f"square-impact, {method}": scenes["square-impact"].replace(solve=_by(method)) for method in METHODS}
     for name, scene in scenes.items():
         if scene.solve.kind == "dynamic":
-            longest = max([ROWS * (scene.output.interval or 1e-3), *(one.average or 0.0 for one in scene.observe)])
+            longest = max(
+                [ROWS * (scene.output.interval or 1e-3), *(observe.average or 0.0 for observe in scene.observe)]
+            )
             scene = scene.replace(solve=_for(scene.solve, longest))
             _foresee(scene)
         cost = refweb.run(scene).cost

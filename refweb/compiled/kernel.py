@@ -35,7 +35,7 @@ def type_of(annotation):
         base, kind = typing.get_args(annotation)[:2]
         return base.kind_of(kind) if hasattr(base, "kind_of") else kind
     if typing.get_origin(annotation) is tuple:
-        return types.Tuple([type_of(one) for one in typing.get_args(annotation)])
+        return types.Tuple([type_of(part) for part in typing.get_args(annotation)])
     return annotation.reference()
 
 
@@ -126,8 +126,8 @@ class Kernel:
         """Address of its machine code, which is compiled where there is none."""
         with numba_internals.lock:
             if not self._slot.filled:
-                for one in self.callees:
-                    _ = one._slot  # symbols that its machine code names
+                for callee in self.callees:
+                    _ = callee._slot  # symbols that its machine code names
                 self._slot.fill(numba_internals.address_of(self._compiled(), self.signature))
         return self._slot.address
 
@@ -158,9 +158,9 @@ class Kernel:
     @functools.cached_property
     def callees(self):
         """Kernels that are called by their address, by it or by what is compiled into it, a list."""
-        found = {}
-        _collect(self.py_func, found, set())
-        return list(found.values())
+        kernels = {}
+        _collect(self.py_func, kernels, set())
+        return list(kernels.values())
 
 
 class _ByAddress:
@@ -178,18 +178,18 @@ class _ByAddress:
         return f"apart {self.kernel._slot.symbol}"
 
 
-def _collect(function, found, seen):
-    """Add to ``found`` the kernels that are called by their address from a function and what is compiled into it."""
-    if function in seen:
+def _collect(function, kernels, visited):
+    """Add to ``kernels`` the kernels that are called by their address from a function and what is compiled into it."""
+    if function in visited:
         return
-    seen.add(function)
+    visited.add(function)
     for _, value in keys.captured(function):
-        for one in value if isinstance(value, tuple) else (value,):
-            if isinstance(one, Kernel):
-                if one.apart is None:
-                    _collect(one.py_func, found, seen)
+        for item in value if isinstance(value, tuple) else (value,):
+            if isinstance(item, Kernel):
+                if item.apart is None:
+                    _collect(item.py_func, kernels, visited)
                 else:
-                    found[one.name] = one
+                    kernels[item.name] = item
 
 
 def needed(kernels, features=None):
@@ -206,14 +206,14 @@ def needed(kernels, features=None):
     -------
     list of Kernel
     """
-    found, left = {}, list(kernels)
+    wanted, left = {}, list(kernels)
     while left:
-        one = left.pop()
-        if one.name in found:
+        kernel_ = left.pop()
+        if kernel_.name in wanted:
             continue
-        found[one.name] = one
-        left += [k for k in one.callees if features is None or k.apart <= features]
-    return list(found.values())
+        wanted[kernel_.name] = kernel_
+        left += [k for k in kernel_.callees if features is None or k.apart <= features]
+    return list(wanted.values())
 
 
 def prepare(kernels, features=None):
@@ -224,16 +224,16 @@ def prepare(kernels, features=None):
     kernels, features
         See `needed`.
     """
-    wanted = [one for one in needed(kernels, features) if one.signature is not None]
-    unknown = [one for one in wanted if not one.known()]
-    new = {one.name: n for n, one in enumerate(unknown)}
+    wanted = [candidate for candidate in needed(kernels, features) if candidate.signature is not None]
+    unknown = [candidate for candidate in wanted if not candidate.known()]
+    new = {candidate.name: n for n, candidate in enumerate(unknown)}
     with _no_collection(), beside(unknown):
-        for one in wanted:
-            for tell in watchers if one.name in new else ():
-                tell(new[one.name], len(new))
-            one.address()
-    for one in kernels:
-        one.prepared = True
+        for candidate in wanted:
+            for tell in watchers if candidate.name in new else ():
+                tell(new[candidate.name], len(new))
+            candidate.address()
+    for candidate in kernels:
+        candidate.prepared = True
 
 
 @contextlib.contextmanager

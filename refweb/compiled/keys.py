@@ -31,14 +31,18 @@ def platform_key(processor):
     import numba
 
     content = [path.read_bytes() for path in sorted(pathlib.Path(__file__).parent.glob("*.py"))]
-    own = hashlib.sha256(b"".join(content)).hexdigest()[:16]
+    sources = hashlib.sha256(b"".join(content)).hexdigest()[:16]
     versions = numba.__version__, llvmlite.__version__
-    return " ".join([sys.implementation.cache_tag, platform.system(), platform.machine(), *versions, *processor, own])
+    return " ".join(
+        [sys.implementation.cache_tag, platform.system(), platform.machine(), *versions, *processor, sources]
+    )
 
 
 def code_of(code, docstring=None):
     """Text of a code object's instructions: neither line numbers nor its docstring, which is its first constant."""
-    constants = [code_of(one) if isinstance(one, python.CodeType) else repr(one) for one in code.co_consts]
+    constants = [
+        code_of(constant) if isinstance(constant, python.CodeType) else repr(constant) for constant in code.co_consts
+    ]
     if docstring is not None and code.co_consts[:1] == (docstring,):
         constants = constants[1:]
     names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
@@ -47,16 +51,16 @@ def code_of(code, docstring=None):
 
 def globals_in(code):
     """Names of the globals that a code object and those inside of it load, a set."""
-    found, extended = set(), 0
+    names, extended = set(), 0
     for operation, argument in zip(code.co_code[::2], code.co_code[1::2], strict=True):
         argument |= extended << 8
         if operation == LOAD_GLOBAL:
-            found.add(code.co_names[argument >> 1])
+            names.add(code.co_names[argument >> 1])
         extended = argument if operation == EXTENDED_ARG else 0
-    for one in code.co_consts:
-        if isinstance(one, python.CodeType):
-            found |= globals_in(one)
-    return found
+    for constant in code.co_consts:
+        if isinstance(constant, python.CodeType):
+            names |= globals_in(constant)
+    return names
 
 
 def captured(function):
@@ -73,20 +77,20 @@ def captured(function):
         yield name, cell.cell_contents
 
 
-def described(value, seen):
+def described(value, visited):
     """Describe a captured value by a text that is the same in every process.
 
     Parameters
     ----------
     value : object
         A number, a text, a type, a kernel, a function, or a tuple of such.
-    seen : tuple
+    visited : tuple
         Functions that are being described, of which no more is said.
     """
     if hasattr(value, "machine_code_key"):
         return value.machine_code_key()
     if isinstance(value, tuple):
-        return f"{type(value).__qualname__} {[described(one, seen) for one in value]}"
+        return f"{type(value).__qualname__} {[described(item, visited) for item in value]}"
     if isinstance(value, bool | int | float | str | bytes | type(None) | np.generic | np.dtype):
         return repr(value)
     if isinstance(value, np.ndarray):
@@ -95,16 +99,16 @@ def described(value, seen):
         return f"module {value.__name__}"
     function = getattr(value, "py_func", None) or getattr(value, "_defn", None) or value
     if isinstance(function, python.FunctionType):
-        return of_function(function, seen)
+        return of_function(function, visited)
     if isinstance(value, type):
         return f"class {value.__module__}.{value.__qualname__} {getattr(value, '_fields', ())}"
     return f"{type(value).__qualname__} {getattr(value, '__name__', value)}"
 
 
-def of_function(function, seen=()):
+def of_function(function, visited=()):
     """A text that changes where what a function does changes, or what it calls."""
-    if function in seen:
+    if function in visited:
         return f"again {function.__qualname__}"
-    seen = (*seen, function)
-    parts = [f"{name} = {described(value, seen)}" for name, value in captured(function)]
+    visited = (*visited, function)
+    parts = [f"{name} = {described(value, visited)}" for name, value in captured(function)]
     return digest(function.__module__, function.__qualname__, code_of(function.__code__, function.__doc__), *parts)

@@ -64,16 +64,16 @@ def host():
     """(name, features) of the processor that numba compiles for."""
     features = _config.CPU_FEATURES
     if features is None:
-        own = llvm.get_host_cpu_features()
-        features = ",".join(name for name in sorted(own) if own[name])
+        own_features = llvm.get_host_cpu_features()
+        features = ",".join(name for name in sorted(own_features) if own_features[name])
     return _config.CPU_NAME or llvm.get_host_cpu_name(), features
 
 
 @functools.cache
 def shipped():
     """(processor, features) whose machine code this processor runs and a wheel may bring; None where none does."""
-    found, own = store.portable(), llvm.get_host_cpu_features()
-    return found if found and (found[0] != "x86-64-v3" or all(own.get(name) for name in store.V3)) else None
+    target, features = store.portable(), llvm.get_host_cpu_features()
+    return target if target and (target[0] != "x86-64-v3" or all(features.get(name) for name in store.V3)) else None
 
 
 def options(given, counted):
@@ -106,8 +106,8 @@ class Cache:
     def _paths(self, signature):
         """Files that may have the machine code of a signature: the user's own, and that of a wheel."""
         yield store.folder() / self.file(signature)
-        if store.SHIPPED.is_dir() and (other := shipped()):
-            yield store.SHIPPED / self.file(signature, other)
+        if store.SHIPPED.is_dir() and (target := shipped()):
+            yield store.SHIPPED / self.file(signature, target)
 
     def has(self, signature):
         """Tell if there is machine code of a signature."""
@@ -115,7 +115,9 @@ class Cache:
 
     def load_overload(self, signature, target_context):
         """The machine code of a signature, None where there is none."""
-        content = next((found for path in self._paths(signature) if (found := store.read(path)) is not None), None)
+        content = next(
+            (machine_code for path in self._paths(signature) if (machine_code := store.read(path)) is not None), None
+        )
         if content is None:
             return None
         rtsys.initialize(target_context)
@@ -193,12 +195,12 @@ _slots: dict[str, Slot] = {}
 
 def slot_of(symbol, key):
     """The `Slot` of a symbol, which stays for ever; of another symbol where a kernel of another key has it."""
-    own = symbol
-    while own in _slots and _slots[own].key != key:
-        own += "'"
-    if own not in _slots:
-        _slots[own] = Slot(own, key)
-    return _slots[own]
+    name = symbol
+    while name in _slots and _slots[name].key != key:
+        name += "'"
+    if name not in _slots:
+        _slots[name] = Slot(name, key)
+    return _slots[name]
 
 
 def give_back(meminfo):
@@ -234,10 +236,10 @@ register_model(Called)(models.OpaqueModel)
 
 @lower_constant(Called)
 def _read_slot(context, builder, kind, value):
-    place = builder.module.globals.get(kind.symbol)
-    if place is None:
-        place = ir.GlobalVariable(builder.module, _byte, kind.symbol)
-    return builder.load(place)
+    slot = builder.module.globals.get(kind.symbol)
+    if slot is None:
+        slot = ir.GlobalVariable(builder.module, _byte, kind.symbol)
+    return builder.load(slot)
 
 
 @lower_builtin(Called, Called, types.VarArg(types.Any))

@@ -106,12 +106,12 @@ class Record:
         """The words of its fields."""
         words = []
         for name, kind in self.reference().fields.items():
-            value, told = getattr(self, name), f"{type(self).__name__}.{name}"
+            value, label = getattr(self, name), f"{type(self).__name__}.{name}"
             if isinstance(kind, types.Array):
-                words += sizes_of(value, kind, told)
+                words += sizes_of(value, kind, label)
             elif isinstance(kind, Pointer):
                 if value._numba_type_ != kind:
-                    refuse(value, kind, told)
+                    refuse(value, kind, label)
                 words.append(value.address)
             else:
                 words.append(int(np.float64(value).view(np.int64)) if isinstance(kind, types.Float) else int(value))
@@ -129,8 +129,8 @@ class Record:
     @classmethod
     def field_names(cls):
         """Names of the fields."""
-        own: Any = cls
-        return [field.name for field in dataclasses.fields(own)]
+        base: Any = cls
+        return [field.name for field in dataclasses.fields(base)]
 
     def by_name(self):
         """Its fields by name."""

@@ -64,10 +64,10 @@ def _copy(kernels):
             return child
     try:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the first process ends this one
-        for one in reversed(kernels):
+        for kernel_ in reversed(kernels):
             if os.getppid() != parent:
                 break
-            if not one.known():
-                one.address()
+            if not kernel_.known():
+                kernel_.address()
     finally:
         os._exit(0)

@@ -31,8 +31,8 @@ SHIPPED = pathlib.Path(__file__).parent / "machine_code"
 @functools.cache
 def folder():
     """The folder that machine code is kept in: ``REFWEB_CACHE``, else one of the user's for the cache of programs."""
-    if own := os.environ.get("REFWEB_CACHE"):
-        return pathlib.Path(own)
+    if path := os.environ.get("REFWEB_CACHE"):
+        return pathlib.Path(path)
     import platformdirs
 
     return pathlib.Path(platformdirs.user_cache_dir("refweb", appauthor=False)) / "kernels"

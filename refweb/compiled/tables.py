@@ -32,17 +32,17 @@ def pointer_to(builder, word):
     return builder.inttoptr(word, _byte)
 
 
-def _words_at(builder, pointer, place):
+def _words_at(builder, pointer, index):
     """Pointer to a word behind a pointer."""
-    return builder.gep(builder.bitcast(pointer, _word.as_pointer()), [place])
+    return builder.gep(builder.bitcast(pointer, _word.as_pointer()), [index])
 
 
-def load(builder, pointer, place, stays=True):
+def load(builder, pointer, index, stays=True):
     """A word behind a pointer, which ``stays`` what it is while kernels run, or may change."""
-    found = builder.load(_words_at(builder, pointer, ir.Constant(_word, place)))
+    value = builder.load(_words_at(builder, pointer, ir.Constant(_word, index)))
     if stays:
-        found.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return found
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value
 
 
 def array_at(context, builder, kind, data, sizes, meminfo=None):
@@ -61,7 +61,7 @@ def array_at(context, builder, kind, data, sizes, meminfo=None):
 class Pointer(types.Type):
     """Type of what is handed over by one pointer."""
 
-    def can_convert_to(self, context, other):
+    def can_convert_to(self, context, target):
         """To nothing else."""
         return None
 
@@ -96,29 +96,29 @@ class _GetItem(AbstractTemplate):
 
 @lower_builtin(operator.getitem, FunctionsType, types.intp)
 def _function(context, builder, signature, arguments):
-    table, place = arguments
+    table, index = arguments
     items = builder.inttoptr(load(builder, table, 1), _word.as_pointer())
-    found = builder.load(builder.gep(items, [place]))
-    found.set_metadata("invariant.load", builder.module.add_metadata([]))
-    return pointer_to(builder, found)
+    value = builder.load(builder.gep(items, [index]))
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return pointer_to(builder, value)
 
 
-def _item(builder, table, place, kind):
+def _item(builder, table, index, kind):
     """Pointer to the words of an array in a table: what counts its references, its address, its sizes."""
     items = builder.inttoptr(load(builder, table, 1), _word.as_pointer())
-    return builder.gep(items, [builder.mul(place, ir.Constant(_word, 2 + kind.ndim))])
+    return builder.gep(items, [builder.mul(index, ir.Constant(_word, 2 + kind.ndim))])
 
 
 @lower_builtin(operator.getitem, ArraysType, types.intp)
 def _array_in(context, builder, signature, arguments):
-    kind, (table, place) = signature.return_type, arguments
-    at = _item(builder, table, place, kind)
+    kind, (table, index) = signature.return_type, arguments
+    at = _item(builder, table, index, kind)
     meminfo = pointer_to(builder, load(builder, at, 0, stays=False))
     sizes = [load(builder, at, 2 + n, stays=False) for n in range(kind.ndim)]
-    found = array_at(context, builder, kind, load(builder, at, 1, stays=False), sizes, meminfo)
+    array = array_at(context, builder, kind, load(builder, at, 1, stays=False), sizes, meminfo)
     if context.enable_nrt:  # whoever counts references gives this one back; to others it is lent
-        context.nrt.incref(builder, kind, found)
-    return found
+        context.nrt.incref(builder, kind, array)
+    return array
 
 
 @_global(operator.setitem)
@@ -132,9 +132,9 @@ class _SetItem(AbstractTemplate):
 @lower_builtin(operator.setitem, ArraysType, types.intp, types.Array)
 def _put(context, builder, signature, arguments):
     """Put an array into a table, which then has a reference to it."""
-    kind, (table, place, value) = signature.args[2], arguments
-    at, new = _item(builder, table, place, kind), make_array(kind)(context, builder, value)
-    before = _array_in(context, builder, kind(signature.args[0], types.intp), (table, place))
+    kind, (table, index, value) = signature.args[2], arguments
+    at, new = _item(builder, table, index, kind), make_array(kind)(context, builder, value)
+    before = _array_in(context, builder, kind(signature.args[0], types.intp), (table, index))
     context.nrt.incref(builder, kind, value)
     sizes = cgutils.unpack_tuple(builder, new.shape)
     words = [builder.ptrtoint(new.meminfo, _word), builder.ptrtoint(new.data, _word), *sizes]
@@ -199,7 +199,7 @@ class Arrays:
 
     def __init__(self, item, arrays):
         self.item, self._arrays = item, list(arrays)
-        words = [[0, *sizes_of(one, item, "an array")] for one in self._arrays]
+        words = [[0, *sizes_of(array, item, "an array")] for array in self._arrays]
         self._items = np.array(words, dtype=WORD).reshape(len(words), 2 + item.ndim)
         self._head = np.array([len(words), self._items.ctypes.data], dtype=WORD)
         self.address = self._head.ctypes.data
@@ -211,31 +211,31 @@ class Arrays:
     def __len__(self):
         return len(self._arrays)
 
-    def __setitem__(self, place, array):
-        self._give_back(place)
-        self._items[place] = [0, *sizes_of(array, self.item, "an array")]
-        self._arrays[place] = array
+    def __setitem__(self, index, array):
+        self._give_back(index)
+        self._items[index] = [0, *sizes_of(array, self.item, "an array")]
+        self._arrays[index] = array
 
-    def __getitem__(self, place) -> np.ndarray:
+    def __getitem__(self, index) -> np.ndarray:
         """The array that Python has put there, or a view of what a kernel has, while it stands there."""
-        words = self._items[place]
+        words = self._items[index]
         if not words[0]:
-            return self._arrays[place]
+            return self._arrays[index]
         dtype, shape = as_dtype(self.item.dtype), tuple(words[2:].tolist())
         size = dtype.itemsize * int(np.prod(shape))
         content: Any = (ctypes.c_char * size).from_address(int(words[1]))
         return np.frombuffer(content, dtype=dtype).reshape(shape)
 
-    def _give_back(self, place):
-        if self._items[place, 0]:
-            numba_internals.give_back(int(self._items[place, 0]))
-            self._items[place, 0] = 0
+    def _give_back(self, index):
+        if self._items[index, 0]:
+            numba_internals.give_back(int(self._items[index, 0]))
+            self._items[index, 0] = 0
 
     def __del__(self):
         if sys.is_finalizing():
             return
-        for place in range(len(self)):
-            self._give_back(place)
+        for index in range(len(self)):
+            self._give_back(index)
 
 
 class Functions:
@@ -254,9 +254,9 @@ class Functions:
 
     def __init__(self, signature, kernels):
         self.signature, self.kernels = signature, tuple(kernels)
-        for one in self.kernels:
-            if one.signature != signature:
-                raise TypeError(f"{one.name} has the signature {one.signature}, not {signature}")
+        for kernel_ in self.kernels:
+            if kernel_.signature != signature:
+                raise TypeError(f"{kernel_.name} has the signature {kernel_.signature}, not {signature}")
 
     @functools.cached_property
     def _numba_type_(self):
@@ -265,12 +265,12 @@ class Functions:
     def __len__(self):
         return len(self.kernels)
 
-    def __getitem__(self, place):
-        return self.kernels[place]
+    def __getitem__(self, index):
+        return self.kernels[index]
 
     @functools.cached_property
     def _items(self):
-        return np.array([one.address() for one in self.kernels], dtype=WORD)
+        return np.array([kernel_.address() for kernel_ in self.kernels], dtype=WORD)
 
     @functools.cached_property
     def _head(self):

@@ -114,7 +114,7 @@ def run_within_drift(simulation, folder, tell):
 
         known = add_errors(simulation, run, ended, rows)
         named = {o.name: o for o in scene.observables}
-        bounded = {name: named[name].bounded(one, simulation.system) for name, one in solution.reduced.items()}
+        bounded = {name: named[name].bounded(result, simulation.system) for name, result in solution.reduced.items()}
         solution.reduced = bounded
         solution.twin_end = ended.course.x, ended.course.v
         if folder is not None:

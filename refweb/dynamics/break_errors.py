@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 
-def add_errors_of_breaks(solution, own, other, share):
+def add_errors_of_breaks(solution, run, refined, share):
     """Add ± to the times of breaks, as far as a run and its twin break the same lines in the same order.
 
     Behind the first break at which they differ nothing is known of either run by the other: what is found there has no
@@ -25,42 +25,42 @@ def add_errors_of_breaks(solution, own, other, share):
     float
         Time from which on nothing is known [s].
     """
-    for n, found in enumerate(solution.breaks):
-        alike = n < len(other.elements) and own.elements[n] == other.elements[n]
+    for n, record in enumerate(solution.breaks):
+        alike = n < len(refined.elements) and run.elements[n] == refined.elements[n]
         if not alike:
             break
-        off = abs(found["time"] - float(other.times[n]))
-        widths = float(own.widths[n] + other.widths[n])
-        found["error"] = float(share * off + widths + 4.0 * np.finfo(float).eps * found["time"])
+        off = abs(record["time"] - float(refined.times[n]))
+        widths = float(run.widths[n] + refined.widths[n])
+        record["error"] = float(share * off + widths + 4.0 * np.finfo(float).eps * record["time"])
     else:
         n = len(solution.breaks)
     _warn_of_near(solution, n)
-    if n < max(len(own.elements), len(other.elements)):
-        return _end_of_knowledge(solution, own, other, n)
+    if n < max(len(run.elements), len(refined.elements)):
+        return _end_of_knowledge(solution, run, refined, n)
     return np.inf
 
 
 def _warn_of_near(solution, count):
     """Warn of the first of so many breaks that the next may come before."""
-    for one, later in zip(solution.breaks[:count], solution.breaks[1:count], strict=False):
-        if 0.0 < later["time"] - one["time"] < one["error"] + later["error"]:
+    for first, later in zip(solution.breaks[:count], solution.breaks[1:count], strict=False):
+        if 0.0 < later["time"] - first["time"] < first["error"] + later["error"]:
             solution.warnings.append(
-                f"lines {one['line']} and {later['line']} break within ± of each other at t = {later['time']:.6g} s: "
+                f"lines {first['line']} and {later['line']} break within ± of each other at t = {later['time']:.6g} s: "
                 "run and twin have them in this order, which is not proven"
             )
             return
 
 
-def _end_of_knowledge(solution, own, other, n):
+def _end_of_knowledge(solution, run, refined, n):
     """Take back the ± of what comes from break ``n`` on, and say so; the time of that [s]."""
-    times = [breaks.times[n] for breaks in (own, other) if n < len(breaks.times)]
+    times = [breaks.times[n] for breaks in (run, refined) if n < len(breaks.times)]
     since = float(min(times))
     net = solution.state.system.net
     words = [
         f"is of line {net.line[breaks.elements[n]]} at t = {breaks.times[n]:.6g} s"
         if n < len(breaks.times)
         else "is none"
-        for breaks in (own, other)
+        for breaks in (run, refined)
     ]
     solution.warnings.append(
         f"the order of breaks is beyond the horizon from t = {since:.6g} s on: break {n + 1} {words[0]}, in the "

@@ -82,14 +82,14 @@ class Budget:
             power = max(power, math.log(last.steps / before.steps) / math.log(before.knob / last.knob))
         return last.price * (last.knob / knob) ** power
 
-    def price_of(self, integrator, share, most):
-        """Cost of all runs, ``most`` at most, until errors that are ``share`` times what they may be are small enough.
+    def price_of(self, integrator, share, limit):
+        """Cost of all runs, ``limit`` at most, until errors that are ``share`` times what they may be are small enough.
 
         Errors go with the step to the power of the order, or with the tolerance to the power 2/3, see
         `refweb.dynamics.twin_error.with_errors`.
         """
         total, knob, order = 0.0, self.runs[-1].knob, integrator.order if integrator.knob == "safety" else 2.0 / 3.0
-        for _ in range(most):
+        for _ in range(limit):
             factor = integrator.next_knob(share)
             knob, share = knob * factor, share * factor**order
             total += self.expected(integrator, knob)

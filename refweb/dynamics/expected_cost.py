@@ -39,11 +39,11 @@ def ruling(integrator, system, reach, speed):
         for name in ("bound", "damping_bound")
     )
     both = np.sqrt(lossy.sum(axis=0) ** 2 + 4.0 * stiff.sum(axis=0)) + lossy.sum(axis=0)
-    most = both.max(initial=0.0)
-    if not most > 0.0:
+    largest = both.max(initial=0.0)
+    if not largest > 0.0:
         return Rule(np.inf, "nothing, as nothing vibrates")
     worst = int(both.argmax())
-    damped = most > np.sqrt(2.0) * 2.0 * np.sqrt(stiff[:, worst].sum())
+    damped = largest > np.sqrt(2.0) * 2.0 * np.sqrt(stiff[:, worst].sum())
     family = system.families[int((lossy if damped else stiff)[:, worst].argmax())]
     row = int(moving[worst])
     if damped:
@@ -56,7 +56,7 @@ def ruling(integrator, system, reach, speed):
     else:
         name = "friction" if family.rubbing is not None else family.name
         by = f"{name} at {system.row_name(row)}"
-    return Rule(integrator.safety * integrator.stretch * 4.0 / most, by)
+    return Rule(integrator.safety * integrator.stretch * 4.0 / largest, by)
 
 
 def _parts(system, bounds, reach, speed):
@@ -102,8 +102,8 @@ def expected_cost(scene, system):
         steps = [solve.duration / solve.step_size]
     else:
         texts = [f"{_seconds(rule.step)}{', where all is touched' * n}, by {rule.by}" for n, rule in enumerate(rules)]
-        least = solve.duration / scene.output.interval
-        steps = [max(solve.duration / rule.step, least) for rule in rules]
+        shortest = solve.duration / scene.output.interval
+        steps = [max(solve.duration / rule.step, shortest) for rule in rules]
     each = len(integrator.drifts) * steps_with_twin(scene)
     prices = [steps[0] * each * step_price(system), steps[-1] * each * step_price(system, touched=True)]
     counts = " to ".join(dict.fromkeys(f"{n:.2g}" for n in steps))

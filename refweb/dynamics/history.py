@@ -40,27 +40,27 @@ def _probes_of_warnings(system, followed, step_size):
     tell = [scale for column, scale in scales.values() if column == 0]
     if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
         scales["strain"] = 1, np.ones(len(net.cells))
-    found = {
+    by_name = {
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
     }
     if system.orbit_radius is not None:
         places = system.net.points[: system.rows - system.net.spins].copy()
-        found["distance"] = probes.Probe(probes.displacement, [probes.MAGNITUDE, 0, len(places)], places, 1.0)
+        by_name["distance"] = probes.Probe(probes.displacement, [probes.MAGNITUDE, 0, len(places)], places, 1.0)
     if system.contact:
         from ..results.observables.overlap import probe_of
 
-        found |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
+        by_name |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
     for i in (i for i, family in enumerate(system.families) if family.crossing is not None):
         cells = len(system.families[i].cells)
-        found["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
+        by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
     if pairs_of(system):
         from ..results.observables.overlap import probe_of_speed, probes_between
 
-        found |= probes_between(system)
+        by_name |= probes_between(system)
         if step_size is not None:
-            found["body speed"] = probe_of_speed(system)
-    return found
+            by_name["body speed"] = probe_of_speed(system)
+    return by_name
 
 
 def _of_tension(probe):
@@ -148,8 +148,8 @@ class Watch:
                 self.probes.append(probe)
         slots |= {o.name: len(self.probes) + i for i, o in enumerate(self._followed)}
         return [
-            one._replace(slot=slots[event.observe if probe is None else event])
-            for event, (probe, one) in zip(events, made, strict=True)
+            event_row._replace(slot=slots[event.observe if probe is None else event])
+            for event, (probe, event_row) in zip(events, made, strict=True)
         ]
 
     def _weights_of_columns(self, energies):
@@ -212,17 +212,17 @@ class Watch:
 
     def breaks(self, course):
         """The breaks of a course, for ``run.json``."""
-        net, found = self.system.net, course.breaks
+        net, broken = self.system.net, course.breaks
         return [
             {
                 "line": int(net.line[element]),
                 "element": int(element),
                 "time": float(time),
                 "error": None,
-                "place": place.tolist(),
+                "place": position.tolist(),
                 "energy": float(energy),
             }
-            for element, time, energy, place, _ in zip(*found, strict=True)
+            for element, time, energy, position, _ in zip(*broken, strict=True)
         ]
 
     def _neglected(self, course):
@@ -245,15 +245,15 @@ class Watch:
         web at rest moves by is such a result.
         """
         extremes, absolute = course.extremes, absolute or {}
-        found = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
+        limits = {o.name: SPREAD * absolute.get(o.unit, 0.0) for o in self._observables}
         for o in self._observables:
             if o.reduce != "final":
                 at = self._slot(o)
                 peak = max(float(extremes.corrections[at]), SPREAD * relative * abs(float(extremes.values[at])))
-                found[o.name] = max(found[o.name], peak)
+                limits[o.name] = max(limits[o.name], peak)
             elif o.average is not None:
-                found[o.name] = max(found[o.name], float(extremes.corrections[self._slot(o)]))
-        return found
+                limits[o.name] = max(limits[o.name], float(extremes.corrections[self._slot(o)]))
+        return limits
 
     def drifts(self, course, twin, time):
         """Distance that bodies with different velocities in a run and its refinement gain in half a time [s], by
@@ -263,12 +263,12 @@ class Watch:
         """
         rows = {body.name: body.row for body in self.system.net.bodies}
         placed = {o.name: o for o in self._observables if o.body is not None and o.unit == "m"}
-        found = {}
+        distances = {}
         for name, o in placed.items():
             apart = (course.v - twin.v)[rows[o.body]]
             along = np.linalg.norm(apart) if o.component is None else abs(apart[o.component])
-            found[name] = 0.5 * time * float(along)
-        return found
+            distances[name] = 0.5 * time * float(along)
+        return distances
 
     def _slot(self, observable):
         """Number of the probe or, behind the probes, of the sum of an observable; None where none is looked at."""
@@ -293,8 +293,8 @@ class Watch:
         net, values, places = self.system.net, course.extremes.values, course.extremes.places
         if (at := self._of_warning("strain")) is not None:
             return float(values[at]), int(net.line[places[at]])
-        told = (_of_tension(p) and _tells_strain(self.system, p.data[:, 0]) for p in self.probes)
-        at = next(i for i, one in enumerate(told) if one)
+        follows = (_of_tension(p) and _tells_strain(self.system, p.data[:, 0]) for p in self.probes)
+        at = next(i for i, yes in enumerate(follows) if yes)
         cell = int(places[at])
         tension, (stiffness, *law) = values[at] / self.probes[at].data[cell, 0], net.line_data[cell, 1:4]
         return float(net.law.strain(tension, stiffness, *law)) if tension > 0.0 else 0.0, int(net.line[cell])
@@ -311,9 +311,9 @@ class Watch:
         extremes = course.extremes
         for i, body in enumerate(self.system.net.bodies):
             at = self._of_warning(("overlap", body.name))
-            value, place = float(extremes.values[at]), int(extremes.places[at])
+            value, index = float(extremes.values[at]), int(extremes.places[at])
             if value > 0.0:
-                overlaps.note(i, value, float(extremes.times[at]), int(self.system.net.line[place]))
+                overlaps.note(i, value, float(extremes.times[at]), int(self.system.net.line[index]))
 
         if overlaps.pairs is not None:
             for i in range(len(overlaps.pairs.found)):

@@ -56,15 +56,15 @@ def start_of(scene, system):
 def remarks_on(start, system):
     """Remarks on a start: jumps of motion, and bodies inside of the web."""
     before = np.zeros((system.rows, 3)) if start.x is None else start.x
-    there = before.copy()
-    system.drive(0.0, there)
-    inner = [(family.contact, system.energy_of(family, 0.0, there)) for family in system.families if family.internal]
-    moved = np.flatnonzero((there != before).any(axis=1))
+    refined = before.copy()
+    system.drive(0.0, refined)
+    inner = [(family.contact, system.energy_of(family, 0.0, refined)) for family in system.families if family.internal]
+    moved = np.flatnonzero((refined != before).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
         yield f"{by} has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    off = np.linalg.norm(np.where(system.held, there, 0.0)[: system.net.nodes], axis=1)
+    off = np.linalg.norm(np.where(system.held, refined, 0.0)[: system.net.nodes], axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
         worst = int(off.argmax())
@@ -87,8 +87,8 @@ def equilibrium(system, progress=None):
     """
     from ..statics.load_steps import solve
 
-    (found,) = solve(system, [0.0], progress)
-    return found
+    (equilibria,) = solve(system, [0.0], progress)
+    return equilibria
 
 
 def checkpoint(folder, name, remedy=""):
@@ -155,7 +155,7 @@ def stored(system, folder):
     bearings = _bearings(system, given, bodies, name)
     start = _start_at(system, positions, displacements, velocities, bodies, bearings)
     start = start._replace(broken=broken if len(broken) else None)
-    x, v = (given.get(f"twin_{one}") for one in ("displacements", "velocities"))
+    x, v = (given.get(f"twin_{key}") for key in ("displacements", "velocities"))
     if any(a is None or a.shape != positions.shape or not np.isfinite(a).all() for a in (x, v)):
         return start, None
     return start, _start_at(system, positions - displacements + x, x, v, bodies, bearings)
@@ -163,28 +163,28 @@ def stored(system, folder):
 
 def _bearings(system, given, bodies, name):
     """(axes, inertia, offset) that bodies which turn in space, here or there, began with in a checkpoint, by name."""
-    known, found = [str(body) for body in bodies], {}
+    known, bearings = [str(body) for body in bodies], {}
     for body in system.net.bodies:
         spins = body.spin is not None and f"{body.name}.spin" in known
         if not spins or body.turn is None and f"{body.name}.turn" not in known:
             continue
         try:
-            own = (given[f"body_{key}"][known.index(body.name)] for key in ("axes", "inertia", "offset"))
-            found[body.name] = tuple(own)
+            arrays = (given[f"body_{key}"][known.index(body.name)] for key in ("axes", "inertia", "offset"))
+            bearings[body.name] = tuple(arrays)
         except (KeyError, IndexError):
             raise InputError(
                 f'{name} checkpoint.npz does not say which axes body "{body.name}" began with: run that again'
             ) from None
-    return found
+    return bearings
 
 
-def _turn(body, bearing, there, x, v):
+def _turn(body, bearing, rows, x, v):
     """Write how a body stands and turns: its axes, the centre of its shape and their motion are those of another start.
 
-    ``there`` has (displacement, velocity) of that one's rows of rotation; x and v of its own rows are those of its row.
+    ``rows`` has (displacement, velocity) of that one's rows of rotation; x and v of its own rows are those of its row.
     """
     axes, inertia, offset = bearing
-    (vector, spin), *last = there
+    (vector, spin), *last = rows
     if last:
         now = axes @ matrix_of((1.0 + last[0][0][0], *vector)).T
         omega = now.T @ np.linalg.solve(inertia, now @ spin) * np.linalg.eigvalsh(inertia)[-1]
@@ -206,23 +206,28 @@ def _start_at(system, positions, displacements, velocities, bodies, bearings):
     net, nodes = system.net, len(positions) - len(bodies)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     row = {str(body): nodes + i for i, body in enumerate(bodies)}
-    own = zip(row_names(net.bodies), range(net.nodes, system.rows), strict=True)
-    held = [body.name for body in net.bodies if body.fixed]
-    pairs = [(here, row[name]) for name, here in own if name in row and name not in held]
-    here, there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
+    numbered = zip(row_names(net.bodies), range(net.nodes, system.rows), strict=True)
+    fixed_names = [body.name for body in net.bodies if body.fixed]
+    pairs = [(row_here, row[name]) for name, row_here in numbered if name in row and name not in fixed_names]
+    row_here, rows_there = np.array([*((i, i) for i in range(nodes)), *pairs]).T
     reference = positions - displacements
-    same = np.isclose(reference[there], net.points[here], rtol=0, atol=1e-15 * np.abs(positions).max(initial=0.0))
-    x[here] = np.where(same, displacements[there], positions[there] - net.points[here])
+    same = np.isclose(
+        reference[rows_there], net.points[row_here], rtol=0, atol=1e-15 * np.abs(positions).max(initial=0.0)
+    )
+    x[row_here] = np.where(same, displacements[rows_there], positions[rows_there] - net.points[row_here])
     own_velocity = v.copy()
-    v[here] = velocities[there]
-    told = own_velocity.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
-    v[told] = own_velocity[told]
+    v[row_here] = velocities[rows_there]
+    given_velocity = own_velocity.any(axis=1) & (np.arange(len(v)) < nodes)  # a [[velocity]] of this scene
+    v[given_velocity] = own_velocity[given_velocity]
     for body in net.bodies:
         if body.name not in bearings:
             continue
-        own, rows = (body.axes, body.inertia, body.offset), (f"{body.name}.spin", f"{body.name}.turn")
-        there = [(displacements[row[name]], velocities[row[name]]) for name in rows if name in row]
-        alike = (np.array_equal(one, other) for one, other in zip(bearings[body.name], own, strict=True))
-        if (len(there) == 2) != (body.turn is not None) or not all(alike):
-            _turn(body, bearings[body.name], there, x, v)
+        numbered, rows = (body.axes, body.inertia, body.offset), (f"{body.name}.spin", f"{body.name}.turn")
+        rows_there = [(displacements[row[name]], velocities[row[name]]) for name in rows if name in row]
+        alike = (
+            np.array_equal(array, array_before)
+            for array, array_before in zip(bearings[body.name], numbered, strict=True)
+        )
+        if (len(rows_there) == 2) != (body.turn is not None) or not all(alike):
+            _turn(body, bearings[body.name], rows_there, x, v)
     return Start(x, v)

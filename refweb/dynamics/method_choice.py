@@ -76,8 +76,8 @@ def decided(scene, system):
     steps = max(scene.solve.duration / (0.5 * bound), float(corners))
     seconds = steps * step_price(system)
     price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
-    if found := [family.name for family in system.families if family.finder is not None]:
-        why = f"[{found[0]}] finds its pairs as they come near, which explicit steps alone take: {price}"
+    if listed := [family.name for family in system.families if family.finder is not None]:
+        why = f"[{listed[0]}] finds its pairs as they come near, which explicit steps alone take: {price}"
         return Choice(given_to(scene, "central-difference"), why)
     damped, slow = _damped(system, bound), seconds > QUICK_RUN and steps > STEP_OF_CVODE * corners
     if slow and damped > DAMPED_BY:

@@ -92,9 +92,9 @@ def _block(integrator, course, schedule, first, count):
         return Block(first, history, history)
     between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
     history = integrator.advance(course, np.sort(np.concatenate([rows, between])))
-    shown = np.isin(history.time, rows)
-    shown[-1] = True  # where an event ends the run, its row is that of the event
-    return Block(first, history[shown], history)
+    selected = np.isin(history.time, rows)
+    selected[-1] = True  # where an event ends the run, its row is that of the event
+    return Block(first, history[selected], history)
 
 
 def blocks(integrator, course, schedule, first=0):

@@ -163,17 +163,19 @@ class Simulation:
         """Begin at the equilibrium."""
         from ..statics.remarks import on_stability, remark_on_open
 
-        found = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
-        self.begin, there = Start(found.x), State(self.system, 0.0, found.x)
-        if text := remark_on_open(there, found):
+        equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
+        self.begin, state = Start(equilibrium_.x), State(self.system, 0.0, equilibrium_.x)
+        if text := remark_on_open(state, equilibrium_):
             self.solution.warnings.append(f"of the equilibrium it starts from: {text}")
-        self.solution.warnings += [text for _, text in on_stability(there, found, "the equilibrium it starts from")]
+        self.solution.warnings += [
+            text for _, text in on_stability(state, equilibrium_, "the equilibrium it starts from")
+        ]
         self.solution.warnings += remarks_on(self.begin, self.system)
         if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
             from ..statics.body_penetration import Passage
 
             passage = Passage(self.scene, self.system)
-            passage.note(State(self.system, 0.0, found.x))
+            passage.note(State(self.system, 0.0, equilibrium_.x))
             passage.overlaps.refuse()
 
     def run(self, folder, tell):
@@ -346,8 +348,8 @@ class Simulation:
     def _unseen(self):
         """Remarks on thresholds that no step ends behind, though the extreme of their observable lies there."""
         names = [o.name for o in self.scene.observables]
-        for event, found in zip(self.scene.event, self.solution.events, strict=True):
-            if found["time"] is None and (result := self.solution.reduced.get(event.observe)) is not None:
+        for event, entry in zip(self.scene.event, self.solution.events, strict=True):
+            if entry["time"] is None and (result := self.solution.reduced.get(event.observe)) is not None:
                 start = self._tables[0][0, 1 + names.index(event.observe)]
                 if (start - event.value) * (result.value - event.value) < 0.0:
                     yield (
@@ -392,7 +394,7 @@ def _check_step(scene):
     """Refuse a fixed step of which a row takes too many."""
     step, row = scene.solve.step_size, min(scene.output.interval, scene.solve.duration)
     if step is not None and row > MAX_STEPS_PER_ROW * step:
-        least = row / MAX_STEPS_PER_ROW
+        shortest = row / MAX_STEPS_PER_ROW
         raise InputError(
-            f"[solve] step_size = {step:g} must be ≥ {least:g} [s]: a row takes at most {MAX_STEPS_PER_ROW:g} steps"
+            f"[solve] step_size = {step:g} must be ≥ {shortest:g} [s]: a row takes at most {MAX_STEPS_PER_ROW:g} steps"
         )

@@ -131,7 +131,7 @@ def _largest_mean(times, apart, end):
     return max((_mean(apart[near]) for near in _parts(times, end)), default=0.0)
 
 
-def _of_chance(times, off, apart, end, order, least):
+def _of_chance(times, off, apart, end, order, floor):
     """Factor by which differences are too small, by that of energy, whose error is known: 1 to `MOST_CHANCE`.
 
     Parameters
@@ -142,16 +142,16 @@ def _of_chance(times, off, apart, end, order, least):
         Error of the balance of energy at these [J], and difference of the two runs.
     end, order : float
         Time of the result [s], and the error over the difference.
-    least : float
+    floor : float
         What is left of the balance by rounding [J].
     """
     means = [(_mean(off[near]), _mean(apart[near])) for near in _parts(times, end)]
-    least = max(least, TELLING * max((mean for mean, _ in means), default=0.0))
-    found = [max(mean / max(order * between, 1e-300), 1.0) for mean, between in means if mean > least]
-    return min(max(found, default=1.0), MOST_CHANCE)
+    floor = max(floor, TELLING * max((mean for mean, _ in means), default=0.0))
+    factors = [max(mean / max(order * between, 1e-300), 1.0) for mean, between in means if mean > floor]
+    return min(max(factors, default=1.0), MOST_CHANCE)
 
 
-def with_errors(results, least, twin, own, other, order=2.0, drifts=None, energy=0.0):
+def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drifts=None, energy=0.0):
     """Results with ± from what differs in a run of a smaller error, times ``order`` and `SPREAD`.
 
     Two runs may agree by chance on a peak, or at the end, where the motion differs otherwise. What counts is the larger
@@ -161,7 +161,7 @@ def with_errors(results, least, twin, own, other, order=2.0, drifts=None, energy
     (``order`` is that factor for the steps really taken). The error of CVODE and IDA goes with the tolerance to the
     power 2/3 at order 2, and faster at higher ones. Higher orders count as 2 here: peaks, contact and slack lines leave
     no more of them, for which the threefold is taken as well. Extremes between steps and absolute tolerances have a
-    ``least`` of their own.
+    ``floors`` of their own.
 
     A kink of the force, where a body touches or a line snaps taut, costs each run what depends on where in a step it
     lies. Two runs may have it alike, and then they agree on all that comes of it: one chance difference runs through
@@ -171,7 +171,7 @@ def with_errors(results, least, twin, own, other, order=2.0, drifts=None, energy
     error is at least what they make of it in half of the last row (``drifts``).
 
     By the twin alone 7 of 7452 results of 207 random impacts are off by more than three times ±, with both of these
-    and ``least`` none; of 1992 results of explicit steps of 83 more impacts 5 and 1: the speed of a web that is first
+    and ``floors`` none; of 1992 results of explicit steps of 83 more impacts 5 and 1: the speed of a web that is first
     touched in the last row, 3.4 times. What else was tried: by energy in all the time to
     the result at once a first touch that agrees is hidden by what comes later (3.05 times ±); the largest ratio of all
     times from the start on has more misses, and a wider ±. A third run of 1.75 times the steps leaves nothing off by
@@ -184,7 +184,7 @@ def with_errors(results, least, twin, own, other, order=2.0, drifts=None, energy
     ----------
     results, twin : dict of str to refweb.results.solution.Result
         Of either run.
-    least : dict of str to float
+    floors : dict of str to float
         What ± is at least.
     own, other : ndarray, shape (rows, columns)
         Rows of either history, see `refweb.dynamics.history.Watch.compared`. Those of equal times are compared: the
@@ -196,19 +196,19 @@ def with_errors(results, least, twin, own, other, order=2.0, drifts=None, energy
     energy : float
         Largest energy of the run [J].
     """
-    rows, found, chances, drifts = min(len(own), len(other)), {}, {}, drifts or {}
-    same, last = own[:rows, 0] == other[:rows, 0], own[-1, 0]
-    own, apart = own[:rows][same], np.abs(own[:rows] - other[:rows])[same]
-    times, off = own[:, 0], own[:, -1] - own[0, -1]
+    rows, results_found, chances, drifts = min(len(kept_rows), len(rows_refined)), {}, {}, drifts or {}
+    same, last = kept_rows[:rows, 0] == rows_refined[:rows, 0], kept_rows[-1, 0]
+    kept_rows, apart = kept_rows[:rows][same], np.abs(kept_rows[:rows] - rows_refined[:rows])[same]
+    times, off = kept_rows[:, 0], kept_rows[:, -1] - kept_rows[0, -1]
     for i, (name, result) in enumerate(results.items(), 1):
         end = result.time
         if end not in chances:
             chances[end] = _of_chance(times, off, apart[:, -1], end, order, ROUNDING * energy)
         apart_then = max(abs(result.value - twin[name].value), _largest_mean(times, apart[:, i], end))
         apart_then = max(apart_then, drifts.get(name, 0.0) if end == last else 0.0)
-        error = max(SPREAD * order * chances[end] * apart_then + 4e-16 * abs(result.value), least.get(name, 0.0))
-        found[name] = result._replace(error=float(error))
-    return found
+        error = max(SPREAD * order * chances[end] * apart_then + 4e-16 * abs(result.value), floors.get(name, 0.0))
+        results_found[name] = result._replace(error=float(error))
+    return results_found
 
 
 def add_errors(simulation, run, twin, rows):
@@ -231,26 +231,26 @@ def add_errors(simulation, run, twin, rows):
         Time from which on the twin tells nothing of the run [s].
     """
     solution = simulation.solution
-    one, other = run.course, twin.course
-    if one.stopped != other.stopped:
-        which = ["the run", "its twin, the second run of a smaller error"][:: 1 if one.stopped else -1]
+    first_run, refined = run.course, twin.course
+    if first_run.stopped != refined.stopped:
+        which = ["the run", "its twin, the second run of a smaller error"][:: 1 if first_run.stopped else -1]
         solution.warnings.append("no errors are known: an event ends {}, but not {}".format(*which))
         return 0.0
-    factor = 1.0 / (1.0 - simulation.integrator.error_share(one, other))
-    drifts = simulation.watch.drifts(one, other, np.diff(rows[-2:, 0]).sum())
+    factor = 1.0 / (1.0 - simulation.integrator.error_share(first_run, refined))
+    drifts = simulation.watch.drifts(first_run, refined, np.diff(rows[-2:, 0]).sum())
     compared = run.results, run.corrections, twin.results, rows, twin.rows
-    solution.reduced = with_errors(*compared, factor, drifts, one.largest)
-    own, count = zip(one.events["width"], other.events["time"], strict=True), len(solution.events)
-    for found, (width, time) in zip(solution.events, list(own)[:count], strict=True):
-        if found["time"] is not None and np.isfinite(time):
-            off = abs(found["time"] - float(time))
-            found["error"] = SPREAD * factor * off + float(width) + 4e-16 * found["time"]
-    if one.stopped and len(rows) > 1:
+    solution.reduced = with_errors(*compared, factor, drifts, first_run.largest)
+    widths, count = zip(first_run.events["width"], refined.events["time"], strict=True), len(solution.events)
+    for entry, (width, time) in zip(solution.events, list(widths)[:count], strict=True):
+        if entry["time"] is not None and np.isfinite(time):
+            off = abs(entry["time"] - float(time))
+            entry["error"] = SPREAD * factor * off + float(width) + 4e-16 * entry["time"]
+    if first_run.stopped and len(rows) > 1:
         _add_lateness(solution, rows[-2:])
     if solution.breaks is not None:
         from .break_errors import add_errors_of_breaks
 
-        return add_errors_of_breaks(solution, one.breaks, other.breaks, SPREAD * factor)
+        return add_errors_of_breaks(solution, first_run.breaks, refined.breaks, SPREAD * factor)
     return np.inf
 
 

@@ -70,7 +70,7 @@ class Attach(Table):
 
     several = True
 
-    body: str = text(most=80)
+    body: str = text(limit=80)
     node: Several = nodes()
     point: Several = vector(default=None, unit="m")
 
@@ -86,31 +86,31 @@ class Attach(Table):
                 f"body = {shown(self.body)} is a {type(body.shape).__name__.lower()}, which keeps its plane: give it "
                 "another shape, such as a cylinder, or fixed = true"
             )
-        found = np.unique(net.web.find(self.node))
-        for other in net.bodies:
-            for node in np.intersect1d(found, other.carried):
-                raise InputError(f'node = {node} is on body "{other.name}" already')
-        points = (net.points[found] - net.points[body.row]) @ body.axes.T
+        nodes_found = np.unique(net.web.find(self.node))
+        for neighbour in net.bodies:
+            for node in np.intersect1d(nodes_found, neighbour.carried):
+                raise InputError(f'node = {node} is on body "{neighbour.name}" already')
+        points = (net.points[nodes_found] - net.points[body.row]) @ body.axes.T
         if self.point is not None:
             points[:] = self.point + body.offset
-        carried, points = (*body.carried, *found.tolist()), np.vstack([body.points, points])
+        carried, points = (*body.carried, *nodes_found.tolist()), np.vstack([body.points, points])
         bodies, mass, places = list(net.bodies), net.mass.copy(), net.points.copy()
         bodies[number] = replace(body, carried=carried, points=points)
         if not body.fixed:
-            shift, bodies[number] = _joined(bodies[number], mass[body.row], mass[found])
-            mass[body.row] += mass[found].sum()
-            mass[found] = 0.0
+            shift, bodies[number] = _joined(bodies[number], mass[body.row], mass[nodes_found])
+            mass[body.row] += mass[nodes_found].sum()
+            mass[nodes_found] = 0.0
             places[body.row] += shift
         return replace(net, mass=mass, points=places, bodies=tuple(bodies))
 
     def on(self, net):
         """The nodes on a fixed body as supports; of a free one there is nothing to add."""
         body = next(body for body in net.bodies if body.name == self.body)
-        own = np.isin(body.carried, net.web.find(self.node))
+        carried = np.isin(body.carried, net.web.find(self.node))
         if not body.fixed:
             return []
-        rows = np.array(body.carried)[own]
-        data = body.points[own] @ body.axes - (net.points[rows] - net.points[body.row])
+        rows = np.array(body.carried)[carried]
+        data = body.points[carried] @ body.axes - (net.points[rows] - net.points[body.row])
         data[np.abs(data) <= 1e-13 * np.abs(body.points).max()] = 0.0  # of rounding
         return PrescribedMotion(cells=column(rows), data=np.ascontiguousarray(data), kernel=hold)
 

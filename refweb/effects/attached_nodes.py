@@ -46,11 +46,11 @@ class Carrier(NamedTuple):
 
 def columns(net, nodes):
     """Numbers of nodes (cells, count) for the data of cells, shape (cells, count `COLUMNS`)."""
-    turns, own = RigidRotations.of(net), np.zeros((len(net.points), COLUMNS))
-    own[:, 0] = -1.0
+    turns, numbers = RigidRotations.of(net), np.zeros((len(net.points), COLUMNS))
+    numbers[:, 0] = -1.0
     for (node, n), arm in zip(turns.carried, turns.arms, strict=True):
-        own[node] = [*turns.rows[n], *arm, *turns.mobility[n].ravel()]
-    return own[nodes].reshape(len(nodes), -1)
+        numbers[node] = [*turns.rows[n], *arm, *turns.mobility[n].ravel()]
+    return numbers[nodes].reshape(len(nodes), -1)
 
 
 @kernel(forceinline=True)
@@ -84,7 +84,7 @@ def turn_by(carrier, moment):
 
 
 @kernel(forceinline=True)
-def speed_at(arm, own, turning):
+def speed_at(arm, velocity, turning):
     """v + ω × a."""
     across = cross(turning, arm)
-    return own[0] + across[0], own[1] + across[1], own[2] + across[2]
+    return velocity[0] + across[0], velocity[1] + across[1], velocity[2] + across[2]

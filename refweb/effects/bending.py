@@ -104,10 +104,12 @@ def stiffness(t, x, v, blocks, cells, data, definite):
             for s in range(3):
                 ar, br, as_, bs = va * a[r], vb * b[r], va * a[s], vb * b[s]
                 pr, qr, ps, qs = br - w * ar, ar - w * br, bs - w * as_, as_ - w * bs
-                one = 1.0 if r == s else 0.0
-                aa = va * va * (curve * pr * ps + tilt * (pr * as_ + ar * ps) + slope * straight * (one - ar * as_))
-                bb = vb * vb * (curve * qr * qs + tilt * (qr * bs + br * qs) + slope * straight * (one - br * bs))
-                ab = va * vb * (curve * pr * qs - slope * (one - br * bs - ar * qs))
+                identity = 1.0 if r == s else 0.0
+                aa = (
+                    va * va * (curve * pr * ps + tilt * (pr * as_ + ar * ps) + slope * straight * (identity - ar * as_))
+                )
+                bb = vb * vb * (curve * qr * qs + tilt * (qr * bs + br * qs) + slope * straight * (identity - br * bs))
+                ab = va * vb * (curve * pr * qs - slope * (identity - br * bs - ar * qs))
                 for m in range(3):
                     for n in range(3):
                         am, bm, an, bn = from_nodes[0][m], from_nodes[1][m], from_nodes[0][n], from_nodes[1][n]
@@ -138,20 +140,20 @@ def springs(net):
     elements : ndarray of int, shape (springs, 2)
         The two elements.
     """
-    node, other = net.cells.ravel(), net.cells[:, ::-1].ravel()
+    node, neighbours = net.cells.ravel(), net.cells[:, ::-1].ravel()
     order = np.argsort(node, kind="stable")
-    node, other, element = node[order], other[order], order // 2
-    outward = net.points[other] - net.points[node]
+    node, neighbours, element = node[order], neighbours[order], order // 2
+    outward = net.points[neighbours] - net.points[node]
     apart = range(1, max(np.bincount(node).max(), 2))
     first, second = np.hstack([np.flatnonzero(node[n:] == node[:-n]) + [[0], [n]] for n in apart])
     a, b = -outward[first], outward[second]
     turn = np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
-    least = np.full(len(node), LARGEST)
-    np.minimum.at(least, first, turn)
-    np.minimum.at(least, second, turn)
-    kept = turn <= np.maximum(least[first], least[second]) + ROUNDING
+    nearest = np.full(len(node), LARGEST)
+    np.minimum.at(nearest, first, turn)
+    np.minimum.at(nearest, second, turn)
+    kept = turn <= np.maximum(nearest[first], nearest[second]) + ROUNDING
     first, second = first[kept], second[kept]
-    rows = np.column_stack([other[first], node[first], other[second]])
+    rows = np.column_stack([neighbours[first], node[first], neighbours[second]])
     return rows, np.column_stack([element[first], element[second]])
 
 

@@ -59,13 +59,15 @@ def _inertia(name, value):
         tensor = np.array(checked(name, value, rows(3)))
     if not np.abs(tensor - tensor.T).max() <= EVEN * np.abs(tensor).max():
         raise InputError(f"{name} = {shown(value)} must be symmetric")
-    least, middle, most = np.linalg.eigvalsh(tensor)
-    if not least > 0.0:
-        raise InputError(f"{name} = {shown(value)} must be positive definite: its principal moments begin at {least:g}")
-    if not most <= (1.0 + EVEN) * (least + middle):
+    smallest, middle, largest = np.linalg.eigvalsh(tensor)
+    if not smallest > 0.0:
         raise InputError(
-            f"{name} = {shown(value)} is no body's: the largest principal moment {most:g} must be ≤ {least + middle:g} "
-            "[kg m²], the sum of the others"
+            f"{name} = {shown(value)} must be positive definite: its principal moments begin at {smallest:g}"
+        )
+    if not largest <= (1.0 + EVEN) * (smallest + middle):
+        raise InputError(
+            f"{name} = {shown(value)} is no body's: the largest principal moment {largest:g} must be ≤ "
+            f"{smallest + middle:g} [kg m²], the sum of the others"
         )
     return tuple(tuple(row) for row in (0.5 * (tensor + tensor.T)).tolist())
 
@@ -158,7 +160,7 @@ class Body(Table):
 
     several = True
 
-    name: str = text(most=80)
+    name: str = text(limit=80)
     shape: str = choice(SHAPES, default="sphere")
     form: Shape = field(_given, default=None)  # the keys of the shape, as its own table
     orientation: Several = field(_quaternion, default=None)
@@ -172,11 +174,11 @@ class Body(Table):
 
     def __init__(self, **given):
         form = given.pop("form", None)  # of the body that this one is a copy of
-        own = {f.name: getattr(form, f.name) for f in fields(form)} if form else {}
-        refuse_keys(type(self), {**own, **given})
+        values = {f.name: getattr(form, f.name) for f in fields(form)} if form else {}
+        refuse_keys(type(self), {**values, **given})
         for f in fields(self):
             object.__setattr__(self, f.name, given.pop(f.name, f.default))
-        object.__setattr__(self, "form", {**own, **given})
+        object.__setattr__(self, "form", {**values, **given})
         self.__post_init__()
 
     def __getattr__(self, key):
@@ -193,8 +195,8 @@ class Body(Table):
         """
 
         def among(*shapes):
-            own = dict.fromkeys(key for shape in shapes for key in _keys(shape))
-            return [key for f in fields(cls) for key in (own if f.name == "form" else [f.name])]
+            keys = dict.fromkeys(key for shape in shapes for key in _keys(shape))
+            return [key for f in fields(cls) for key in (keys if f.name == "form" else [f.name])]
 
         shape = given.get("shape", "sphere")
         known = among(shape) if isinstance(shape, str) and shape in SHAPES else []

@@ -77,18 +77,18 @@ def slip_size(b, c, y, z, slip):
 @kernel(forceinline=True)
 def solve_normal(touches, n, h, rate):
     """(force along the normal, N) where the others alone would speed the contact up by ``rate`` [m/s²]."""
-    push, damping, own = touches[n, PUSH], touches[n, DAMPING], touches[n, OWN]
+    push, damping, weight = touches[n, PUSH], touches[n, DAMPING], touches[n, OWN]
     if damping == 0.0:
         return 0.0, push
     while True:
         theta = touches[n, THETA]
         start = touches[n, START] + theta * h * rate
-        u = start / (1.0 + theta * h * own * push * damping)
+        u = start / (1.0 + theta * h * weight * push * damping)
         damped = damping * u
         if damped < -1.0:
             damped = -1.0
         force = -push * damped
-        if theta == 0.5 or damped * (touches[n, START] + 0.5 * h * (rate + own * force)) >= 0.0:
+        if theta == 0.5 or damped * (touches[n, START] + 0.5 * h * (rate + weight * force)) >= 0.0:
             return force, push * (1.0 + damped)
         touches[n, THETA] = 0.5
 
@@ -96,20 +96,20 @@ def solve_normal(touches, n, h, rate):
 @kernel(forceinline=True)
 def solve_tangents(touches, n, h, drag, first, last, settling):
     """Friction along both tangents, of μ N = ``drag``, where the others alone would speed it up by first and last."""
-    slip, one, other = touches[n, SLIP], h * touches[n, OWN + 1], h * touches[n, OWN + 2]
+    slip, first_weight, second = touches[n, SLIP], h * touches[n, OWN + 1], h * touches[n, OWN + 2]
     u, w = touches[n, START + 1], touches[n, START + 2]
     if settling:
-        r = slip_size(u + h * first, w + h * last, one * drag, other * drag, slip)
-        touches[n, THETA + 1] = fitted(max(one, other) * drag / r)
+        r = slip_size(u + h * first, w + h * last, first_weight * drag, second * drag, slip)
+        touches[n, THETA + 1] = fitted(max(first_weight, second) * drag / r)
     while True:
         theta = touches[n, THETA + 1]
-        b, c, y, z = u + theta * h * first, w + theta * h * last, theta * one * drag, theta * other * drag
+        b, c, y, z = u + theta * h * first, w + theta * h * last, theta * first_weight * drag, theta * second * drag
         r = slip_size(b, c, y, z, slip)
         b, c = b / (r + y), c / (r + z)
         force = -drag * b, -drag * c
         if theta == 0.5:
             return force
-        mean, more = u + 0.5 * (h * first + one * force[0]), w + 0.5 * (h * last + other * force[1])
+        mean, more = u + 0.5 * (h * first + first_weight * force[0]), w + 0.5 * (h * last + second * force[1])
         if b * mean + c * more >= 0.0:
             return force
         touches[n, THETA + 1] = 0.5
@@ -141,7 +141,7 @@ def sweeping(moved, apply_force):
     @kernel(GAUSS_SEIDEL)
     def sweep(h, number, f, inverse, touches, count):
         """Solve contacts in turn, backwards where ``number`` is odd; the largest change of a velocity [m/s]."""
-        most = 0.0
+        largest = 0.0
         for m in range(count):
             n = count - 1 - m if number % 2 else m
             if not touches[n, PUSH] > 0.0:
@@ -149,20 +149,20 @@ def sweeping(moved, apply_force):
             was = touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2]
             p, normal = 0.0, touches[n, PUSH]
             if touches[n, DAMPING] > 0.0:
-                own, rate = touches[n, OWN], moved(touches, n, 0, f, inverse)
-                p, normal = solve_normal(touches, n, h, rate - own * was[0])
-                most = max(most, h * own * abs(p - was[0]))
+                weight, rate = touches[n, OWN], moved(touches, n, 0, f, inverse)
+                p, normal = solve_normal(touches, n, h, rate - weight * was[0])
+                largest = max(largest, h * weight * abs(p - was[0]))
             q = s = 0.0
             drag = touches[n, FRICTION] * normal
             if drag > 0.0:
-                one, other = touches[n, OWN + 1], touches[n, OWN + 2]
-                first = moved(touches, n, 1, f, inverse) + touches[n, MIXED] * (p - was[0]) - one * was[1]
-                last = moved(touches, n, 2, f, inverse) + touches[n, MIXED + 1] * (p - was[0]) - other * was[2]
+                first_weight, second = touches[n, OWN + 1], touches[n, OWN + 2]
+                first = moved(touches, n, 1, f, inverse) + touches[n, MIXED] * (p - was[0]) - first_weight * was[1]
+                last = moved(touches, n, 2, f, inverse) + touches[n, MIXED + 1] * (p - was[0]) - second * was[2]
                 q, s = solve_tangents(touches, n, h, drag, first, last, number < SETTLING)
-                most = max(most, h * one * abs(q - was[1]), h * other * abs(s - was[2]))
+                largest = max(largest, h * first_weight * abs(q - was[1]), h * second * abs(s - was[2]))
             touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2] = p, q, s
             apply_force(touches, n, p - was[0], q - was[1], s - was[2], f)
-        return most
+        return largest
 
     return sweep
 

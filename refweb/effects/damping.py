@@ -33,8 +33,8 @@ from .line_kernels import gradient, law_of, pull_together, strain
 @kernel()
 def viscous(law, e, rate, time, axial, slack, smooth):
     """N [N]."""
-    pull, least = time * rate * tangent(law, e, axial, slack, smooth), -above_floor(law, e, axial, slack, smooth)
-    return max(pull, least)
+    pull, smallest = time * rate * tangent(law, e, axial, slack, smooth), -above_floor(law, e, axial, slack, smooth)
+    return max(pull, smallest)
 
 
 @kernel()
@@ -73,9 +73,9 @@ def kernels(law, tau, gradients, weights):
                 v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
                 rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / data[c, LENGTH]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                own = law_of(law, data, c)
-                pull = viscous(own, e, rate, data[c, tau], axial, slack, smooth)
-                tension = pull + prepared_stress(own, e, axial, slack, smooth, data[c, G0], data[c, R0])
+                line_law = law_of(law, data, c)
+                pull = viscous(line_law, e, rate, data[c, tau], axial, slack, smooth)
+                tension = pull + prepared_stress(line_law, e, axial, slack, smooth, data[c, G0], data[c, R0])
                 if q == 0 or tension > largest:
                     largest = tension
                 power -= weights[q] * data[c, LENGTH] * pull * rate
@@ -90,14 +90,14 @@ def kernels(law, tau, gradients, weights):
             return
         for c in range(cells.shape[0]):
             axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
-            own = law_of(law, data, c)
+            line_law = law_of(law, data, c)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p, speed = (p0 * inverse, p1 * inverse, p2 * inverse), (p0 * w[0] + p1 * w[1] + p2 * w[2]) * inverse
                 rate, share = speed / data[c, LENGTH], weights[q] / data[c, LENGTH]
-                by_strain, by_rate = slopes(own, e, rate, time, axial, slack, smooth)
-                across = weights[q] * viscous(own, e, rate, time, axial, slack, smooth) * inverse
+                by_strain, by_rate = slopes(line_law, e, rate, time, axial, slack, smooth)
+                across = weights[q] * viscous(line_law, e, rate, time, axial, slack, smooth) * inverse
                 along, turn = share * by_strain - across, share * by_rate * inverse
                 for i in range(3):
                     for j in range(3):
@@ -113,13 +113,13 @@ def kernels(law, tau, gradients, weights):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
             axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
-            own = law_of(law, data, c)
+            line_law = law_of(law, data, c)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / data[c, LENGTH]
-                along = weights[q] / data[c, LENGTH] * slopes(own, e, rate, time, axial, slack, smooth)[1]
+                along = weights[q] / data[c, LENGTH] * slopes(line_law, e, rate, time, axial, slack, smooth)[1]
                 for a in range(nodes):
                     for b in range(nodes):
                         d = along * flat[q * nodes + a] * flat[q * nodes + b]
@@ -132,13 +132,13 @@ def kernels(law, tau, gradients, weights):
         # The stiffness has no bound of its own: in a step that this bound allows it is below that of the law unless
         # nodes move faster than sound, but at the kink of a smoothed law, which such a step passes at once.
         for c in range(cells.shape[0]):
-            most = data[c, tau] * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
+            coefficient = data[c, tau] * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
             for q in range(points):
                 total = 0.0
                 for a in range(nodes):
                     total += abs(flat[q * nodes + a])
                 for a in range(nodes):
-                    rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * most
+                    rates[np.uint64(cells[c, a])] += weights[q] * abs(flat[q * nodes + a]) * total * coefficient
 
     return force, stiffness, damping, damping_bound
 

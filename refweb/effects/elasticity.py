@@ -45,8 +45,8 @@ def kernels(law, gradients, weights):
         """(dx/dξ, w T/|dx/dξ|, T, ε) at quadrature point q of element c."""
         p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
         axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-        own = law_of(law, data, c)
-        tension = prepared_stress(own, e, axial, slack, smooth, data[c, G0], data[c, R0])
+        line_law = law_of(law, data, c)
+        tension = prepared_stress(line_law, e, axial, slack, smooth, data[c, G0], data[c, R0])
         return p0, p1, p2, weights[q] * tension * inverse, tension, e
 
     @kernel()
@@ -71,8 +71,8 @@ def kernels(law, gradients, weights):
     @kernel(FORCE)
     def force_of_four(t, x, v, f, cells, data, out):
         """The same of elements of one point, four at once: what one waits for, the others use."""
-        whole = cells.shape[0] // 4 * 4
-        for n in range(0, whole, 4):
+        fours = cells.shape[0] // 4 * 4
+        for n in range(0, fours, 4):
             i, j, k, m = np.uint64(n), np.uint64(n + 1), np.uint64(n + 2), np.uint64(n + 3)
             first, second = pull_at(x, cells, data, i, 0), pull_at(x, cells, data, j, 0)
             third, fourth = pull_at(x, cells, data, k, 0), pull_at(x, cells, data, m, 0)
@@ -80,7 +80,7 @@ def kernels(law, gradients, weights):
             give(f, cells, j, second, out)
             give(f, cells, k, third, out)
             give(f, cells, m, fourth, out)
-        for n in range(whole, cells.shape[0]):
+        for n in range(fours, cells.shape[0]):
             give(f, cells, np.uint64(n), pull_at(x, cells, data, np.uint64(n), 0), out)
 
     @kernel(ENERGY)
@@ -90,8 +90,8 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                own = law_of(law, data, c)
-                total += weights[q] * energy_density(own, e, axial, slack, smooth)
+                line_law = law_of(law, data, c)
+                total += weights[q] * energy_density(line_law, e, axial, slack, smooth)
             out[c] = total * data[c, LENGTH]
 
     @kernel(STIFFNESS)
@@ -101,9 +101,9 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                own = law_of(law, data, c)
-                along = weights[q] * tangent(own, e, axial, slack, smooth) / data[c, LENGTH]
-                tension = stress(own, e, axial, slack, smooth)
+                line_law = law_of(law, data, c)
+                along = weights[q] * tangent(line_law, e, axial, slack, smooth) / data[c, LENGTH]
+                tension = stress(line_law, e, axial, slack, smooth)
                 across = 0.0 if definite and tension < 0.0 else weights[q] * tension * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for a in range(nodes):
@@ -138,9 +138,9 @@ def kernels(law, gradients, weights):
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
                 axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                own = law_of(law, data, c)
-                pulled = (1.0 + e) * stress(own, e, axial, slack, smooth)
-                total += weights[q] * (energy_density(own, e, axial, slack, smooth) - pulled)
+                line_law = law_of(law, data, c)
+                pulled = (1.0 + e) * stress(line_law, e, axial, slack, smooth)
+                total += weights[q] * (energy_density(line_law, e, axial, slack, smooth) - pulled)
             out[c] = total
 
     return force_of_four if points == 1 else force, energy, stiffness, bound, every_strain, length_force

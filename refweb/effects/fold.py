@@ -107,13 +107,13 @@ class Fold(Table):
 
     def _star(self, web, length):
         """Places of the nodes of a star, lines having these natural lengths [m]."""
-        found = web.find("centre" if self.hub is None else self.hub, "hub")
-        if len(found) != 1:
-            raise InputError(f"hub is {len(found)} nodes, must be one")
+        hub_nodes = web.find("centre" if self.hub is None else self.hub, "hub")
+        if len(hub_nodes) != 1:
+            raise InputError(f"hub is {len(hub_nodes)} nodes, must be one")
         size = np.linalg.norm(web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]], axis=1)
         ratio = 0.5 if self.ratio is None else self.ratio
         turns = turns_of(ratio, float((length / size).min())) if self.turns is None else self.turns
-        return wound(web.points, web.points[found[0]], self.axis or (0.0, 0.0, 1.0), ratio, turns)
+        return wound(web.points, web.points[hub_nodes[0]], self.axis or (0.0, 0.0, 1.0), ratio, turns)
 
     def _from_file(self, web):
         """Places of the nodes in the file."""

@@ -30,13 +30,13 @@ def shortest_of(net):
     Between corners a length is a product of positive linear functions of time, which is least at an end.
     """
     corners = [t for _, table in net.factors for t, _ in table if 0.0 < t < net.end]
-    least = np.full(len(net.cells), np.inf)
+    shortest = np.full(len(net.cells), np.inf)
     for t in {0.0, net.end, *corners}:
         length = net.natural_length.copy()
         for elements, table in net.factors:
             length[elements] *= np.interp(t, *np.transpose(table))
-        np.minimum(least, length, out=least)
-    return least
+        np.minimum(shortest, length, out=shortest)
+    return shortest
 
 
 def scaled(net, lines, table):

@@ -53,7 +53,7 @@ class Link(Table):
         return Constraint(cells=cells, data=np.column_stack([apart, length]))
 
     def _one(self, net, i, node):
-        found = net.web.find(node, f"nodes[{i}]")
-        if len(found) != 1:
-            raise InputError(f"nodes[{i}] = {shown(node)} is {len(found)} nodes, must be one")
-        return int(found[0])
+        nodes_found = net.web.find(node, f"nodes[{i}]")
+        if len(nodes_found) != 1:
+            raise InputError(f"nodes[{i}] = {shown(node)} is {len(nodes_found)} nodes, must be one")
+        return int(nodes_found[0])

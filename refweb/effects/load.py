@@ -73,5 +73,5 @@ class Load(Table):
         """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
         data = np.tile(self.force, (len(loaded), 1))
-        own = dict(force=force, energy=energy, impulse=impulse)
-        return outer_load(net, "load", column(loaded), data, self.factor, **own)
+        kernels = dict(force=force, energy=energy, impulse=impulse)
+        return outer_load(net, "load", column(loaded), data, self.factor, **kernels)

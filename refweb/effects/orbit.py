@@ -95,6 +95,6 @@ class Orbit(Table):
     def on(self, net):
         """The families of all rows with mass."""
         n = np.sqrt(GRAVITATION / self.radius) / self.radius if self.mean_motion is None else self.mean_motion
-        own = self._frame()
-        pull, speed = n**2 * own.T @ np.diag([3.0, 0.0, -1.0]) @ own, n * own[2]
+        frame = self._frame()
+        pull, speed = n**2 * frame.T @ np.diag([3.0, 0.0, -1.0]) @ frame, n * frame[2]
         return families(net, speed.tolist(), pull, name="orbit", book="orbit_energy", orbit_radius=self.radius)

@@ -50,10 +50,10 @@ def kernels(nodes, shares, couples):
                 row, share = cells[c, a], shares[a]
                 d0, d1, d2 = share * data[c, ALONG], share * data[c, ALONG + 1], share * data[c, ALONG + 2]
                 for b in range(nodes):
-                    other, couple = cells[c, b], couples[nodes * a + b]
-                    d0 += couple * x[other, 0]
-                    d1 += couple * x[other, 1]
-                    d2 += couple * x[other, 2]
+                    column, couple = cells[c, b], couples[nodes * a + b]
+                    d0 += couple * x[column, 0]
+                    d1 += couple * x[column, 1]
+                    d2 += couple * x[column, 2]
                 p0, p1, p2 = d1 * n2 - d2 * n1, d2 * n0 - d0 * n2, d0 * n1 - d1 * n0
                 f[row, 0] += p0
                 f[row, 1] += p1
@@ -77,10 +77,10 @@ def kernels(nodes, shares, couples):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            most = data[c, FACTOR] * math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))
+            area = data[c, FACTOR] * math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))
             for a in range(nodes):
                 for b in range(nodes):
-                    rates[cells[c, a]] += most * abs(couples[nodes * a + b])
+                    rates[cells[c, a]] += area * abs(couples[nodes * a + b])
 
     return force, stiffness, bound
 
@@ -150,7 +150,7 @@ class Pressure(Table):
         pushed = self.value * sides[net.line[at], None] * normal
         data = np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3]])
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
-        own = dict(
+        arguments = dict(
             force=force,
             stiffness=stiffness,
             bound=bound,
@@ -158,7 +158,7 @@ class Pressure(Table):
             elements=at,
             disable_cells=without(slice(NORMAL, NORMAL + 3)),
         )
-        return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **own)
+        return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **arguments)
 
     def _sides(self, web, lines, normal):
         """Sign of each line: 1 if it pushes away from the point by itself, −1 if not."""

@@ -93,12 +93,12 @@ class Rupture(Table):
     def extend(self, net):
         """The net with the strengths of its lines, and what broken elements held in one more column."""
         web = net.web
-        own = np.full(len(web.lines), np.nan if self.strength is None else self.strength)
-        given = givers(web.groups, self.groups, len(web.lines)).get("strength", np.full(len(own), -1))
+        strengths = np.full(len(web.lines), np.nan if self.strength is None else self.strength)
+        given = givers(web.groups, self.groups, len(web.lines)).get("strength", np.full(len(strengths), -1))
         for number, group in enumerate(self.groups.values()):
             if group.strength is not None:
-                own[given == number] = group.strength
-        strength = np.where(np.isnan(own[net.line]), net.strength, own[net.line])
+                strengths[given == number] = group.strength
+        strength = np.where(np.isnan(strengths[net.line]), net.strength, strengths[net.line])
         return replace(net, strength=strength).with_column(HELD, 0.0)
 
     def on(self, net):

@@ -67,10 +67,10 @@ class Temperature(Table):
     def check(self):
         """Refuse a natural length that is not positive."""
         for name in (None, *self.groups):
-            own = self.groups.get(name, self)
+            settings = self.groups.get(name, self)
             _refuse_none(
-                self if own.expansion is None else own,
-                self if own.change is None else own,
+                self if settings.expansion is None else settings,
+                self if settings.change is None else settings,
                 "" if name is None else f"groups.{short(name)} ",
             )
 
@@ -87,13 +87,13 @@ class Temperature(Table):
     def _factors(self, web):
         """Lines of each pair of α and ΔT, and the table of their factor."""
         tables = list(self.groups.values())
-        found = givers(web.groups, self.groups, len(web.lines))
+        tables_of = givers(web.groups, self.groups, len(web.lines))
         none = np.full(len(web.lines), -1)
-        given = np.stack([found.get("expansion", none), found.get("change", none)], axis=1)
-        for one in np.unique(given, axis=0):
-            expanding, changing = (tables[number] if number >= 0 else self for number in one)
+        given = np.stack([tables_of.get("expansion", none), tables_of.get("change", none)], axis=1)
+        for numbers in np.unique(given, axis=0):
+            expanding, changing = (tables[number] if number >= 0 else self for number in numbers)
             _refuse_none(expanding, changing, "groups ")
-            yield np.flatnonzero((given == one).all(axis=1)), _factor(expanding, changing)
+            yield np.flatnonzero((given == numbers).all(axis=1)), _factor(expanding, changing)
 
 
 def _factor(expanding, changing):

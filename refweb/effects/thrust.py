@@ -108,31 +108,31 @@ class Thrust(Table):
 
     def on(self, net):
         """The family of one element; ``out`` is the power [W]."""
-        found = net.web.find(self.node)
-        if len(found) != 1:
-            raise InputError(f"node = {shown(self.node)} is {len(found)} nodes, must be one")
-        line = self._line(net.web, found[0])
-        second = int(found[0] == net.web.lines[line, 1])
+        nodes_found = net.web.find(self.node)
+        if len(nodes_found) != 1:
+            raise InputError(f"node = {shown(self.node)} is {len(nodes_found)} nodes, must be one")
+        line = self._line(net.web, nodes_found[0])
+        second = int(nodes_found[0] == net.web.lines[line, 1])
         cell = np.flatnonzero(net.line == line)[-second]
-        place, sign = float(second), 1.0 - 2.0 * second
-        order = np.argsort(abs(net.places - place))
+        position, sign = float(second), 1.0 - 2.0 * second
+        order = np.argsort(abs(net.places - position))
         power = np.arange(len(order))
         functions = np.linalg.inv(np.vander(net.places, increasing=True))
-        slopes = sign * (power[1:] * place ** (power[1:] - 1)) @ functions[1:]
+        slopes = sign * (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
         reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
-        own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
-        own |= dict(elements=np.array([cell]), disable_cells=without(0))
-        return outer_load(net, "thrust", cells, data, self.factor, **own)
+        force_kernels = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
+        force_kernels |= dict(elements=np.array([cell]), disable_cells=without(0))
+        return outer_load(net, "thrust", cells, data, self.factor, **force_kernels)
 
     def _line(self, web, node):
         """Number of the line that ends at a node."""
         lines = web.find_lines(self.line, "line")
-        here = lines[(web.lines[lines] == node).any(axis=1)]
-        if len(here) == 1:
-            return int(here[0])
+        lines_here = lines[(web.lines[lines] == node).any(axis=1)]
+        if len(lines_here) == 1:
+            return int(lines_here[0])
         if len(lines) == 1:
             ends = web.lines[lines[0]]
             raise InputError(f"node = {shown(self.node)} must be an end of line {lines[0]}, {ends[0]} or {ends[1]}")
-        raise InputError(f"line = {shown(self.line)}: {len(here)} of its lines end at node {node}, must be one")
+        raise InputError(f"line = {shown(self.line)}: {len(lines_here)} of its lines end at node {node}, must be one")

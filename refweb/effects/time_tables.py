@@ -13,21 +13,21 @@ from ..kernels import kernel
 def interpolate(t, data, start, width, column):
     """(value, slope) of one column at time t, by bisection; ``width`` counts the time column."""
     before = start + 1
-    here = before + (int(data[start]) - 1) * width
+    row_begin = before + (int(data[start]) - 1) * width
     if t < data[before]:
         return data[before + column], 0.0
-    if not t < data[here]:
-        return data[here + column], 0.0
-    while here - before > width:
-        middle = before + (here - before) // width // 2 * width
+    if not t < data[row_begin]:
+        return data[row_begin + column], 0.0
+    while row_begin - before > width:
+        middle = before + (row_begin - before) // width // 2 * width
         if t < data[middle]:
-            here = middle
+            row_begin = middle
         else:
             before = middle
-    slope = (data[here + column] - data[before + column]) / (data[here] - data[before])
-    if t - data[before] < data[here] - t:
+    slope = (data[row_begin + column] - data[before + column]) / (data[row_begin] - data[before])
+    if t - data[before] < data[row_begin] - t:
         return data[before + column] + slope * (t - data[before]), slope
-    return data[here + column] - slope * (data[here] - t), slope
+    return data[row_begin + column] - slope * (data[row_begin] - t), slope
 
 
 @kernel()
@@ -37,12 +37,12 @@ def integrate(t, data, start, width, column):
     if t < data[first]:
         return data[first + column] * (t - data[first])
     for k in range(1, rows):
-        here = first + k * width
-        before = here - width
-        if t < data[here]:
+        row_begin = first + k * width
+        before = row_begin - width
+        if t < data[row_begin]:
             value, _ = interpolate(t, data, start, width, column)
             return total + 0.5 * (data[before + column] + value) * (t - data[before])
-        total += 0.5 * (data[before + column] + data[here + column]) * (data[here] - data[before])
+        total += 0.5 * (data[before + column] + data[row_begin + column]) * (data[row_begin] - data[before])
     last = first + (rows - 1) * width
     return total + data[last + column] * (t - data[last])
 

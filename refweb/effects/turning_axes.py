@@ -124,15 +124,15 @@ def kernels_of_velocity(nodes):
     @kernel(BOUND)
     def damping_bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            most = math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))  # of row sums of Ω ×
+            largest = math.sqrt(2.0 * (data[c, 0] ** 2 + data[c, 1] ** 2 + data[c, 2] ** 2))  # of row sums of Ω ×
             for a in range(nodes):
                 for b in range(nodes):
-                    rates[cells[c, a]] += 2.0 * most * abs(data[c, TURNED + nodes * a + b])
+                    rates[cells[c, a]] += 2.0 * largest * abs(data[c, TURNED + nodes * a + b])
 
     return coriolis, damping, damping_bound
 
 
-def families(net, speed, pull, **own):
+def families(net, speed, pull, **arguments):
     """The families of all rows with mass; where mass is consistent those of the lines as well.
 
     Parameters
@@ -150,18 +150,18 @@ def families(net, speed, pull, **own):
     turning = [body for body in net.bodies if body.spin is not None and not body.shape.planar]
     spins = np.array([body.spin for body in turning if body.turn is None], int)
     masses = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
-    found = [
-        _of_place(column(heavy), net.mass[heavy], net.points[heavy], pull, speed, own),
-        _of_velocity(column(np.concatenate([heavy, spins])), masses, speed, own),
+    terms = [
+        _of_place(column(heavy), net.mass[heavy], net.points[heavy], pull, speed, arguments),
+        _of_velocity(column(np.concatenate([heavy, spins])), masses, speed, arguments),
     ]
     if (coupled := net.consistent_minus_lumped) is not None:
-        found.append(_of_place(net.cells, coupled, net.points[net.cells], pull, speed, own))
-        found.append(_of_velocity(net.cells, coupled, speed, own))
+        terms.append(_of_place(net.cells, coupled, net.points[net.cells], pull, speed, arguments))
+        terms.append(_of_velocity(net.cells, coupled, speed, arguments))
     if any(body.turn is not None for body in turning):
         from . import turning_bodies
 
-        found += turning_bodies.families(net, speed, pull, own)
-    return found
+        terms += turning_bodies.families(net, speed, pull, arguments)
+    return terms
 
 
 def _numbers(head, *parts):
@@ -170,7 +170,7 @@ def _numbers(head, *parts):
     return np.ascontiguousarray(np.hstack([np.tile(head, (len(parts[0]), 1)), *flat]))
 
 
-def _of_place(cells, mass, points, pull, speed, own):
+def _of_place(cells, mass, points, pull, speed, arguments):
     stiffest = max(-float(np.linalg.eigvalsh(pull)[0]), 0.0)
     force, energy, stiffness, bound = kernels_of_place(cells.shape[1])
     return Family(
@@ -181,11 +181,11 @@ def _of_place(cells, mass, points, pull, speed, own):
         stiffness=stiffness,
         bound=bound if stiffest else None,  # what only lowers frequencies makes no step shorter
         angular_velocity=tuple(speed),
-        **own,
+        **arguments,
     )
 
 
-def _of_velocity(cells, mass, speed, own):
+def _of_velocity(cells, mass, speed, arguments):
     force, damping, damping_bound = kernels_of_velocity(cells.shape[1])
     return Family(
         cells=cells,
@@ -196,5 +196,5 @@ def _of_velocity(cells, mass, speed, own):
         symmetric=False,
         at_rest=False,
         angular_velocity=tuple(speed),
-        **own,
+        **arguments,
     )

@@ -133,13 +133,13 @@ def coriolis(t, x, v, f, cells, data, out):
 def coriolis_stiffness(t, x, v, blocks, cells, data, definite):
     blocks[:] = 0.0
     for c in range(cells.shape[0] if not definite else 0):
-        (omega, own, w), a = whirl(x, v, data, c, cells), cells[c, 0]
+        (omega, own_velocity, w), a = whirl(x, v, data, c, cells), cells[c, 0]
         s = turned(matrix_at(x, a, cells[c, 1]), rows_of(data, c, SPREAD))
         u, o = (v[a, 0], v[a, 1], v[a, 2]), (data[c, SPEED], data[c, SPEED + 1], data[c, SPEED + 2])
         for j in range(3):
             e = unit(j)
             first, less = cross(e, omega), times(w, cross(e, u))
-            first = cross((first[0] - less[0], first[1] - less[1], first[2] - less[2]), own)
+            first = cross((first[0] - less[0], first[1] - less[1], first[2] - less[2]), own_velocity)
             last = cross(omega, times(changed(e, s), o))
             for i in range(3):
                 blocks[c, i, j] = -2.0 * (first[i] + last[i])
@@ -164,7 +164,7 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
         rates[cells[c, 0]] += 2.0 * math.sqrt(3.0 * size) * data[c, LARGEST]
 
 
-def families(net, speed, pull, own):
+def families(net, speed, pull, arguments):
     """The families of all bodies that turn in space, see `refweb.effects.turning_axes.families`."""
     turns = RigidRotations.of(net)
     tensors = [turns.moment[n] * np.linalg.inv(mobility) for n, mobility in enumerate(turns.mobility)]
@@ -177,7 +177,7 @@ def families(net, speed, pull, own):
     head = np.tile([*np.ravel(pull), *speed], (len(cells), 1))
     parts = head, *(np.reshape(part, (len(cells), 9)) for part in (spreads, turns.mobility)), np.array(largest)
     shared: dict = dict(
-        cells=cells, data=np.ascontiguousarray(np.column_stack(parts)), symmetric=False, at_rest=False, **own
+        cells=cells, data=np.ascontiguousarray(np.column_stack(parts)), symmetric=False, at_rest=False, **arguments
     )
     still = Family(force=force, energy=energy, stiffness=stiffness, bound=bound, **shared)
     moving = Family(

@@ -57,11 +57,11 @@ class Velocity(Table):
         """Write the initial velocities into v, shape (rows, 3); refuse those that a support does not allow."""
         if net.quasi_static:
             raise InputError("a velocity cannot be used in statics: leave it out")
-        found = net.find(self.node)
-        velocities = np.tile(np.array(self.value or (0.0, 0.0, 0.0)), (len(found), 1))
+        nodes_found = net.find(self.node)
+        velocities = np.tile(np.array(self.value or (0.0, 0.0, 0.0)), (len(nodes_found), 1))
         if self.spin is not None:
-            velocities += np.cross(self.spin, net.points[found] - self.about)
-        for node, velocity in zip(found, velocities, strict=True):
+            velocities += np.cross(self.spin, net.points[nodes_found] - self.about)
+        for node, velocity in zip(nodes_found, velocities, strict=True):
             allowed = [axis for axis in range(3) if not supported[node, axis]]
             stopped = [axis for axis in range(3) if supported[node, axis] and velocity[axis] != 0.0]
             for body in net.bodies if self.node != "all" else ():

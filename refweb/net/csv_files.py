@@ -19,7 +19,7 @@ def web_of(points, lines):
     """The `Web` of the paths of its points and of its lines."""
     nodes, ends = _table(points, POINTS), _table(lines, LINES)
     places = np.column_stack([nodes.numbers(key) for key in "xyz"])
-    pairs = np.column_stack([ends.numbers(key, whole=True) for key in "ij"])
+    pairs = np.column_stack([ends.numbers(key, integer=True) for key in "ij"])
     names = {}
     for number, name in enumerate(nodes.columns.get("name", ())):
         if name:
@@ -34,8 +34,8 @@ def web_of(points, lines):
 
 def places_of(path):
     """Positions [m] in the columns x, y and z of a file, shape (rows, 3)."""
-    found = _table(path, dict.fromkeys("xyz", True))
-    return np.column_stack([found.numbers(key) for key in "xyz"])
+    columns = _table(path, dict.fromkeys("xyz", True))
+    return np.column_stack([columns.numbers(key) for key in "xyz"])
 
 
 class _Columns:
@@ -48,18 +48,18 @@ class _Columns:
         """Name of a row in messages."""
         return f"{self.path.name}, line {self._rows[number]}"
 
-    def numbers(self, key, whole=False, empty=None):
+    def numbers(self, key, integer=False, empty=None):
         """A column as numbers."""
-        found = []
+        values = []
         for number, text in enumerate(self.columns[key]):
             try:
                 if "_" in text:  # which Python takes in numbers
                     raise ValueError
-                found.append(empty if not text and empty is not None else int(text) if whole else float(text))
+                values.append(empty if not text and empty is not None else int(text) if integer else float(text))
             except ValueError:
-                kind = "a whole number" if whole else "a number"
+                kind = "a whole number" if integer else "a number"
                 raise InputError(f"{self.at(number)}: {key} = {shown(text)} must be {kind}") from None
-        return np.array(found, dtype=np.int64 if whole else np.float64)
+        return np.array(values, dtype=np.int64 if integer else np.float64)
 
 
 def _table(path, known):

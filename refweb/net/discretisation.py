@@ -85,11 +85,11 @@ def _divided(web, pieces):
     return np.vstack([web.points, inner.reshape(-1, 3)]), ends
 
 
-def _numbered(dofs, line, place, nodes):
+def _numbered(dofs, line, position, nodes):
     """Row of each dof: the web's nodes keep their number, the others follow line by line and along each line."""
     count = max(dofs.max() + 1, nodes)
     of_line, along = np.empty(count, dtype=np.int64), np.empty(count)
-    of_line[dofs], along[dofs] = line[:, None], place
+    of_line[dofs], along[dofs] = line[:, None], position
     added = nodes + np.lexsort((along[nodes:], of_line[nodes:]))
     row = np.arange(count)
     row[added] = np.arange(nodes, count)
@@ -129,25 +129,25 @@ def _elements(web, element, pieces, length):
         return Elements(points, cells, line, element.doflocs[:, 0], values(element, places)[1], weights)
     line_basis = basis(points, ends, length, element)
     dofs, places = line_basis.element_dofs.T, element.doflocs[:, 0]
-    place = np.tile(np.arange(pieces), len(web.lines))[:, None] + places
-    row = _numbered(dofs, line, place, len(web.points))
+    position = np.tile(np.arange(pieces), len(web.lines))[:, None] + places
+    row = _numbered(dofs, line, position, len(web.points))
     cells = np.ascontiguousarray(row[dofs], dtype=np.int32)
     if len(row) > len(web.points):
         start, end = (web.points[web.lines[:, side]] for side in (0, 1))
         points = np.empty((len(row), 3))
-        points[cells] = start[line][:, None] + (place / pieces)[:, :, None] * (end - start)[line][:, None]
+        points[cells] = start[line][:, None] + (position / pieces)[:, :, None] * (end - start)[line][:, None]
         points[: len(web.points)] = web.points
     return Elements(points, cells, line, places, values(element, line_basis.X)[1], line_basis.W)
 
 
-def _line_data(web, line, pieces, length, own):
+def _line_data(web, line, pieces, length, values):
     """`Net.line_data` of elements, from the properties of each."""
-    slackness, smoothing = own["slackness"], own["smoothing"]
+    slackness, smoothing = values["slackness"], values["smoothing"]
     r0 = np.sqrt(slackness**2 + 4.0 * smoothing**2)
     g0 = 2.0 * smoothing**2 / np.where(r0 > 0.0, r0 + slackness, 1.0)
     reference = web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]]
     size = np.linalg.norm(reference, axis=1)
-    data = [length, own["modulus"] * own["area"], slackness, smoothing, g0, r0]
+    data = [length, values["modulus"] * values["area"], slackness, smoothing, g0, r0]
     data += [*(reference[line] / pieces).T, size[line] / pieces]
     return np.ascontiguousarray(np.column_stack(data))
 
@@ -182,10 +182,10 @@ def build(web, cable, quasi_static=False, consistent=False):
     """
     given, pieces, element = cable.properties(web), cable.subdivide, line_element(cable.order)
     laws = np.unique(given["law"])
-    own = {name: np.repeat(value, pieces) for name, value in given.items()}
-    length = own["natural_length"] / pieces
+    values = {name: np.repeat(value, pieces) for name, value in given.items()}
+    length = values["natural_length"] / pieces
     cut = _elements(web, element, pieces, length)
-    share = own["density"] * own["area"] * length
+    share = values["density"] * values["area"] * length
     mass, apart = _masses(element, cut.cells, share, len(cut.points), consistent)
     net = Net(
         web=web,
@@ -194,9 +194,9 @@ def build(web, cable, quasi_static=False, consistent=False):
         mass=mass,
         cells=cut.cells,
         line=cut.line,
-        line_data=_line_data(web, cut.line, pieces, length, own),
-        area=own["area"],
-        strength=own["strength"],
+        line_data=_line_data(web, cut.line, pieces, length, values),
+        area=values["area"],
+        strength=values["strength"],
         gradients=cut.gradients,
         weights=cut.weights,
         nodes=len(cut.points),
@@ -206,4 +206,4 @@ def build(web, cable, quasi_static=False, consistent=False):
         cable_mass=float(mass.sum()),
         consistent_minus_lumped=apart,
     )
-    return net if net.law else net.with_column("law", own["law"])
+    return net if net.law else net.with_column("law", values["law"])

@@ -25,8 +25,8 @@ CHUNK = 1_000_000
 
 def turns_of(ratio, tightest):
     """n, of which σ is `SLACKEST` times the least natural length over distance, ``tightest``; 0 where none is."""
-    most = SLACKEST * tightest
-    return max(most / ratio - ratio / most, 0.0) / (2.0 * math.pi)
+    limit = SLACKEST * tightest
+    return max(limit / ratio - ratio / limit, 0.0) / (2.0 * math.pi)
 
 
 def wound(points, hub, axis, ratio, turns):
@@ -77,9 +77,9 @@ def nearest_lines(points, lines, gap):
 
     starts, ends = points[lines[:, 0]], points[lines[:, 1]]
     half = 0.5 * np.linalg.norm(ends - starts, axis=1).max()
-    found = cKDTree(0.5 * (starts + ends)).query_pairs(2.0 * half + gap, output_type="ndarray")
-    apart = (lines[found[:, 0]][:, :, None] != lines[found[:, 1]][:, None, :]).all(axis=(1, 2))
-    pairs, best = found[apart], (math.inf, -1, -1)
+    close = cKDTree(0.5 * (starts + ends)).query_pairs(2.0 * half + gap, output_type="ndarray")
+    apart = (lines[close[:, 0]][:, :, None] != lines[close[:, 1]][:, None, :]).all(axis=(1, 2))
+    pairs, best = close[apart], (math.inf, -1, -1)
     for first in range(0, len(pairs), CHUNK):
         some = pairs[first : first + CHUNK]
         apart = distances(starts, ends, some)
@@ -112,9 +112,9 @@ def refuse_unfit(points, lines, length, gap):
         )
     for line in np.flatnonzero(size == 0.0)[:1]:
         raise InputError(f"line {line} would have no length: its nodes {lines[line].tolist()} are at one place")
-    near, one, other = nearest_lines(points, lines, gap)
+    near, first, second = nearest_lines(points, lines, gap)
     if near < gap:
         raise InputError(
-            f"lines {one} and {other} would be {near:.3g} m apart, must be ≥ gap = {gap:.3g} [m]: fold the web less, "
-            "or give a smaller gap"
+            f"lines {first} and {second} would be {near:.3g} m apart, must be ≥ gap = {gap:.3g} [m]: fold the web "
+            "less, or give a smaller gap"
         )

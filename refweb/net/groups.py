@@ -59,11 +59,11 @@ def _numbers(name, lines, count):
 
 def by_place(lines, rim, nodes):
     """The groups of `PLACES` that have lines, as `members`."""
-    held = np.zeros(nodes, dtype=np.int64)
-    held[rim] = 1
-    ends = held[lines].sum(axis=1)
-    found = {name: np.flatnonzero(ends == k) for k, name in enumerate(PLACES)} if len(rim) else {}
-    return {name: found[name] for name in reversed(PLACES) if name in found and len(found[name])}
+    counts = np.zeros(nodes, dtype=np.int64)
+    counts[rim] = 1
+    ends = counts[lines].sum(axis=1)
+    names_of = {name: np.flatnonzero(ends == k) for k, name in enumerate(PLACES)} if len(rim) else {}
+    return {name: names_of[name] for name in reversed(PLACES) if name in names_of and len(names_of[name])}
 
 
 def givers(groups, tables, count, where="groups"):
@@ -90,17 +90,17 @@ def givers(groups, tables, count, where="groups"):
     InputError
         For a group that the web does not have, and a line to which two groups give the same key.
     """
-    found, names = {}, list(tables)
+    owners, names = {}, list(tables)
     for number, (name, table) in enumerate(tables.items()):
         if name not in groups:
             hint = nearest(name, groups) if groups else "this web has no groups"
             raise InputError(f"{where} {shown(name)} is not a group of lines, {hint}")
         for key in table.to_dict():
-            by = found.setdefault(key, np.full(count, -1))
+            by = owners.setdefault(key, np.full(count, -1))
             for line in groups[name][by[groups[name]] >= 0][:1]:
                 raise InputError(
                     f"{where} {shown(names[by[line]])} and {shown(name)} both give {key} to line {line}: give it in "
                     "one of them"
                 )
             by[groups[name]] = number
-    return found
+    return owners

@@ -105,16 +105,16 @@ def grown_box(l0, l1, l2, radius, c0, c1, c2, thin):
         bend = (-b0 / distance, g0 * g1 / distance, g0 * g2 / distance)
         return radius - distance, (g0, g1, g2), (*bend, -b1 / distance, g1 * g2 / distance, -b2 / distance)
     f0, f1, f2 = c0 - abs(l0), c1 - abs(l1), c2 - abs(l2)
-    least = min(f0, f1, f2)
-    at = 0 if f0 == least else 1 if f1 == least else 2
-    g = _shrinkage(radius + least, radius)[0]
+    smallest = min(f0, f1, f2)
+    at = 0 if f0 == smallest else 1 if f1 == smallest else 2
+    g = _shrinkage(radius + smallest, radius)[0]
     others = min(f1 if at == 0 else f0, f1 if at == 2 else f2)
     if not thin and (others < g or min(c0, c1, c2) < g):
-        return _smooth(l0, l1, l2, radius, c0, c1, c2, radius + least)
+        return _smooth(l0, l1, l2, radius, c0, c1, c2, radius + smallest)
     g0 = math.copysign(1.0, -l0) if at == 0 else 0.0
     g1 = math.copysign(1.0, -l1) if at == 1 else 0.0
     g2 = math.copysign(1.0, -l2) if at == 2 else 0.0
-    return radius + least, (g0, g1, g2), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return radius + smallest, (g0, g1, g2), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel()
@@ -141,8 +141,8 @@ def depth(p, grown):
         return grown_box(p[0], p[1], p[2], grown.radius, c[0], c[1], c[2], thin)
     out = math.hypot(p[0], p[1])
     e0, e1 = (p[0] / out, p[1] / out) if out > 0.0 else (1.0, 0.0)
-    found = grown_box(out, 0.0, p[2], grown.radius, c[0], math.inf, c[2], c[0] == 0.0)
-    deep, (g, _, g2), (b, _, b02, _, _, b22) = found
+    values = grown_box(out, 0.0, p[2], grown.radius, c[0], math.inf, c[2], c[0] == 0.0)
+    deep, (g, _, g2), (b, _, b02, _, _, b22) = values
     around = g / out if out > 0.0 else b
     bend = (b * e0 * e0 + around * e1 * e1, (b - around) * e0 * e1, b02 * e0, b * e1 * e1 + around * e0 * e0)
     return deep, (g * e0, g * e1, g2), (*bend, b02 * e1, b22)

@@ -21,7 +21,7 @@ def _lengths(name, value):
         return value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)):
-        return tuple(checked(f"{name}[{i}]", one, LENGTH) for i, one in enumerate(value))
+        return tuple(checked(f"{name}[{i}]", value_i, LENGTH) for i, value_i in enumerate(value))
     return checked(name, value, LENGTH)
 
 
@@ -34,7 +34,7 @@ def _names(name, value):
         listed = numbers if isinstance(numbers, (list, tuple)) else [numbers]
         if not listed:
             raise InputError(f"{name}.{key} = [] must be at least one node number")
-        result[key] = tuple(node_number(f"{name}.{key}", one) for one in listed)
+        result[key] = tuple(node_number(f"{name}.{key}", node) for node in listed)
     return result
 
 

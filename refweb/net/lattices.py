@@ -60,8 +60,8 @@ def _places(counts):
 def _rows(counts, first, polygon, pitch=(2, 1)):
     """Copies of a polygon, ``counts[j]`` in row j from x = ``first[j]`` on; integer array (polygons, corners, 2)."""
     row, column = _places(counts)
-    place = np.stack([pitch[0] * column + np.asarray(first)[row], pitch[1] * row], axis=1)
-    return place[:, None, :] + np.array(polygon)
+    points = np.stack([pitch[0] * column + np.asarray(first)[row], pitch[1] * row], axis=1)
+    return points[:, None, :] + np.array(polygon)
 
 
 class Tessellation(NamedTuple):
@@ -104,8 +104,8 @@ def _directions(points, lines):
     x, y, _ = (points[lines[:, 1]] - points[lines[:, 0]]).T
     along, up = abs(y) < _PARALLEL * abs(x), abs(x) < _PARALLEL * abs(y)
     aslant, rising = ~(along | up), x * y > 0.0
-    found = dict(rows=along, columns=up, rising=aslant & rising, falling=aslant & ~rising, diagonals=aslant)
-    return {name: np.flatnonzero(these) for name, these in found.items() if these.any()}
+    groups = dict(rows=along, columns=up, rising=aslant & rising, falling=aslant & ~rising, diagonals=aslant)
+    return {name: np.flatnonzero(these) for name, these in groups.items() if these.any()}
 
 
 def _rings(net, layer):
@@ -115,8 +115,8 @@ def _rings(net, layer):
     np.minimum.at(low, net.sides.ravel(), each)
     np.maximum.at(high, net.sides.ravel(), each)
     ring = np.where(net.frame | (low < high), low, 0)
-    found = {f"ring-{k}": np.flatnonzero(ring == k) for k in range(1, layer.max() + 1)}
-    return found | ({"spokes": np.flatnonzero(ring == 0)} if (ring == 0).any() else {})
+    rings = {f"ring-{k}": np.flatnonzero(ring == k) for k in range(1, layer.max() + 1)}
+    return rings | ({"spokes": np.flatnonzero(ring == 0)} if (ring == 0).any() else {})
 
 
 def _placed(nodes, mesh, side):
@@ -243,9 +243,9 @@ class Window(Table):
 
     def check(self):
         """Refuse sizes at which nothing hangs together, and more than a million cells."""
-        for name, least in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
-            if getattr(self, name) < least:
-                raise InputError(f'{name} = {getattr(self, name)} must be ≥ {least} for mesh = "{self.mesh}"')
+        for name, smallest in zip(("rows", "columns"), SMALLEST[self.mesh], strict=True):
+            if getattr(self, name) < smallest:
+                raise InputError(f'{name} = {getattr(self, name)} must be ≥ {smallest} for mesh = "{self.mesh}"')
         if self.rows * self.columns > _MOST_CELLS:
             raise InputError(f"rows × columns = {self.rows * self.columns} must be ≤ {_MOST_CELLS}")
 

@@ -89,9 +89,9 @@ def remarks(web):
     ends = np.sort(web.lines, axis=1)
     pairs, of, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     for pair in np.flatnonzero(count > 1)[:1]:
-        one, other = np.flatnonzero(of.ravel() == pair)[:2]
+        first, second = np.flatnonzero(of.ravel() == pair)[:2]
         yield (
-            f"{int((count - 1).sum())} lines join two nodes that another line joins, {one} and {other} among them: "
+            f"{int((count - 1).sum())} lines join two nodes that another line joins, {first} and {second} among them: "
             "each carries load; leave one out if the file has it twice by mistake"
         )
     used = np.unique(web.lines)
@@ -130,19 +130,19 @@ def _web_of(mesh):
         length = length[of] * share
     groups = None if groups is None else [groups[i] for i in of]
     if mesh.groups is not None:
-        own = {} if groups is None else members(groups, len(lines))
-        once, place = _merged(lines, mesh)
+        members_ = {} if groups is None else members(groups, len(lines))
+        once, order = _merged(lines, mesh)
         lines, length = lines[once], None if length is None else length[once]
-        groups = {name: np.unique(place[list(cells)]) for name, cells in {**own, **mesh.groups}.items()}
+        groups = {name: np.unique(order[list(cells)]) for name, cells in {**members_, **mesh.groups}.items()}
     broken = np.zeros(0, dtype=np.int64) if broken is None or mesh.groups is not None else np.flatnonzero(broken[of])
     rim = mesh.supports if support is None else np.flatnonzero(support)
-    own: dict = dict(kind="file", groups=groups, broken=broken)
-    keep = _kept(mesh, lines, rim, len(points))
-    if keep is None:
-        return Web(points, lines, length, rim=rim, names=mesh.names, **own)
-    new = np.cumsum(keep) - 1
+    members_: dict = dict(kind="file", groups=groups, broken=broken)
+    mask = _kept(mesh, lines, rim, len(points))
+    if mask is None:
+        return Web(points, lines, length, rim=rim, names=mesh.names, **members_)
+    new = np.cumsum(mask) - 1
     names = {name: new[list(nodes)].tolist() for name, nodes in mesh.names.items()}
-    return Web(points[keep], new[lines], length, rim=new[rim], names=names, **own)
+    return Web(points[mask], new[lines], length, rim=new[rim], names=names, **members_)
 
 
 def _kept(mesh, lines, rim, count):
@@ -150,26 +150,26 @@ def _kept(mesh, lines, rim, count):
 
     Nodes within curved lines are not, and of Gmsh those that no line uses and no physical point names.
     """
-    keep = np.full(count, mesh.groups is None)
+    mask = np.full(count, mesh.groups is None)
     curved = [block.cells[:, 2:] for block in mesh.lines if INNER.get(block.kind)]
-    if (keep.all() and not curved) or lines.min() < 0 or lines.max() >= count:  # the web refuses such lines
+    if (mask.all() and not curved) or lines.min() < 0 or lines.max() >= count:  # the web refuses such lines
         return None
     for inner in curved:
-        keep[inner] = False
-    keep[lines] = keep[rim] = True
+        mask[inner] = False
+    mask[lines] = mask[rim] = True
     for nodes in mesh.names.values():
-        keep[nodes] = True
-    return None if keep.all() else keep
+        mask[nodes] = True
+    return None if mask.all() else mask
 
 
 def _check_cells(mesh):
     """Refuse what is no line, and say what there is."""
-    held = {}
+    counts = {}
     for block in mesh.blocks:
-        held[block.kind] = held.get(block.kind, 0) + len(block.cells)
-    other = sorted(set(held) - set(INNER) - {"polyline", *HARMLESS})
-    if other or not mesh.lines:
-        text = ", ".join(f"{count} {kind}" for kind, count in sorted(held.items())) or "no"
+        counts[block.kind] = counts.get(block.kind, 0) + len(block.cells)
+    unsupported = sorted(set(counts) - set(INNER) - {"polyline", *HARMLESS})
+    if unsupported or not mesh.lines:
+        text = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items())) or "no"
         raise InputError(f"it holds {text} cells: a web has only lines; {mesh.remedy}")
 
 
@@ -179,16 +179,16 @@ def _segments(blocks, points):
     for block in blocks:
         cells = block.cells if block.kind == "polyline" else block.cells[:, :2]
         pieces = cells.shape[1] - 1
-        own = np.stack([cells[:, :-1], cells[:, 1:]], axis=2).reshape(-1, 2).astype(np.int64)
-        lines.append(own)
+        pairs = np.stack([cells[:, :-1], cells[:, 1:]], axis=2).reshape(-1, 2).astype(np.int64)
+        lines.append(pairs)
         of.append(first + np.repeat(np.arange(len(cells)), pieces))
         first += len(cells)
         if pieces == 1:
-            share.append(np.ones(len(own)))
+            share.append(np.ones(len(pairs)))
             continue
-        size = np.linalg.norm(np.diff(points[own % len(points)], axis=1)[:, 0], axis=1).reshape(-1, pieces)
-        whole = size.sum(axis=1, keepdims=True)
-        share.append((size / np.where(whole > 0.0, whole, 1.0)).ravel())
+        size = np.linalg.norm(np.diff(points[pairs % len(points)], axis=1)[:, 0], axis=1).reshape(-1, pieces)
+        counts = size.sum(axis=1, keepdims=True)
+        share.append((size / np.where(counts > 0.0, counts, 1.0)).ravel())
     return np.concatenate(lines), np.concatenate(of), np.concatenate(share)
 
 
@@ -198,8 +198,8 @@ def _merged(lines, mesh):
     key = np.column_stack([np.sort(lines, axis=1), entity])
     _, first, number = np.unique(key, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
-    place = np.argsort(order)[number.ravel()]
-    return first[order], place
+    position = np.argsort(order)[number.ravel()]
+    return first[order], position
 
 
 def _joined(key, blocks):

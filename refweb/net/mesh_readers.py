@@ -116,15 +116,15 @@ def _asks_for_vtk(path, suffix):
             return re.search(rb"^\s*DATASET\s+POLYDATA", file.read(2000), re.MULTILINE | re.IGNORECASE) is not None
     if suffix != ".vtu":
         return False
-    whole = path.read_bytes()
-    if b"<!DOCTYPE" in whole or b"<!ENTITY" in whole:
+    content = path.read_bytes()
+    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
         return False
-    return b'type="String"' in whole or _has_polylines(path, whole)
+    return b'type="String"' in content or _has_polylines(path, content)
 
 
-def _has_polylines(path, whole):
+def _has_polylines(path, content):
     """Tell if meshio leaves cells of a .vtu file out."""
-    said = sum(map(int, re.findall(rb'NumberOfCells="(\d{1,12})"', whole)))
+    said = sum(map(int, re.findall(rb'NumberOfCells="(\d{1,12})"', content)))
     try:
         return said != sum(len(block.data) for block in by_meshio(path, "vtu").cells)
     except (InputError, KeyError):
@@ -173,20 +173,20 @@ def by_vtk(path):
             said = [line for line in ended.stderr.splitlines() if line.strip()]
             raise _unread(path, said[-1] if said else f"status {ended.returncode}", "VTK")
         with np.load(target, allow_pickle=False) as archive:
-            found = dict(archive)
+            arrays = dict(archive)
     from meshio import _vtk_common
 
     names = _vtk_common.vtk_to_meshio_type
-    sizes, types = np.diff(found["offsets"]), found["types"]
+    sizes, types = np.diff(arrays["offsets"]), arrays["types"]
     starts = np.flatnonzero(np.append(True, (np.diff(types) != 0) | (np.diff(sizes) != 0))) if len(types) else []
     blocks = []
     for first, last in itertools.pairwise([*starts, len(types)]):
-        cells = found["cells"][found["offsets"][first] : found["offsets"][last]].reshape(last - first, sizes[first])
-        data = {key[5:]: values[first:last] for key, values in found.items() if key.startswith("cell ")}
+        cells = arrays["cells"][arrays["offsets"][first] : arrays["offsets"][last]].reshape(last - first, sizes[first])
+        data = {key[5:]: values[first:last] for key, values in arrays.items() if key.startswith("cell ")}
         kind = "polyline" if types[first] == 4 else names.get(int(types[first]), f"type {types[first]}")
         blocks.append(Block(kind, cells, data))
-    point_data = {key[6:]: values for key, values in found.items() if key.startswith("point ")}
-    return Mesh(found["points"], blocks, point_data, REMEDIES[""])
+    point_data = {key[6:]: values for key, values in arrays.items() if key.startswith("point ")}
+    return Mesh(arrays["points"], blocks, point_data, REMEDIES[""])
 
 
 def _of_gmsh(mesh):
@@ -194,18 +194,18 @@ def _of_gmsh(mesh):
     named = {(int(dim), int(tag)): name for name, (tag, dim) in mesh.field_data.items()}
     blocks, groups, names, first = [], {}, {}, 0
     for i, block in enumerate(mesh.cells):
-        own = {key: mesh.cell_data[key][i] for key in ("gmsh:physical", "gmsh:geometrical") if key in mesh.cell_data}
+        tags = {key: mesh.cell_data[key][i] for key in ("gmsh:physical", "gmsh:geometrical") if key in mesh.cell_data}
         data = {key: mesh.cell_data[key][i] for key in ("natural_length", "group") if key in mesh.cell_data}
-        data |= {"entity": own["gmsh:geometrical"]} if "gmsh:geometrical" in own else {}
+        data |= {"entity": tags["gmsh:geometrical"]} if "gmsh:geometrical" in tags else {}
         blocks.append(Block(block.type, block.data, data))
         dim = 0 if block.type == "vertex" else 1
         if block.type != "vertex" and block.type not in LINES:
             continue
         members = {}
-        for tag in np.unique(own.get("gmsh:physical", [])):
+        for tag in np.unique(tags.get("gmsh:physical", [])):
             if tag:
                 name = named.get((dim, int(tag)), str(tag))
-                members.setdefault(name, set()).update(np.flatnonzero(own["gmsh:physical"] == tag).tolist())
+                members.setdefault(name, set()).update(np.flatnonzero(tags["gmsh:physical"] == tag).tolist())
         for name, sets in mesh.cell_sets.items():
             if not name.startswith("gmsh:") and sets[i] is not None and len(sets[i]):
                 members.setdefault(name, set()).update(np.asarray(sets[i]).tolist())

@@ -138,8 +138,8 @@ class Net:
         """The net with one more column in ``line_data``; ``values`` are one number or one for each element."""
         if name in self.columns:
             raise ValueError(f"there is a column {name} already")
-        own = np.broadcast_to(values, len(self.cells))
-        numbers = np.ascontiguousarray(np.column_stack([self.line_data, own]), dtype=float)
+        column = np.broadcast_to(values, len(self.cells))
+        numbers = np.ascontiguousarray(np.column_stack([self.line_data, column]), dtype=float)
         return replace(self, line_data=numbers, columns=(*self.columns, name))
 
     @property
@@ -207,5 +207,5 @@ class Net:
     def find(self, selection, name="node"):
         """Rows of a selection of nodes; "all" has the nodes that order and subdivision add, see `Web.find`."""
         every = selection == "all" or (isinstance(selection, (list, tuple)) and "all" in selection)
-        found = self.web.find(selection, name)
-        return np.arange(self.nodes) if every else found
+        numbers = self.web.find(selection, name)
+        return np.arange(self.nodes) if every else numbers

@@ -249,8 +249,8 @@ class RigidBody:
 
         Of a body that carries nodes it does.
         """
-        one = (self.inertia == self.inertia[0, 0] * np.eye(3)).all()
-        return not (self.fixed or self.shape.planar or self.shape.once and one and not self.carried)
+        spherical = (self.inertia == self.inertia[0, 0] * np.eye(3)).all()
+        return not (self.fixed or self.shape.planar or self.shape.once and spherical and not self.carried)
 
     @property
     def moment(self):
@@ -262,8 +262,8 @@ class RigidBody:
     @property
     def mobility(self):
         """Moment of inertia times the inverse of the inertia tensor, along its axes, shape (3, 3)."""
-        found = self.moment * np.linalg.inv(self.inertia)
-        return 0.5 * (found + found.T)
+        tensor = self.moment * np.linalg.inv(self.inertia)
+        return 0.5 * (tensor + tensor.T)
 
     @property
     def start_spin(self):
@@ -349,10 +349,10 @@ def axes_about(name, axis):
     """Unit vectors, shape (3, 3), the third along a key's value."""
     if axis is None:
         raise InputError(f"{name} is missing: give {name} = ... or orientation = ...")
-    own = unit(name, axis)
-    first = np.cross(own, np.eye(3)[np.abs(own).argmin()])
+    vector = unit(name, axis)
+    first = np.cross(vector, np.eye(3)[np.abs(vector).argmin()])
     first /= np.linalg.norm(first)
-    return np.array([np.cross(first, own), first, own])
+    return np.array([np.cross(first, vector), first, vector])
 
 
 def axes_of(axes):

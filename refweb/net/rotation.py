@@ -157,7 +157,7 @@ class RigidRotations(Record):
             mobility=mobility,
             principal=principal,
             faster=faster,
-            reach=np.array([_reach(b, own) for b, own in zip(bodies, principal, strict=True)]).reshape(count, 3),
+            reach=np.array([_reach(b, axes) for b, axes in zip(bodies, principal, strict=True)]).reshape(count, 3),
             before=np.zeros((count, 4)),
             room=np.zeros((TERMS + 1, 10)),
             carried=np.array(carried, dtype=np.int64).reshape(-1, 2),
@@ -189,11 +189,11 @@ def _scales(body, net):
     across = [np.cross(np.eye(3), point) @ root for point in body.points]
     pulls = [[root @ (p[k] * np.eye(3) - np.outer(p, np.eye(3)[k])) @ root for k in range(3)] for p in body.points]
     lever = np.linalg.norm(across, 2, axis=(1, 2))
-    light, own = net.mass[net.heavy].min(), net.mass[body.row]
+    light, own_mass = net.mass[net.heavy].min(), net.mass[body.row]
     angle = min(0.5 / max(float(lever.max()), 1e-300), math.sqrt(light / body.moment))
-    place = min(0.5, math.sqrt(light / own))
+    factor = min(0.5, math.sqrt(light / own_mass))
     pull = np.linalg.norm(np.linalg.norm(pulls, 2, axis=(2, 3)), axis=1)
-    return np.column_stack([np.full(len(lever), 1.0 / place), lever / angle, pull])
+    return np.column_stack([np.full(len(lever), 1.0 / factor), lever / angle, pull])
 
 
 @kernel(leaf=True)
@@ -235,35 +235,37 @@ def note_turns(x, turns):
 @kernel(leaf=True)
 def series(h, n, v, turns, q):
     """Take the quaternion ``q (4,)`` of a free body on by a time h, by one series."""
-    room, w, s = turns.room, turns.mobility[n], turns.rows[n, 1]
+    terms_space, w, s = turns.room, turns.mobility[n], turns.rows[n, 1]
     start = times_transposed(matrix_of(q[0], q[1], q[2], q[3]), (v[s, 0], v[s, 1], v[s, 2]))
     for k in range(4):
-        room[0, k] = q[k]
+        terms_space[0, k] = q[k]
     for k in range(3):
-        room[0, 4 + k] = start[k]
+        terms_space[0, 4 + k] = start[k]
     for m in range(TERMS):
         for k in range(3):
-            room[m, 7 + k] = w[k, 0] * room[m, 4] + w[k, 1] * room[m, 5] + w[k, 2] * room[m, 6]
+            terms_space[m, 7 + k] = (
+                w[k, 0] * terms_space[m, 4] + w[k, 1] * terms_space[m, 5] + w[k, 2] * terms_space[m, 6]
+            )
         share = h / (m + 1.0)
         l0 = l1 = l2 = q0 = q1 = q2 = q3 = 0.0
         for i in range(m + 1):
-            a, b, c, d = room[i, 0], room[i, 1], room[i, 2], room[i, 3]
-            f, g, e = room[i, 4], room[i, 5], room[i, 6]
-            u0, u1, u2 = room[m - i, 7], room[m - i, 8], room[m - i, 9]
+            a, b, c, d = terms_space[i, 0], terms_space[i, 1], terms_space[i, 2], terms_space[i, 3]
+            f, g, e = terms_space[i, 4], terms_space[i, 5], terms_space[i, 6]
+            u0, u1, u2 = terms_space[m - i, 7], terms_space[m - i, 8], terms_space[m - i, 9]
             l0, l1, l2 = l0 + g * u2 - e * u1, l1 + e * u0 - f * u2, l2 + f * u1 - g * u0
             q0 -= b * u0 + c * u1 + d * u2
             q1 += a * u0 + c * u2 - d * u1
             q2 += a * u1 + d * u0 - b * u2
             q3 += a * u2 + b * u1 - c * u0
-        room[m + 1, 0], room[m + 1, 1] = 0.5 * share * q0, 0.5 * share * q1
-        room[m + 1, 2], room[m + 1, 3] = 0.5 * share * q2, 0.5 * share * q3
-        room[m + 1, 4], room[m + 1, 5], room[m + 1, 6] = share * l0, share * l1, share * l2
+        terms_space[m + 1, 0], terms_space[m + 1, 1] = 0.5 * share * q0, 0.5 * share * q1
+        terms_space[m + 1, 2], terms_space[m + 1, 3] = 0.5 * share * q2, 0.5 * share * q3
+        terms_space[m + 1, 4], terms_space[m + 1, 5], terms_space[m + 1, 6] = share * l0, share * l1, share * l2
         size = moved = 0.0
         for k in range(4):
-            q[k] += room[m + 1, k]
-            size = max(size, abs(room[m + 1, k]))
+            q[k] += terms_space[m + 1, k]
+            size = max(size, abs(terms_space[m + 1, k]))
         for k in range(3):
-            moved = max(moved, abs(room[m + 1, 4 + k]))
+            moved = max(moved, abs(terms_space[m + 1, 4 + k]))
         if size < SMALL and abs(h) * moved < SMALL:
             break
     size = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
@@ -318,25 +320,25 @@ def advance_rotation(h: float, v: Matrix, x: Matrix, turns: RigidRotations) -> N
 
 @kernel(apart=("turning", "looks"))
 def turns_within(
-    s: float, h: float, old: Cube, x: Matrix, v: Matrix, turns: RigidRotations, here: Matrix, speed: Matrix
+    s: float, h: float, old: Cube, x: Matrix, v: Matrix, turns: RigidRotations, state: Matrix, speed: Matrix
 ) -> None:
-    """Write rotations, and what bodies carry, to ``here`` and ``speed``.
+    """Write rotations, and what bodies carry, to ``state`` and ``speed``.
 
     They are those at the share s of a step of size h that begins at ``old`` (position, velocity, ...), and lie on the
     cubic through quaternions and their rates at either end.
     """
     r = 1.0 - s
-    way, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
+    blend, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
     for n in range(turns.moment.size):
         p, t = turns.rows[n, 1], turns.rows[n, 2]
         first = 1.0 + old[0, t, 0], old[0, p, 0], old[0, p, 1], old[0, p, 2]
         last = 1.0 + x[t, 0], x[p, 0], x[p, 1], x[p, 2]
         d0 = quaternion_rate(*first, angular_velocity(n, old[0], old[1], turns))
         d1 = quaternion_rate(*last, angular_velocity(n, x, v, turns))
-        here[t, 0] = first[0] - 1.0 + way * (last[0] - first[0]) + rate0 * d0[0] + rate1 * d1[0]
+        state[t, 0] = first[0] - 1.0 + blend * (last[0] - first[0]) + rate0 * d0[0] + rate1 * d1[0]
         for k in range(3):
-            here[p, k] = first[1 + k] + way * (last[1 + k] - first[1 + k]) + rate0 * d0[1 + k] + rate1 * d1[1 + k]
-    update_attached_nodes(here, speed, turns)
+            state[p, k] = first[1 + k] + blend * (last[1 + k] - first[1 + k]) + rate0 * d0[1 + k] + rate1 * d1[1 + k]
+    update_attached_nodes(state, speed, turns)
 
 
 @kernel(leaf=True)
@@ -393,5 +395,7 @@ def quaternion_of(matrix):
             [0.0, 0.0, 0.0, m[2, 2] - m[0, 0] - m[1, 1]],
         ]
     )
-    found = np.linalg.eigh(k, UPLO="U")[1][:, -1]
-    return found * (1.0 if found[0] > 0.0 or (found[0] == 0.0 and found[np.abs(found).argmax()] > 0.0) else -1.0)
+    quaternion = np.linalg.eigh(k, UPLO="U")[1][:, -1]
+    return quaternion * (
+        1.0 if quaternion[0] > 0.0 or (quaternion[0] == 0.0 and quaternion[np.abs(quaternion).argmax()] > 0.0) else -1.0
+    )

@@ -40,10 +40,10 @@ def speeds(n, x, v, turns):
     [m/s].
     """
     b, s, far = turns.rows[n, 0], turns.rows[n, 1], turns.reach[n]
-    own = math.sqrt(v[b, 0] ** 2 + v[b, 1] ** 2 + v[b, 2] ** 2)
+    speed = math.sqrt(v[b, 0] ** 2 + v[b, 1] ** 2 + v[b, 2] ** 2)
     u = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (v[s, 0], v[s, 1], v[s, 2]), turns)
     fastest = fastest_about(n, u, turns)
-    return own, far[0] * fastest[0] + far[1] * fastest[1] + far[2] * fastest[2]
+    return speed, far[0] * fastest[0] + far[1] * fastest[1] + far[2] * fastest[2]
 
 
 @kernel(leaf=True)
@@ -53,9 +53,9 @@ def pushes(n, x, f, turns):
     [N], and [N m²] over I [kg m²].
     """
     b, s, far, w = turns.rows[n, 0], turns.rows[n, 1], turns.reach[n], turns.faster[n]
-    own = math.sqrt(f[b, 0] ** 2 + f[b, 1] ** 2 + f[b, 2] ** 2)
+    force_size = math.sqrt(f[b, 0] ** 2 + f[b, 1] ** 2 + f[b, 2] ** 2)
     m = along_principal(n, matrix_at(x, s, turns.rows[n, 2]), (f[s, 0], f[s, 1], f[s, 2]), turns)
-    return own, far[0] * w[0] * abs(m[0]) + far[1] * w[1] * abs(m[1]) + far[2] * w[2] * abs(m[2])
+    return force_size, far[0] * w[0] * abs(m[0]) + far[1] * w[1] * abs(m[1]) + far[2] * w[2] * abs(m[2])
 
 
 @kernel(leaf=True, apart=("turning",))
@@ -72,8 +72,8 @@ def fastest_point(x: Matrix, v: Matrix, turns: RigidRotations) -> float:
     """Largest speed of any point of a body while it moves freely, at most [m/s]."""
     fastest = 0.0
     for n in range(turns.moment.size):
-        own, turning = speeds(n, x, v, turns)
-        fastest = max(fastest, own + turning)
+        speed, turning = speeds(n, x, v, turns)
+        fastest = max(fastest, speed + turning)
     return fastest
 
 
@@ -96,10 +96,10 @@ def beside_places(
     Of the surface that is what it turns by; of nodes that bodies carry how far they are off the way that the velocities
     they have lead them.
     """
-    most = off = 0.0
+    largest = off = 0.0
     for n in range(turns.moment.size):
         (_, turning), (_, moment) = speeds(n, x, v, turns), pushes(n, x, f, turns)
-        most = max(most, abs(drift) * (turning + abs(kick) * inverse[turns.rows[n, 1], 0] * moment))
+        largest = max(largest, abs(drift) * (turning + abs(kick) * inverse[turns.rows[n, 1], 0] * moment))
     for c in range(turns.carried.shape[0]):
         n, a = turns.carried[c, 1], turns.arms[c]
         b, s = turns.rows[n, 0], turns.rows[n, 1]
@@ -110,4 +110,4 @@ def beside_places(
         more *= max(turns.faster[n, 0], turns.faster[n, 1], turns.faster[n, 2])
         angle = abs(drift) * (math.sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2) + more)
         off = max(off, abs(drift) * (force + more * arm) + 0.5 * angle * angle * arm)
-    return most + off
+    return largest + off

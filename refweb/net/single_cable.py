@@ -107,8 +107,8 @@ def _arc(n, distance, length):
 
     phi = np.pi / n  # a circle, where the distance is lost beside the length
     if mismatch(phi) < 0.0:
-        found = brentq(mismatch, 0.0, phi, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=1000)
-        phi = cast(float, found)  # it may be told to give more
+        angle = brentq(mismatch, 0.0, phi, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=1000)
+        phi = cast(float, angle)  # it may be told to give more
     k = np.arange(1, n)
     if phi == 0:
         return k * chord, 0.0 * k

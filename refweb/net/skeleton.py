@@ -34,9 +34,9 @@ MOST = 3000
 
 def points(places, thickness):
     """Parts that are points (n, 3), shape (n, `COLUMNS`)."""
-    found = np.zeros((len(places), COLUMNS))
-    found[:, KIND], found[:, THICKNESS], found[:, FROM:TO] = POINT, thickness, places
-    return found
+    rows = np.zeros((len(places), COLUMNS))
+    rows[:, KIND], rows[:, THICKNESS], rows[:, FROM:TO] = POINT, thickness, places
+    return rows
 
 
 def edges(places, pairs, thickness):
@@ -44,24 +44,24 @@ def edges(places, pairs, thickness):
 
     Each point belongs to the first line that ends there.
     """
-    found, owned = np.zeros((len(pairs), COLUMNS)), set()
-    found[:, KIND], found[:, THICKNESS] = SEGMENT, thickness
+    rows, owned = np.zeros((len(pairs), COLUMNS)), set()
+    rows[:, KIND], rows[:, THICKNESS] = SEGMENT, thickness
     for n, pair in enumerate(pairs):
         for end, (corner, column) in enumerate(zip(pair, (FROM, TO), strict=True)):
-            found[n, column : column + 3] = places[corner]
-            found[n, OWNS + end] = corner not in owned
+            rows[n, column : column + 3] = places[corner]
+            rows[n, OWNS + end] = corner not in owned
             owned.add(corner)
-    return found
+    return rows
 
 
 def rim(radius, height, thickness):
     """Parts of a circle about the third axis, shape (2 `ARCS`, `COLUMNS`)."""
-    found = np.zeros((2 * ARCS, COLUMNS))
-    found[:, KIND], found[:, THICKNESS] = ARC, thickness
-    found[:, FROM + 2], found[:, TO], found[:, THIRD + 1] = height, radius, radius
-    found[:, OWNS] = math.pi / ARCS * np.arange(2 * ARCS)
-    found[:, OWNS + 1] = found[:, OWNS] + 2.0 * math.pi / ARCS
-    return found
+    rows = np.zeros((2 * ARCS, COLUMNS))
+    rows[:, KIND], rows[:, THICKNESS] = ARC, thickness
+    rows[:, FROM + 2], rows[:, TO], rows[:, THIRD + 1] = height, radius, radius
+    rows[:, OWNS] = math.pi / ARCS * np.arange(2 * ARCS)
+    rows[:, OWNS + 1] = rows[:, OWNS] + 2.0 * math.pi / ARCS
+    return rows
 
 
 def of_box(grown):
@@ -116,9 +116,9 @@ def of_surface(corners, triangles):
             side[triangle[k], triangle[k - 2]] = t, triangle[k - 1]
     pairs = []
     for (i, j), (t, _) in side.items():
-        other, across = side[j, i]
+        opposite, across = side[j, i]
         below = normals[t] @ (corners[across] - corners[i])
-        if i < j and below < 0.0 and normals[t] @ normals[other] < math.cos(FLAT):
+        if i < j and below < 0.0 and normals[t] @ normals[opposite] < math.cos(FLAT):
             pairs.append((i, j))
     if len(pairs) > MOST:
         raise InputError(

@@ -31,12 +31,14 @@ def _box(r, core):
     volume, squares = 0.0, np.zeros(3)
     for beyond in itertools.product((False, True), repeat=3):
         k = sum(beyond)
-        ball, first, second = (own * r ** (k + power) for own, power in zip(BALLS[k], range(3), strict=True))
+        ball, first, second = (
+            weights_of * r ** (k + power) for weights_of, power in zip(BALLS[k], range(3), strict=True)
+        )
         flat = math.prod(2.0 * c for c, out in zip(core, beyond, strict=True) if not out)
         volume += flat * ball
         for n, c in enumerate(core):
-            own = c * c * ball + 2.0 * c * first + second if beyond[n] else c * c / 3.0 * ball
-            squares[n] += flat * own
+            weights_of = c * c * ball + 2.0 * c * first + second if beyond[n] else c * c / 3.0 * ball
+            squares[n] += flat * weights_of
     return volume, squares
 
 
@@ -47,7 +49,7 @@ def _round(r, core):
     u = [r**2 / 2.0, r**3 / 3.0, r**4 / 4.0]
     uu = [r**3 / 3.0, math.pi / 16.0 * r**4, 2.0 / 15.0 * r**5]
     weights = (a * a, 2.0 * a, 1.0)
-    area, at, square = (sum(p * q for p, q in zip(weights, own, strict=False)) for own in (w, u, uu))
+    area, at, square = (sum(p * q for p, q in zip(weights, polynomial, strict=False)) for polynomial in (w, u, uu))
     fourth = sum(p * q for p, q in zip((a**4, 4.0 * a**3, 6.0 * a**2, 4.0 * a, 1.0), w, strict=True))
     volume = 2.0 * math.pi * (h * (a + r) ** 2 + area)
     across = math.pi / 2.0 * (h * (a + r) ** 4 + fourth)

@@ -22,13 +22,13 @@ def sphere():
         axis=-1,
     ).reshape(-1, 3)
     points = np.vstack([rings, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    here = np.arange(level)
-    after = (here + 1) % level
+    indices = np.arange(level)
+    after = (indices + 1) % level
     last, top, bottom = level * (len(polar) - 1), len(rings), len(rings) + 1
-    triangles = [np.column_stack([np.full(level, top), here, after])]
+    triangles = [np.column_stack([np.full(level, top), indices, after])]
     for ring in range(len(polar) - 1):
-        triangles += _band(ring * level + here, ring * level + after, level)
-    triangles.append(np.column_stack([np.full(level, bottom), last + after, last + here]))
+        triangles += _band(ring * level + indices, ring * level + after, level)
+    triangles.append(np.column_stack([np.full(level, bottom), last + after, last + indices]))
     return _fixed(points), _fixed(np.vstack(triangles))
 
 
@@ -40,9 +40,9 @@ def tube(radius, thin):
     across = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     out = radius - thin + thin * np.cos(across)
     points = np.stack([out * np.cos(around), out * np.sin(around), thin * np.sin(across) + 0.0 * around], axis=-1)
-    here = np.arange(level * sides).reshape(level, sides)
-    after = np.roll(here, -1, axis=1)
-    triangles = [t for i in range(level) for t in _band(here[i], after[i], here[(i + 1) % level] - here[i])]
+    indices = np.arange(level * sides).reshape(level, sides)
+    after = np.roll(indices, -1, axis=1)
+    triangles = [t for i in range(level) for t in _band(indices[i], after[i], indices[(i + 1) % level] - indices[i])]
     return _fixed(points.reshape(-1, 3)), _fixed(np.vstack(triangles))
 
 
@@ -51,6 +51,6 @@ def _fixed(values):
     return values
 
 
-def _band(here, after, step):
+def _band(ring, after, step):
     """Triangles between a row of points, each with the one after it, and the row a step on."""
-    return [np.column_stack([here, here + step, after + step]), np.column_stack([here, after + step, after])]
+    return [np.column_stack([ring, ring + step, after + step]), np.column_stack([ring, after + step, after])]

@@ -159,7 +159,9 @@ class Law:
     def _evaluate(self, which, *numbers):
         numbers = np.broadcast_arrays(*numbers)
         out = np.empty(numbers[0].shape)
-        evaluate(which, self.number, *(np.array(one, dtype=float).reshape(-1) for one in numbers), out.reshape(-1))
+        evaluate(
+            which, self.number, *(np.array(number, dtype=float).reshape(-1) for number in numbers), out.reshape(-1)
+        )
         return out[()]
 
     def stress(self, strain, modulus=1.0, slackness=0.0, smoothing=0.0):

@@ -87,7 +87,11 @@ class Web:
         groups = members(self.groups, len(lines))
         names = {name: _named(name, numbers, len(points)) for name, numbers in self.names.items()}
         rim = np.unique(in_range("rim", self.rim, len(points))).astype(np.int32)
-        groups |= {name: own for name, own in by_place(lines, rim, len(points)).items() if name not in groups}
+        groups |= {
+            name: group_members
+            for name, group_members in by_place(lines, rim, len(points)).items()
+            if name not in groups
+        }
         broken = np.unique(in_range("broken", self.broken, len(lines)))
         given = self.natural_length is not None if self.length_given is None else bool(self.length_given)
         for name, value in (
@@ -182,20 +186,20 @@ class Web:
             For a number out of range or an unknown name.
         """
         if isinstance(selection, (list, tuple, np.ndarray)):
-            found = [self._find_one(f"{name}[{i}]", one) for i, one in enumerate(selection)]
+            numbers = [self._find_one(f"{name}[{i}]", part) for i, part in enumerate(selection)]
         else:
-            found = [self._find_one(name, selection)]
-        return np.array(list(dict.fromkeys(chain(*found))), dtype=np.int64)
+            numbers = [self._find_one(name, selection)]
+        return np.array(list(dict.fromkeys(chain(*numbers))), dtype=np.int64)
 
     def find_around(self, selection):
         """Find nodes, as `find`, in their order around: nodes of one name counterclockwise around their middle."""
-        found = self.find(selection)
-        if not isinstance(selection, str) or len(found) < 3:
-            return found
-        away = self.points[found] - self.points[found].mean(axis=0)
-        one, other, normal = np.linalg.svd(away)[2]
-        turn = np.copysign(1.0, normal[np.abs(normal).argmax()] * np.linalg.det([one, other, normal]))
-        return found[np.argsort(turn * np.arctan2(away @ other, away @ one), kind="stable")]
+        numbers = self.find(selection)
+        if not isinstance(selection, str) or len(numbers) < 3:
+            return numbers
+        away = self.points[numbers] - self.points[numbers].mean(axis=0)
+        first, second, normal = np.linalg.svd(away)[2]
+        turn = np.copysign(1.0, normal[np.abs(normal).argmax()] * np.linalg.det([first, second, normal]))
+        return numbers[np.argsort(turn * np.arctan2(away @ second, away @ first), kind="stable")]
 
     def find_lines(self, selection, name="lines"):
         """Line numbers of a selection.
@@ -218,38 +222,38 @@ class Web:
             For a number out of range, or a name that is that of no line.
         """
         if isinstance(selection, (list, tuple, np.ndarray)):
-            found = [self._find_lines(f"{name}[{i}]", one) for i, one in enumerate(selection)]
+            numbers = [self._find_lines(f"{name}[{i}]", part) for i, part in enumerate(selection)]
         else:
-            found = [self._find_lines(name, selection)]
-        return np.unique(np.concatenate(found)).astype(np.int64)
+            numbers = [self._find_lines(name, selection)]
+        return np.unique(np.concatenate(numbers)).astype(np.int64)
 
-    def _find_lines(self, name, one):
-        if not isinstance(one, str):
-            if not 0 <= node_number(name, one) < len(self.lines):
-                raise InputError(f"{name} = {one} must be 0 … {len(self.lines) - 1}")
-            return [one]
-        if one in self.groups:
-            return self.groups[one]
-        if one == "all":
+    def _find_lines(self, name, part):
+        if not isinstance(part, str):
+            if not 0 <= node_number(name, part) < len(self.lines):
+                raise InputError(f"{name} = {part} must be 0 … {len(self.lines) - 1}")
+            return [part]
+        if part in self.groups:
+            return self.groups[part]
+        if part == "all":
             return np.arange(len(self.lines))
-        if one == "rim":
+        if part == "rim":
             raise InputError(f'{name} = "rim": no line of this web joins two nodes of its rim, give line numbers')
-        raise InputError(f"{name} = {shown(one)} names no line, {nearest(one, ('all', *self.groups))}")
+        raise InputError(f"{name} = {shown(part)} names no line, {nearest(part, ('all', *self.groups))}")
 
-    def _find_one(self, name, one):
-        if not isinstance(one, str):
-            if not 0 <= node_number(name, one) < len(self.points):
-                raise InputError(f"{name} = {one} must be 0 … {len(self.points) - 1}")
-            return (one,)
-        if one in self.names:
-            return self.names[one]
-        if one == "all":
+    def _find_one(self, name, part):
+        if not isinstance(part, str):
+            if not 0 <= node_number(name, part) < len(self.points):
+                raise InputError(f"{name} = {part} must be 0 … {len(self.points) - 1}")
+            return (part,)
+        if part in self.names:
+            return self.names[part]
+        if part == "all":
             return range(len(self.points))
-        if one == "rim" and not len(self.rim):
+        if part == "rim" and not len(self.rim):
             raise InputError(f'{name} = "rim": this web has no supports of its own, give node numbers')
-        if one in SELECTIONS:
-            return np.atleast_1d(getattr(self, one)).tolist()
-        raise InputError(f"{name} = {shown(one)} names no node, {nearest(one, (*SELECTIONS, *self.names))}")
+        if part in SELECTIONS:
+            return np.atleast_1d(getattr(self, part)).tolist()
+        raise InputError(f"{name} = {shown(part)} names no node, {nearest(part, (*SELECTIONS, *self.names))}")
 
 
 def _first(bad):

@@ -24,35 +24,35 @@ def frames_of(record, frames=None, progress=None):
     return space_of(record, record.chosen(), frames, progress) if record.times else None
 
 
-def space(record, found):
-    """The web in space, and the data it needs; ``found`` is what `frames_of` gives."""
-    if found is None:
+def space(record, drawn):
+    """The web in space, and the data it needs; ``drawn`` is what `frames_of` gives."""
+    if drawn is None:
         return section("space", "In space", tag("p", "No frame of this run can be drawn."))
-    head, peak = found.head, record.chosen()
-    head["labels"] = [record.clock(number) for number in found.shown]
-    head["peak"] = found.shown.index(peak) if peak in found.shown else len(found.shown) - 1
+    head, peak = drawn.head, record.chosen()
+    head["labels"] = [record.clock(number) for number in drawn.shown]
+    head["peak"] = drawn.shown.index(peak) if peak in drawn.shown else len(drawn.shown) - 1
     for field in head["fields"]:
         ends = [abs(end) for pair in field["taut"] if pair for end in pair]
         field["factor"], field["shown"] = scaled_unit(field["name"], max(ends, default=0.0))
-    parts = [_view(head), tag("p", _on_frames(record, found, peak), class_="note")]
-    return section("space", "In space", *parts, data("head", head), data("data", found.text))
+    parts = [_view(head), tag("p", _on_frames(record, drawn, peak), class_="note")]
+    return section("space", "In space", *parts, data("head", head), data("data", drawn.text))
 
 
-def _on_frames(record, found, peak):
+def _on_frames(record, drawn, peak):
     """Sentence on the frames that are shown, and on their accuracy."""
-    shown, total = len(found.shown), len(record.times)
-    words = [f"{shown} of {total} frames." if shown < total else f"All {total} frames." if total > 1 else "One frame."]
-    left = total - shown - len(found.missing)
+    count, total = len(drawn.shown), len(record.times)
+    words = [f"{count} of {total} frames." if count < total else f"All {total} frames." if total > 1 else "One frame."]
+    left = total - count - len(drawn.missing)
     if left:
-        kept = f"the first, the last and {PEAK} are here" if peak in found.shown else ""
+        kept = f"the first, the last and {PEAK} are here" if peak in drawn.shown else ""
         words.append(
             f"{left} are left out to keep the page small{'; ' + kept if kept else ''}; "
             "refweb report --frames N shows more."
         )
-    if found.missing:
-        words.append(f"Not to be read: {', '.join(map(str, found.missing))}.")
+    if drawn.missing:
+        words.append(f"Not to be read: {', '.join(map(str, drawn.missing))}.")
     words.append(
-        f"Points are within {found.error / found.extent:.0e} of the web's extent, values of lines within 0.2 % of "
+        f"Points are within {drawn.error / drawn.extent:.0e} of the web's extent, values of lines within 0.2 % of "
         "their range in a frame."
     )
     return " ".join(words)
@@ -120,17 +120,17 @@ def plots(record):
     from ..pictures.plots import draw, kinds
 
     try:
-        found = {name: line for name, line in kinds(record).items() if name not in LIKE_STRESS}
+        plots_of = {name: line for name, line in kinds(record).items() if name not in LIKE_STRESS}
     except InputError as error:
         return section("plots", "Plots", tag("p", str(error)))
-    few = dict(list(found.items())[-MOST_PLOTS:]) if len(found) > MOST_PLOTS else found
+    few = dict(list(plots_of.items())[-MOST_PLOTS:]) if len(plots_of) > MOST_PLOTS else plots_of
     parts = []
     for name, line in few.items():
         try:
             parts.append(figure(_plot(draw(record, name, title=""), line), line))
         except InputError as error:
             parts.append(tag("p", f"{name}: {error}"))
-    left = [name for name in found if name not in few]
+    left = [name for name in plots_of if name not in few]
     more = tag("p", f"By refweb plot --quantity also: {', '.join(left)}.", class_="note") if left else ""
     nothing = "" if parts else tag("p", "There is nothing to plot.")
     return section("plots", "Plots", tag("div", parts, class_="plots"), more, nothing)

@@ -36,8 +36,8 @@ def levels(values, steps):
     low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
     size = high / 2 - low / 2  # half, which is finite
     share = np.where(finite, values, low) / 2 - low / 2
-    found = np.rint(steps * (share / size)) if size > 0 else np.zeros(np.shape(values))
-    return np.where(finite, found, steps + 1).astype(int), low, high
+    rounded = np.rint(steps * (share / size)) if size > 0 else np.zeros(np.shape(values))
+    return np.where(finite, rounded, steps + 1).astype(int), low, high
 
 
 def differences(frames):

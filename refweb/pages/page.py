@@ -49,7 +49,7 @@ def report(folder, out=None, frames=None, progress=None):
         Where the folder is none of a run or of modes, the file cannot be written, or ``frames`` is below 1.
     """
     folder = Path(folder)
-    record = of_folder(folder, seen=False)
+    record = of_folder(folder, with_frames=False)
     record.refuse_others("pages")
     if record.status == "running":
         record = record._replace(summary=so_far(folder, read_summary(folder)))
@@ -61,7 +61,9 @@ def report_of(solution, out=None, frames=None):
     """Write the page of a solution, wherever it is, by default into its folder; see `report`."""
     if out is None and solution.path is None:
         raise InputError("out is missing: this solution has no folder, so say where the page goes, such as report.html")
-    return _write(of_solution(solution, seen=False), Path(solution.path) / NAME if out is None else out, frames, None)
+    return _write(
+        of_solution(solution, with_frames=False), Path(solution.path) / NAME if out is None else out, frames, None
+    )
 
 
 def _unread(path):
@@ -85,9 +87,9 @@ def _write(record, out, frames, progress, unread=""):
 
 def page_of(record, frames=None, progress=None, unread=""):
     """The page of a record, as text; ``unread`` says why it has no summary, where it has none."""
-    found = drawings.frames_of(record, frames, progress)
-    lacking = list(_lacking(record, found, unread))
-    parts = [sections.results(record), sections.warnings(record, lacking), drawings.space(record, found)]
+    frames_found = drawings.frames_of(record, frames, progress)
+    lacking = list(_lacking(record, frames_found, unread))
+    parts = [sections.results(record), sections.warnings(record, lacking), drawings.space(record, frames_found)]
     parts += [sections.simulated(record), drawings.plots(record), drawings.pictures(record)]
     parts += [make(record) for make in (sections.cost, sections.scene, sections.versions)]
     parts = [part for part in parts if part]
@@ -104,14 +106,14 @@ def filled(title, status, parts, script):
         version=html(__version__),
         status=status,
         style=_read("page.css"),
-        contents=html([tag("a", Html(found[2]), href=f"#{found[1]}") for found in contents if found]),
+        contents=html([tag("a", Html(section[2]), href=f"#{section[1]}") for section in contents if section]),
         main="\n".join(parts),
         script=script[1:],
         script_hash=f"sha256-{digest}",
     )
 
 
-def _lacking(record, found, unread):
+def _lacking(record, drawn, unread):
     """Sentences on what the page has nothing of: the summary, the history, the frames."""
     if unread:
         yield f"Results, warnings and how the run ended are not known: {unread}."
@@ -121,7 +123,7 @@ def _lacking(record, found, unread):
             yield "The history has no rows."
     except InputError:
         yield "The history cannot be read."
-    if found is None:
+    if drawn is None:
         yield "No frame can be drawn." if record.times else "There are no frames."
 
 

@@ -25,33 +25,33 @@ KINDS = {"dynamic": "dynamics", "static": "statics", "modes": "modes"}
 def results(record):
     """Results with their ±, and what is known of them."""
     summary, said = record.summary, []
-    steps, found = summary.get("steps") or [], summary.get("results") or {}
+    steps, values = summary.get("steps") or [], summary.get("results") or {}
     if record.kind == "modes" and steps:
-        shown = [table(*rows_of_modes(steps[-1]))]
+        tables = [table(*rows_of_modes(steps[-1]))]
         if len(steps) > 1:
             said.append(f"of load step {steps[-1]['step']:g}, the last of {len(steps)}")
     elif len(steps) > 1:
-        shown = [table(*rows_of_steps(steps))]
-    elif found:
-        columns, rows, _ = rows_of_results(found, dynamic=record.kind == "dynamic")
-        shown = [table(columns, [[cell.removeprefix("t = ").removeprefix("at ") for cell in row] for row in rows])]
+        tables = [table(*rows_of_steps(steps))]
+    elif values:
+        columns, rows, _ = rows_of_results(values, dynamic=record.kind == "dynamic")
+        tables = [table(columns, [[cell.removeprefix("t = ").removeprefix("at ") for cell in row] for row in rows])]
     else:
-        shown = [tag("p", "There are no results." if summary else "Results are not known.")]
-    said += [] if record.kind == "modes" else on_results(found)
+        tables = [tag("p", "There are no results." if summary else "Results are not known.")]
+    said += [] if record.kind == "modes" else on_results(values)
     events = [
         [event["name"], "did not happen" if event["time"] is None else f"t = {event['time']:.6g} s"]
         for event in summary.get("events") or []
     ]
-    more = [*on_run(summary), *(("solver", text) for text in (on_solver(summary["solver"]) if found else ()))]
-    parts = [*shown, listing(said) if said else "", table(["event", "time"], events) if events else ""]
+    more = [*on_run(summary), *(("solver", text) for text in (on_solver(summary["solver"]) if values else ()))]
+    parts = [*tables, listing(said) if said else "", table(["event", "time"], events) if events else ""]
     return section("results", "Results", *parts, pairs(more) if more else "")
 
 
 def warnings(record, lacking=()):
     """Warnings of the run, and sentences on the data that its folder lacks."""
-    found = [*record.summary.get("warnings", []), *lacking]
-    body = listing(found) if found else tag("p", "None.")
-    return section("warnings", "Warnings", tag("div", body, class_="warned") if found else body)
+    texts = [*record.summary.get("warnings", []), *lacking]
+    body = listing(texts) if texts else tag("p", "None.")
+    return section("warnings", "Warnings", tag("div", body, class_="warned") if texts else body)
 
 
 def simulated(record):
@@ -63,12 +63,12 @@ def simulated(record):
     absent = [name for name in EFFECTS if name not in present]
     rows: list = [("web", [_keys(scene.get("web", {})), _sizes(record.summary.get("web") or {})])]
     rows.append(("cable", _cable(scene.get("cable", {}))))
-    supports = [_keys(one) for name in ("supports", "support") for one in _several(scene.get(name))]
-    rows.append(("supports", [tag("div", one) for one in supports] or "the web's own"))
+    supports = [_keys(entry) for name in ("supports", "support") for entry in _several(scene.get(name))]
+    rows.append(("supports", [tag("div", entry) for entry in supports] or "the web's own"))
     for name in present:
         several = isinstance(scene[name], list)
         rows.append(
-            (f"[[{name}]]" if several else f"[{name}]", [tag("div", _keys(one)) for one in _several(scene[name])])
+            (f"[[{name}]]" if several else f"[{name}]", [tag("div", _keys(entry)) for entry in _several(scene[name])])
         )
     effects = ", ".join(present) or "none but the tension of its lines"
     rows.insert(
@@ -77,7 +77,7 @@ def simulated(record):
     rows += [(name, _keys(scene[name])) for name in ("solve", "accuracy", "output") if scene.get(name)]
     for name in ("observe", "event"):
         if scene.get(name):
-            rows.append((f"[[{name}]]", [tag("div", _keys(one)) for one in scene[name]]))
+            rows.append((f"[[{name}]]", [tag("div", _keys(entry)) for entry in scene[name]]))
     return section("simulated", "What was simulated", pairs(rows))
 
 
@@ -87,13 +87,13 @@ def cost(record):
     if not spent:
         return ""
     effects = sorted(spent.get("by_effect", {}).items(), key=lambda item: -item[1])
-    most = max((seconds for _, seconds in effects), default=0.0) or 1.0
+    largest = max((seconds for _, seconds in effects), default=0.0) or 1.0
     bars = [
-        [name, Html(f'<span class="share" style="width:{8 * seconds / most:.2f}em"></span> {seconds:.3g} s')]
+        [name, Html(f'<span class="share" style="width:{8 * seconds / largest:.2f}em"></span> {seconds:.3g} s')]
         for name, seconds in effects
     ]
-    note = "Kernels of an effect, each timed alone at the end and multiplied by its calls: an estimate."
-    parts = [tag("p", on_cost(spent))] + ([table(["effect", "CPU time"], bars), tag("p", note)] if bars else [])
+    remark = "Kernels of an effect, each timed alone at the end and multiplied by its calls: an estimate."
+    parts = [tag("p", on_cost(spent))] + ([table(["effect", "CPU time"], bars), tag("p", remark)] if bars else [])
     return section("cost", "Cost", *parts)
 
 
@@ -111,9 +111,9 @@ def scene(record):
 
 def versions(record):
     """Versions of what solved it."""
-    found = record.summary.get("versions") or {}
+    libraries = record.summary.get("versions") or {}
     seed = record.summary.get("seed")
-    rows = [*found.items(), *([("seed", seed)] if seed is not None else [])]
+    rows = [*libraries.items(), *([("seed", seed)] if seed is not None else [])]
     return section("versions", "Versions", pairs(rows)) if rows else ""
 
 
@@ -143,7 +143,7 @@ def _value(value):
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
     return shown(value)
 
 
@@ -156,13 +156,13 @@ def _sizes(web):
 
 def _cable(cable):
     units = {"modulus": "Pa", "area": "m²", "density": "kg/m³", "strength": "Pa"}
-    groups = [tag("div", [f"group {name}: ", _keys(one)]) for name, one in cable.get("groups", {}).items()]
-    own = {
+    groups = [tag("div", [f"group {name}: ", _keys(entry)]) for name, entry in cable.get("groups", {}).items()]
+    plain_keys = {
         key: f"{value:g} {units[key]}" if key in units else _value(value)
         for key, value in cable.items()
         if key != "groups"
     }
-    return [tag("div", _listed(own)), *groups]
+    return [tag("div", _listed(plain_keys)), *groups]
 
 
 def _together(text):

@@ -52,7 +52,7 @@ class Space(NamedTuple):
     missing: list
 
 
-def space_of(record, peak=None, most=None, progress=None):
+def space_of(record, peak=None, limit=None, progress=None):
     """The frames of a record.
 
     Parameters
@@ -61,7 +61,7 @@ def space_of(record, peak=None, most=None, progress=None):
         What is shown.
     peak : int, optional
         Number of a frame that is shown in any case, as are the first and the last.
-    most : int, optional
+    limit : int, optional
         Largest number of frames, ≥ 1; by default as many as stay below `LARGEST` bytes, and `MOST`.
     progress : callable, optional
         Called with a line of text and the share that is done, 0 to 1.
@@ -71,10 +71,10 @@ def space_of(record, peak=None, most=None, progress=None):
     Space or None
         None where no frame can be read.
     """
-    if most is not None and most < 1:
-        raise InputError(f"frames = {most} must be ≥ 1 [1]")
+    if limit is not None and limit < 1:
+        raise InputError(f"frames = {limit} must be ≥ 1 [1]")
     numbers, kept, missing = list(record.times), {}, []
-    count = min(most or MOST, len(numbers))
+    count = min(limit or MOST, len(numbers))
     while True:
         chosen = chosen_of(numbers, count, peak)
         for i, number in enumerate(chosen):
@@ -85,11 +85,11 @@ def space_of(record, peak=None, most=None, progress=None):
                     missing.append(number)
             if progress is not None:
                 progress("reading frames", 0.8 * (i + 1) / len(chosen))
-        shown = [kept[number] for number in chosen if number in kept]
-        if not shown:
+        frames_kept = [kept[number] for number in chosen if number in kept]
+        if not frames_kept:
             return None
-        space = _space(record, shown, missing)
-        if most is not None or len(space.text) <= LARGEST or len(shown) <= 3:
+        space = _space(record, frames_kept, missing)
+        if limit is not None or len(space.text) <= LARGEST or len(frames_kept) <= 3:
             return space
         count = max(3, min(count - 1, int(0.95 * count * LARGEST / len(space.text))))
 
@@ -105,9 +105,9 @@ def chosen_of(numbers, count, peak=None):
         return sorted(list(wanted)[:count], key=numbers.index)
     places = set(np.rint(np.linspace(0, len(numbers) - 1, count)).astype(int).tolist())
     if peak in numbers and (at := numbers.index(peak)) not in places:
-        places.discard(min(places - {0, len(numbers) - 1}, key=lambda place: abs(place - at)))
+        places.discard(min(places - {0, len(numbers) - 1}, key=lambda index: abs(index - at)))
         places.add(at)
-    return [numbers[place] for place in sorted(places)]
+    return [numbers[index] for index in sorted(places)]
 
 
 def _space(record, frames, missing):
@@ -124,17 +124,17 @@ def _space(record, frames, missing):
         steps[..., axis], low, high = levels(moved[..., axis], PLACES)
         ranges.append((low, (high - low) / PLACES))
     single = origin.astype(np.float32)
-    points, place = _once(single, steps)
+    points, order = _once(single, steps)
     written = single.astype(float) + [low for low, _ in ranges] + steps * [step for _, step in ranges]
     error = float(np.linalg.norm(written - (origin + moved), axis=-1).max())
-    segments = place.reshape(-1, along)
+    segments = order.reshape(-1, along)
     segments = np.stack([segments[:, :-1], segments[:, 1:]], axis=-1).reshape(-1, 2)
     arrays = {
         "origin": single[points],
         "moves": differences(steps[:, points].transpose(0, 2, 1)),
         "segments": segments.astype(np.uint32),
         "slack": np.array([np.where(frame.broken, 2, frame.slack) for frame in frames]).astype(np.uint8),
-        "supports": place[_supports(frames)].astype(np.uint32),
+        "supports": order[_supports(frames)].astype(np.uint32),
         "colours": np.rint(255 * colour_map()(np.linspace(0, 1, 256))[:, :3]).astype(np.uint8),
     }
     head = {
@@ -160,11 +160,11 @@ def _once(origin, steps):
     rows = np.concatenate(
         [origin.view(np.int32).astype(int), steps.transpose(1, 0, 2).reshape(len(origin), -1)], axis=1
     )
-    _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    _, first, inverse_order = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(order), dtype=int)
     rank[order] = np.arange(len(order))
-    return first[order], rank[place.ravel()]
+    return first[order], rank[inverse_order.ravel()]
 
 
 def _supports(frames):
@@ -185,10 +185,10 @@ def _fields(frames, arrays):
     order += [name for name in HIDDEN if name in names]
     fields, known = [], {}
     for name in order:
-        found = [levels(frame.fields[name], VALUES) for frame in frames]
-        ranges = [[low, high] for _, low, high in found]
-        values = np.array([level for level, *_ in found]).astype(np.uint8)
-        constant = bool((values == values[0]).all()) and all(one == ranges[0] for one in ranges)
+        levels_of = [levels(frame.fields[name], VALUES) for frame in frames]
+        ranges = [[low, high] for _, low, high in levels_of]
+        values = np.array([level for level, *_ in levels_of]).astype(np.uint8)
+        constant = bool((values == values[0]).all()) and all(limits == ranges[0] for limits in ranges)
         values = values[:1] if constant else values
         array = known.setdefault(values.tobytes(), f"field {name}")
         arrays.setdefault(array, values)
@@ -217,25 +217,29 @@ def _range(values):
 
 def _bodies(frames, arrays):
     """Data of each body: its name, its colour and its rotation and position in each frame."""
-    found = []
+    rows = []
     for i, (name, body) in enumerate(frames[0].bodies.items()):
-        there = [frame.bodies[name].points for frame in frames if name in frame.bodies]
-        if len(there) < len(frames) or any(points.shape != body.points.shape for points in there) or not len(body[1]):
+        points_of = [frame.bodies[name].points for frame in frames if name in frame.bodies]
+        if (
+            len(points_of) < len(frames)
+            or any(points.shape != body.points.shape for points in points_of)
+            or not len(body[1])
+        ):
             continue
         middle = body.points.mean(axis=0)
         arrays[f"points of body {i}"] = (body.points - middle).astype(np.float32)
         arrays[f"triangles of body {i}"] = body.triangles.astype(np.uint32)
-        turns = [_rotation(body.points - middle, points - points.mean(axis=0)) for points in there]
-        found.append(
+        turns = [_rotation(body.points - middle, points - points.mean(axis=0)) for points in points_of]
+        rows.append(
             {
                 "name": name,
                 "colour": list(BODIES[i % len(BODIES)]),
                 "number": i,
-                "places": [points.mean(axis=0).tolist() for points in there],
+                "places": [points.mean(axis=0).tolist() for points in points_of],
                 "turns": [turn.ravel().tolist() for turn in turns],
             }
         )
-    return found
+    return rows
 
 
 def _rotation(before, after):
@@ -276,8 +280,8 @@ def places(arrays, head, frame):
 def values(arrays, field, frame):
     """Values of a field in a frame as the page has them [SI], shape (lines,); NaN where they are not finite."""
     low, high = field["ranges"][frame]
-    found = arrays[field["array"]].reshape(
+    values_read = arrays[field["array"]].reshape(
         -1 if field["constant"] else len(field["ranges"]), len(arrays["slack"]) // len(field["ranges"])
     )
-    found = found[0 if field["constant"] else frame]
-    return np.where(found == UNKNOWN, np.nan, low + (high - low) * found / VALUES)
+    values_read = values_read[0 if field["constant"] else frame]
+    return np.where(values_read == UNKNOWN, np.nan, low + (high - low) * values_read / VALUES)

@@ -56,17 +56,17 @@ def _together(summary):
         if of := words.of_group(entry["of"]):
             said.append(tag("h3", of))
         for make in (words.rows_of_spread, words.rows_of_conditions, words.rows_of_indices):
-            found = make(entry)
-            said += [table(found.columns, found.rows)] if found.rows else []
-        told = [*words.on_spread(entry), *words.on_indices(entry)]
-        said += [listing(told)] if told else []
+            statistics_of = make(entry)
+            said += [table(statistics_of.columns, statistics_of.rows)] if statistics_of.rows else []
+        texts = [*words.on_spread(entry), *words.on_indices(entry)]
+        said += [listing(texts)] if texts else []
     said += [tag("p", text, class_="note") for text in words.on_samples(summary["study"])]
     return section("results", "Results", *said)
 
 
 def _warnings(summary):
-    found = summary["warnings"]
-    return section("warnings", "Warnings", tag("div", listing(found), class_="warned") if found else tag("p", "None."))
+    texts = summary["warnings"]
+    return section("warnings", "Warnings", tag("div", listing(texts), class_="warned") if texts else tag("p", "None."))
 
 
 def _plots(study):
@@ -84,13 +84,13 @@ def _rows(study, rows):
     hidden = ("statistical",)
     columns = [name for name in study.columns if name not in hidden]
     cells = [[_cell(row.get(name)) for name in columns] for row in rows[:MOST_ROWS]]
-    note = f"All digits are in {NAME}."
+    remark = f"All digits are in {NAME}."
     if len(rows) > MOST_ROWS:
-        note += f" The first {MOST_ROWS} of {len(rows)} rows are here."
+        remark += f" The first {MOST_ROWS} of {len(rows)} rows are here."
     order = sorted(range(len(columns)), key=lambda n: (columns[n] in (*FIRST, *LAST), n))
-    shown = [[row[n] for n in order] for row in cells]
-    body = table([columns[n] for n in order], shown) if rows else tag("p", "There are no rows.")
-    return section("rows", "Rows", tag("details", [tag("summary", f"{len(rows)} rows"), body]), tag("p", note))
+    ordered = [[row[n] for n in order] for row in cells]
+    body = table([columns[n] for n in order], ordered) if rows else tag("p", "There are no rows.")
+    return section("rows", "Rows", tag("details", [tag("summary", f"{len(rows)} rows"), body]), tag("p", remark))
 
 
 def _cell(value):

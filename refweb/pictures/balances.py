@@ -46,53 +46,53 @@ class EnergyBalance(NamedTuple):
         return self.top - self.given
 
 
-def energy_book(shown):
+def energy_book(runs):
     """The `EnergyBalance` of a run.
 
     The total is the sum of what is stored and moves; what damping and friction took is stacked on it, so that the whole
     changes by work alone.
     """
-    table, names = shown.history, [name for name in shown.energies if name not in (GIVEN, TOTAL)]
+    table, names = runs.history, [name for name in runs.energies if name not in (GIVEN, TOTAL)]
     names.sort(key=lambda name: (name == LOST, name == "kinetic_energy"))
-    least = {}
+    smallest = {}
     for name in names:
         low = float(np.nanmin(table[name])) if np.isfinite(table[name]).any() else 0.0
-        least[name] = low if name in FLOATING or low < 0.0 else 0.0
-    parts = {name: table[name] - least[name] for name in names}
+        smallest[name] = low if name in FLOATING or low < 0.0 else 0.0
+    parts = {name: table[name] - smallest[name] for name in names}
     top = np.sum(list(parts.values()), axis=0)
-    work = table[GIVEN] if GIVEN in shown.energies else np.zeros_like(top)
-    return EnergyBalance(parts, least, top, top[:1] + work - work[:1])
+    work = table[GIVEN] if GIVEN in runs.energies else np.zeros_like(top)
+    return EnergyBalance(parts, smallest, top, top[:1] + work - work[:1])
 
 
-def energy(shown):
+def energy(runs):
     """Panels of the book of energies: stacked of one run, of several a panel for each kind; and what it is open by."""
-    if len(shown) > 1:
-        return _energies_beside(shown)
-    (s,) = shown
+    if len(runs) > 1:
+        return _energies_beside(runs)
+    (s,) = runs
     book, dynamic = energy_book(s), s.record.kind == "dynamic"
-    second, clock = clock_of(shown) if dynamic else (1.0, "")
+    second, clock = clock_of(runs) if dynamic else (1.0, "")
     along = f"time [{clock}]" if dynamic else "load step"
     factor, unit = unit_of("J", book.top, book.given)
-    keep = telling(*book.parts.values(), most=300)
-    at = s.along[keep] / second
-    if len(keep) == 1 and not dynamic:  # of one load step a column as broad as half a step
-        keep, at = np.repeat(keep, 2), at + np.array([-0.25, 0.25])
+    mask = telling(*book.parts.values(), limit=300)
+    at = s.along[mask] / second
+    if len(mask) == 1 and not dynamic:  # of one load step a column as broad as half a step
+        mask, at = np.repeat(mask, 2), at + np.array([-0.25, 0.25])
 
     def stack(axes):
-        entries, below = [], np.zeros(len(keep))
+        entries, below = [], np.zeros(len(mask))
         for number, (name, values) in enumerate(book.parts.items()):
-            above = below + values[keep] / factor
+            above = below + values[mask] / factor
             fill = {"facecolor": COLOURS[number % 7], "edgecolor": (1.0, 1.0, 1.0, 0.5), "linewidth": 0.0}
             area = axes.fill_between(at, below, above, hatch=HATCHES[number % len(HATCHES)], **fill)
-            if len(keep) == 1:  # an instant has no breadth
+            if len(mask) == 1:  # an instant has no breadth
                 axes.vlines(at, below, above, color=COLOURS[number % 7], linewidth=12.0)
             entries.append((area, _called(name, book.least[name])))
             below = above
-        (line,) = axes.plot(at, below, color=DARK, linewidth=1.6, marker=dot(keep))
+        (line,) = axes.plot(at, below, color=DARK, linewidth=1.6, marker=dot(mask))
         entries.append((line, _called("sum", sum(book.least.values()))))
         if dynamic:
             start = "at the start" + (" + work" if GIVEN in s.energies else "")
-            (line,) = axes.plot(at, book.given[keep] / factor, color="white", linestyle=(0, (2, 2)), linewidth=1.6)
+            (line,) = axes.plot(at, book.given[mask] / factor, color="white", linestyle=(0, (2, 2)), linewidth=1.6)
             entries.append((line, start))
         axes.set_ylim(bottom=0.0)
         if not dynamic:
@@ -104,7 +104,7 @@ def energy(shown):
 
     panels = [Panel(stack, along, 1.3 * TALL)]
     if dynamic:
-        panels.append(_drifts(shown, "energy", second, clock))
+        panels.append(_drifts(runs, "energy", second, clock))
     return panels
 
 
@@ -116,23 +116,23 @@ def _white_on_dark(axes):
         line.set_path_effects([Stroke(linewidth=3.0, foreground=DARK), Normal()])
 
 
-def _called(name, least):
+def _called(name, smallest):
     """The name of an energy as a legend has it."""
     name = name.removesuffix("_energy").replace("_", " ")
-    return f"{name} above {readable(least, None, 'J')}" if least else name
+    return f"{name} above {readable(smallest, None, 'J')}" if smallest else name
 
 
-def _drifts(shown, what, second, clock):
+def _drifts(runs, what, second, clock):
     """The panel of what the book of energies is open by."""
-    drifts = [energy_book(s).drift for s in shown]
+    drifts = [energy_book(s).drift for s in runs]
     factor, unit = unit_of("J", *drifts)
 
     def draw(axes):
         entries = []
-        for s, drift in zip(shown, drifts, strict=True):
-            keep = telling(drift)
+        for s, drift in zip(runs, drifts, strict=True):
+            mask = telling(drift)
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, marker=dot(keep), **style)
+            (line,) = axes.plot(s.along[mask] / second, drift[mask] / factor, marker=dot(mask), **style)
             said = s.said(_share(s, "energy_drift", what))
             entries += [(line, said)] if said else []
         label(axes, "drift", unit)
@@ -143,42 +143,40 @@ def _drifts(shown, what, second, clock):
 
 def _share(s, key, what):
     """Error of a balance, as ``run.json`` gives it for a run that has ended."""
-    found = None if s.record.status == "running" else (s.record.summary.get("solver") or {}).get(key)
-    return "" if found is None else f"{what} drift {found:.1e} of the largest {what}"
+    error = None if s.record.status == "running" else (s.record.summary.get("solver") or {}).get(key)
+    return "" if error is None else f"{what} drift {error:.1e} of the largest {what}"
 
 
-def _energies_beside(shown):
+def _energies_beside(runs):
     """A panel for each energy of several runs, and one for what their books are open by."""
-    names = dict.fromkeys(name for s in shown for name in s.energies)
-    dynamic = shown[0].record.kind == "dynamic"
-    second, clock = clock_of(shown) if dynamic else (1.0, "")
+    names = dict.fromkeys(name for s in runs for name in s.energies)
+    dynamic = runs[0].record.kind == "dynamic"
+    second, clock = clock_of(runs) if dynamic else (1.0, "")
     along = f"time [{clock}]" if dynamic else "load step"
 
     def panel(name, first):
-        having = [s for s in shown if name in s.energies]
+        having = [s for s in runs if name in s.energies]
         factor, unit = unit_of("J", *(s.history[name] for s in having))
 
         def draw(axes):
             for s in having:
-                keep = telling(s.history[name])
+                mask = telling(s.history[name])
                 style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
-                axes.plot(s.along[keep] / second, s.history[name][keep] / factor, marker=dot(keep), **style)
+                axes.plot(s.along[mask] / second, s.history[name][mask] / factor, marker=dot(mask), **style)
             label(axes, name.removesuffix("_energy").replace("_", " "), unit)
             if first:
-                legend(axes, names_of(axes, shown))
+                legend(axes, names_of(axes, runs))
 
         return Panel(draw, along, LOW)
 
     panels = [panel(name, not number) for number, name in enumerate(names)]
-    return [*panels, _drifts(shown, "energy", second, clock)] if dynamic else panels
+    return [*panels, _drifts(runs, "energy", second, clock)] if dynamic else panels
 
 
-def names_of(axes, shown):
+def names_of(axes, runs):
     """Entries of a legend that name runs by their ink."""
     return [
-        (axes.plot([], [], color=s.ink.colour, linestyle=s.ink.style, linewidth=1.4)[0], s.name)
-        for s in shown
-        if s.name
+        (axes.plot([], [], color=s.ink.colour, linestyle=s.ink.style, linewidth=1.4)[0], s.name) for s in runs if s.name
     ]
 
 
@@ -207,49 +205,49 @@ class MomentumBalancePlot(NamedTuple):
         return self.momentum - self.given
 
 
-def momentum_book(shown):
+def momentum_book(runs):
     """The `MomentumBalancePlot` along each axis."""
     names = {"impulse of supports": "support_impulse", "impulse of loads and all else": "outer_impulse"}
-    names = {words: name for words, name in names.items() if f"{name}_x" in shown.history}
+    names = {words: name for words, name in names.items() if f"{name}_x" in runs.history}
     return {
         axis: MomentumBalancePlot(
-            shown.history[f"momentum_{axis}"],
-            {words: shown.history[f"{name}_{axis}"] for words, name in names.items()},
+            runs.history[f"momentum_{axis}"],
+            {words: runs.history[f"{name}_{axis}"] for words, name in names.items()},
         )
         for axis in AXES
     }
 
 
-def has_momentum(shown):
+def has_momentum(runs):
     """Tell if a run has a momentum balance."""
-    return all(f"momentum_{axis}" in shown.units for axis in AXES)
+    return all(f"momentum_{axis}" in runs.units for axis in AXES)
 
 
-def momentum(shown):
+def momentum(runs):
     """Panels of the book of momentum: for each axis momentum against impulses, and what it is open by."""
-    books = [momentum_book(s) for s in shown]
+    books = [momentum_book(s) for s in runs]
     sizes = {axis: max(_size(b[axis]) for b in books) for axis in AXES}
     drawn = [axis for axis in AXES if sizes[axis] > SMALL * max(sizes.values())] or ["z"]
     small = [axis for axis in AXES if axis not in drawn]
     notes = (f"Along {' and '.join(small)} all momenta are below {SMALL:g} of the largest.",) if small else ()
     largest = np.array(max(sizes.values()))
     factor, unit = unit_of("N s", largest)
-    second, clock = clock_of(shown)
+    second, clock = clock_of(runs)
     low, high = _ends([b[axis] for b in books for axis in drawn])
 
     def panel(axis, first):
         def draw(axes):
-            for s, book in zip(shown, books, strict=True):
-                entries = _momenta(axes, s, book[axis], second, factor, len(shown) > 1)
+            for s, book in zip(runs, books, strict=True):
+                entries = _momenta(axes, s, book[axis], second, factor, len(runs) > 1)
             axes.set_ylim(low / factor, high / factor)
             label(axes, f"along {axis}", unit)
             if first:
-                legend(axes, names_of(axes, shown) + entries)
+                legend(axes, names_of(axes, runs) + entries)
 
         return Panel(draw, f"time [{clock}]", LOW, notes)
 
     panels = [panel(axis, not number) for number, axis in enumerate(drawn)]
-    return [*panels, _momentum_drifts(shown, books, second, clock)]
+    return [*panels, _momentum_drifts(runs, books, second, clock)]
 
 
 def _size(book):
@@ -261,8 +259,8 @@ def _ends(books):
     values = np.concatenate([v for book in books for v in (book.momentum, *book.impulses.values())])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
-    room = 0.06 * (high - low) or 1.0
-    return low - room, high + room
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin
 
 
 def _momenta(axes, s, book, second, factor, several):
@@ -272,35 +270,35 @@ def _momenta(axes, s, book, second, factor, several):
     for number, (words, values) in enumerate(curves.items()):
         ink = Ink.of(number)
         style = {"color": s.ink.colour if several else ink.colour, "linestyle": ink.style}
-        keep = telling(values)
+        mask = telling(values)
         (line,) = axes.plot(
-            at[keep], values[keep] / factor, marker=dot(keep), linewidth=1.6 if number == 0 else 1.1, **style
+            at[mask], values[mask] / factor, marker=dot(mask), linewidth=1.6 if number == 0 else 1.1, **style
         )
         handle = line if not several else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
         entries.append((handle, words))
-    keep = telling(book.given)
+    mask = telling(book.given)
     style = {"color": DARK, "linestyle": STYLES[3], "linewidth": 2.2}
-    (line,) = axes.plot(at[keep], book.given[keep] / factor, **style, zorder=3)
+    (line,) = axes.plot(at[mask], book.given[mask] / factor, **style, zorder=3)
     return [*entries, (line, "at the start + impulses")]
 
 
-def _momentum_drifts(shown, books, second, clock):
+def _momentum_drifts(runs, books, second, clock):
     """The panel of what the book of momentum is open by."""
-    drifts = [(s, axis, book[axis].drift) for s, book in zip(shown, books, strict=True) for axis in AXES]
+    drifts = [(s, axis, book[axis].drift) for s, book in zip(runs, books, strict=True) for axis in AXES]
     factor, unit = unit_of("N s", *(drift for _, _, drift in drifts))
 
     def draw(axes):
         entries = []
         for s, axis, drift in drifts:
-            keep, ink = telling(drift), Ink.of(AXES.index(axis))
+            mask, ink = telling(drift), Ink.of(AXES.index(axis))
             style = {"color": s.ink.colour if s.name else ink.colour, "linestyle": ink.style, "linewidth": 1.2}
-            (line,) = axes.plot(s.along[keep] / second, drift[keep] / factor, marker=dot(keep), **style)
-            if s is shown[0]:
+            (line,) = axes.plot(s.along[mask] / second, drift[mask] / factor, marker=dot(mask), **style)
+            if s is runs[0]:
                 handle = line if not s.name else axes.plot([], [], color=DARK, linestyle=ink.style)[0]
                 entries.append((handle, f"along {axis}"))
         label(axes, "drift", unit)
         legend(axes, entries, columns=3)
 
-    shares = [(s, _share(s, "momentum_drift", "momentum")) for s in shown]
+    shares = [(s, _share(s, "momentum_drift", "momentum")) for s in runs]
     said = tuple(s.said(words if s.name else words.capitalize()) for s, words in shares if words)
     return Panel(draw, f"time [{clock}]", LOW, said)

@@ -188,9 +188,9 @@ def _pair(oblique, side, near, points, aspect):
     for _ in range(20 if excess(low) < 0 else 0):
         middle = (low + high) / 2
         low, high = (middle, high) if excess(middle) < 0 else (low, middle)
-    found = [stacked(low), (BESIDE, *_fitted(oblique, side, near, aspect, BESIDE))]
-    widths = [min(v.share(points) * r[2] for v, r in zip(views, where, strict=True)) for where, *views in found]
-    (first, second), large, small = found[int(widths[1] > 1.15 * widths[0])]
+    pair_of_views = [stacked(low), (BESIDE, *_fitted(oblique, side, near, aspect, BESIDE))]
+    widths = [min(v.share(points) * r[2] for v, r in zip(views, where, strict=True)) for where, *views in pair_of_views]
+    (first, second), large, small = pair_of_views[int(widths[1] > 1.15 * widths[0])]
     wider = small.share(points) * second[2] / (large.share(points) * first[2])
     return [large.wider(1 / wider), small.wider(wider)], [first, second]
 

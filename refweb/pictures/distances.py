@@ -56,22 +56,22 @@ def spread(record, field):
     if field not in frame.fields:
         raise InputError(f"{record.name}: its frames hold no {field}")
     values, middles = np.asarray(frame.fields[field]), frame.origin.mean(axis=1)
-    place, words = _place(record, frame, middles, values, field)
-    note = f"The frame at {at(record, frame.time)} is nearest to {name}, which is of {at(record, when)}."
-    note = "" if frame.time == when or not name else note
-    return Spread(frame, values, np.linalg.norm(middles - place, axis=1), frame.slack, words, note)
+    origin_point, words = _place(record, frame, middles, values, field)
+    remark = f"The frame at {at(record, frame.time)} is nearest to {name}, which is of {at(record, when)}."
+    remark = "" if frame.time == when or not name else remark
+    return Spread(frame, values, np.linalg.norm(middles - origin_point, axis=1), frame.slack, words, remark)
 
 
 def largest(record, field):
     """(name, time) of the result of a field, of the first result where there is none; "" and the last time else."""
     results = record.summary.get("results") or {}
-    asked = {one.get("name"): one for one in record.scene.get("observe") or []}
-    own = [name for name in results if asked.get(name, {}).get("quantity") == field]
-    name = next((name for name in [*own, *results] if results[name].get("time") is not None), None)
+    asked = {entry.get("name"): entry for entry in record.scene.get("observe") or []}
+    names = [name for name in results if asked.get(name, {}).get("quantity") == field]
+    name = next((name for name in [*names, *results] if results[name].get("time") is not None), None)
     if name is None:
         return "", max(record.times.values())
-    steps = [one[name] for step in record.summary.get("steps") or [] if name in (one := step.get("results", {}))]
-    return name, max(steps or [results[name]], key=lambda one: abs(one["value"] or 0.0))["time"]
+    steps = [entry[name] for step in record.summary.get("steps") or [] if name in (entry := step.get("results", {}))]
+    return name, max(steps or [results[name]], key=lambda entry: abs(entry["value"] or 0.0))["time"]
 
 
 def _place(record, frame, middles, values, field):
@@ -106,42 +106,46 @@ def _loaded(record, frame, numbers):
     lines = np.column_stack([frame.ends[first, 0], frame.ends[np.append(first[1:], len(numbers)) - 1, 1]])
     try:
         web = Web(points=nodes[:count], lines=lines, kind=str((record.scene.get("web") or {}).get("kind", "inline")))
-        found = np.unique(np.concatenate([web.find(load["node"]) for load in loads]))
+        loaded_nodes = np.unique(np.concatenate([web.find(load["node"]) for load in loads]))
     except (InputError, KeyError, ValueError):  # a name that the scene alone knows
         return None
-    return (nodes[found[0]], f"node {found[0]}, which is loaded") if len(found) == 1 else None
+    return (nodes[loaded_nodes[0]], f"node {loaded_nodes[0]}, which is loaded") if len(loaded_nodes) == 1 else None
 
 
-def distances(shown, field):
+def distances(runs, field):
     """The panel of a field over the distance from the place that was hit or loaded."""
-    found = [spread(s.record, field) for s in shown]
-    factor, called = unit_of(FIELDS[field], *(one.values for one in found))
-    metre, unit = unit_of("m", *(one.distance for one in found))
+    spreads = [spread(s.record, field) for s in runs]
+    factor, called = unit_of(FIELDS[field], *(item.values for item in spreads))
+    metre, unit = unit_of("m", *(item.distance for item in spreads))
 
     def draw(axes):
         entries = []
-        for s, one in zip(shown, found, strict=True):
-            taut, many = ~one.slack, len(one.values) > MANY
-            size = 3.0 if len(one.values) > 500 else 5.0
+        for s, item in zip(runs, spreads, strict=True):
+            taut, many = ~item.slack, len(item.values) > MANY
+            size = 3.0 if len(item.values) > 500 else 5.0
             dots = {"linestyle": "", "markersize": size, "rasterized": many, "markeredgewidth": 0.0, "alpha": 0.75}
-            far, values = one.distance / metre, one.values / factor
-            place = f", from {one.origin}" if len(places) > 1 else ""
-            when = at(s.record, one.frame.time)
+            far, values = item.distance / metre, item.values / factor
+            origin_text = f", from {item.origin}" if len(places) > 1 else ""
+            when = at(s.record, item.frame.time)
             if taut.any():
                 (points,) = axes.plot(far[taut], values[taut], marker=s.ink.marker, color=s.ink.colour, **dots)
-                largest = readable(float(np.nanmax(one.values)), None, FIELDS[field])
-                entries.append((points, s.said(f"lines at {when}, at most {largest}{place}")))
-            if one.slack.any():
-                look = {"linestyle": "", "marker": "x", "markersize": size + 1, "rasterized": many}
-                (points,) = axes.plot(far[one.slack], values[one.slack], color=s.ink.colour if s.name else PALE, **look)
-                all_of_it = "" if taut.any() else f" at {when}{place}"
-                entries.append((points, s.said(f"slack: {one.slack.sum()} of {len(one.slack)} lines{all_of_it}")))
+                largest = readable(float(np.nanmax(item.values)), None, FIELDS[field])
+                entries.append((points, s.said(f"lines at {when}, at most {largest}{origin_text}")))
+            if item.slack.any():
+                style = {"linestyle": "", "marker": "x", "markersize": size + 1, "rasterized": many}
+                (points,) = axes.plot(
+                    far[item.slack], values[item.slack], color=s.ink.colour if s.name else PALE, **style
+                )
+                all_of_it = "" if taut.any() else f" at {when}{origin_text}"
+                entries.append((points, s.said(f"slack: {item.slack.sum()} of {len(item.slack)} lines{all_of_it}")))
         label(axes, field, called)
         legend(axes, entries)
 
-    places = dict.fromkeys(one.origin for one in found)
-    place = f"\nfrom {next(iter(places))}" if len(places) == 1 else ""
-    return [Panel(draw, f"distance in the undeformed web [{unit}]{place}", 3.4, tuple(one.note for one in found))]
+    places = dict.fromkeys(item.origin for item in spreads)
+    origin_text = f"\nfrom {next(iter(places))}" if len(places) == 1 else ""
+    return [
+        Panel(draw, f"distance in the undeformed web [{unit}]{origin_text}", 3.4, tuple(item.note for item in spreads))
+    ]
 
 
 def at(record, time):

@@ -68,8 +68,8 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
         raise InputError(f"{name} = {value}: a film has all frames, leave it out")
     poses = _poses(record, frame, time)
     first = record.frame(poses[0].number)
-    look = look_of(record, first, field, range, scale, view)
-    film = _Film(record, poses, look, fps)
+    options = look_of(record, first, field, range, scale, view)
+    film = _Film(record, poses, options, fps)
     write_atomically(out, lambda name: film.write(Path(name), progress or (lambda text, share: None)))
     return out
 
@@ -92,8 +92,8 @@ def _poses(record, frame, time):
 class _Film:
     """The images of a film, and how they are written."""
 
-    def __init__(self, record, poses, look, fps):
-        self._record, self._poses, self._look = record, poses, look
+    def __init__(self, record, poses, options, fps):
+        self._record, self._poses, self._look = record, poses, options
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
         self._read = functools.lru_cache(WARM_START)(record.frame)
@@ -130,12 +130,12 @@ class _Film:
         """The stage that shows all images; of a swing its two ends and its middle do."""
         ends = {max, min}
         poses = [end(self._poses, key=lambda pose: pose.phase) for end in ends] if self._swings else self._poses
-        seen = None
+        limits = None
         for pose in poses:
             progress("reading frames", 0.0)
-            here = Seen.of(self._frame(pose), self._look.field).spanned()
-            seen = here if seen is None else seen.joined(here)
-        return Stage.of(seen, self._look, SIZE[0] / SIZE[1])
+            limits_here = Seen.of(self._frame(pose), self._look.field).spanned()
+            limits = limits_here if limits is None else limits.joined(limits_here)
+        return Stage.of(limits, self._look, SIZE[0] / SIZE[1])
 
     def _page(self):
         """Image of everything around the web, with transparency, RGBA."""
@@ -155,8 +155,8 @@ class _Film:
             page.paste(self._around, mask=self._around)
         for view, (left, bottom, _, height) in zip(views, self._stage.rectangles, strict=True):
             mask = Image.fromarray(with_clear_white(view)) if beneath else None
-            place = round(left * SIZE[0]), round((1 - bottom - height) * SIZE[1])
-            page.paste(Image.fromarray(view), place, mask)
+            corner = round(left * SIZE[0]), round((1 - bottom - height) * SIZE[1])
+            page.paste(Image.fromarray(view), corner, mask)
         if not beneath:
             page.paste(self._around, mask=self._around)
         pen = ImageDraw.Draw(page)

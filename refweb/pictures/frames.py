@@ -124,16 +124,16 @@ def listed(folder):
         raise InputError(f'"{folder}" is not a result folder, it holds no web.pvd: name one of refweb run') from None
     except (OSError, ElementTree.ParseError) as error:
         raise InputError(f'"{folder}" is not a result folder: web.pvd cannot be read ({error})') from None
-    found = {}
+    paths = {}
     for item in sets:
         match = re.fullmatch(r"(.*)_(\d+)\.vtu", Path(item.get("file", "")).name)
         if match:
-            frame = found.setdefault(int(match[2]), Listed(float(item.get("timestep", 0)), {}))
+            frame = paths.setdefault(int(match[2]), Listed(float(item.get("timestep", 0)), {}))
             frame.paths[match[1]] = Path(folder) / item.get("file", "")
-    found = {number: found[number] for number in sorted(found) if "web" in found[number].paths}
-    if not found:
+    paths = {number: paths[number] for number in sorted(paths) if "web" in paths[number].paths}
+    if not paths:
         raise InputError(f'"{folder}" has no frames: web.pvd lists no file such as frames/web_000000.vtu')
-    return found
+    return paths
 
 
 def number_of(frame, known):
@@ -146,7 +146,7 @@ def number_of(frame, known):
     return frame
 
 
-def read(folder, number, found=None):
+def read(folder, number, known_paths=None):
     """Read one frame of a result folder, whose `listed` frames may be given.
 
     Raises
@@ -154,7 +154,7 @@ def read(folder, number, found=None):
     InputError
         Where it cannot be read or has positions that are not finite.
     """
-    time, paths = (found or listed(folder))[number]
+    time, paths = (known_paths or listed(folder))[number]
     web = _mesh(paths["web"])
     if not np.isfinite(web.points).all():
         raise InputError(f"frame = {number}: has positions that are not finite, choose an earlier one")
@@ -196,8 +196,8 @@ def frame_of(number, time, meshes, supported):
     if "shape" in web.point_data:
         mode = _amplitude(web.points, web.point_data["shape"]) * web.point_data["shape"]
         swing = np.concatenate([_curves(mode[cells], samples) for _, cells in blocks])
-    held = web.points[supported]
-    return Frame(number, time, paths, start, tree, fields, slack, held, bodies, ends, lifted, swing)
+    fixed = web.points[supported]
+    return Frame(number, time, paths, start, tree, fields, slack, fixed, bodies, ends, lifted, swing)
 
 
 def _amplitude(points, shape):

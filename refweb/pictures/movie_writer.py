@@ -34,10 +34,10 @@ def ffmpeg():
     InputError
         Where there is none.
     """
-    found = shutil.which("ffmpeg")
-    if found is None:
+    path = shutil.which("ffmpeg")
+    if path is None:
         raise InputError('out = "….mp4" needs ffmpeg, which is not found on PATH: install it, or name a .gif')
-    return found
+    return path
 
 
 class Gif:
@@ -82,8 +82,8 @@ class Gif:
         drawn = Image.fromarray(part)
         drawn.putpalette(self._palette.colours)
         options = {"duration": max(self._delay, 1000 * seconds), "disposal": 1, "transparency": COLOURS}
-        place = (columns.start, rows.start)
-        self._file.write(b"".join(GifImagePlugin.getdata(drawn, offset=place, include_color_table=False, **options)))
+        corner = (columns.start, rows.start)
+        self._file.write(b"".join(GifImagePlugin.getdata(drawn, offset=corner, include_color_table=False, **options)))
 
     def close(self):
         """End it."""
@@ -149,8 +149,8 @@ class Mp4:
 
 def _span(where):
     """The slice from the first to the last that is true."""
-    found = np.flatnonzero(where)
-    return slice(int(found[0]), int(found[-1]) + 1)
+    indices = np.flatnonzero(where)
+    return slice(int(indices[0]), int(indices[-1]) + 1)
 
 
 class Palette(NamedTuple):
@@ -170,11 +170,11 @@ def _nearest(table):
     """Number of the colour, of shape (colours, 3), that is nearest to the middle of each bin, shape (64³,)."""
     table, levels = np.asarray(table, dtype=np.float32), np.arange(64, dtype=np.float32) * 255 / 63
     green, blue = (x.ravel() for x in np.meshgrid(levels, levels, indexing="ij"))
-    found = np.empty((64, 64 * 64), dtype=np.uint8)
-    for red, numbers in zip(levels, found, strict=True):
+    nearest = np.empty((64, 64 * 64), dtype=np.uint8)
+    for red, numbers in zip(levels, nearest, strict=True):
         bins = np.stack([np.full_like(green, red), green, blue], axis=1)
         numbers[:] = ((table**2).sum(axis=1) - 2 * bins @ table.T).argmin(axis=1)
-    return found.ravel()
+    return nearest.ravel()
 
 
 def _palette(samples, certain):
@@ -193,6 +193,6 @@ def _palette(samples, certain):
     spread = np.repeat(colours.astype(np.uint8), np.ceil(count[key] ** 0.75 / 8).astype(int), axis=0)
     table = [255, 255, 255, *np.round(255 * np.asarray(certain)).astype(int).ravel().tolist()]
     left = COLOURS - len(table) // 3
-    found = Image.fromarray(spread[None]).quantize(left, method=Image.Quantize.MEDIANCUT, kmeans=1)
-    table += (found.getpalette() or [])[: 3 * left]
+    palette = Image.fromarray(spread[None]).quantize(left, method=Image.Quantize.MEDIANCUT, kmeans=1)
+    table += (palette.getpalette() or [])[: 3 * left]
     return Palette(bytes(table + [255] * (768 - len(table))), _nearest(np.reshape(table, (-1, 3))))

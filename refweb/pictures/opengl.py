@@ -82,11 +82,11 @@ class Window:
         self._window.Render()
         return self._read(bool(model))
 
-    def _pixels(self, place):
+    def _pixels(self, area):
         """Pixels of the window that a metre takes at a place [m], shape (3,): the mean over views."""
         return SUPERSAMPLING * np.mean(
             [
-                view.project(place)[2] * height / (2 * view.half[1])
+                view.project(area)[2] * height / (2 * view.half[1])
                 for (_, view), (_, height) in zip(self._renderers, self._sizes, strict=True)
             ]
         )
@@ -98,26 +98,26 @@ class Window:
 
         pixels = vtkUnsignedCharArray()
         self._window.GetPixelData(0, 0, self._width - 1, self._height - 1, 0, pixels, 0)
-        whole = vtk_to_numpy(pixels).reshape(self._height, self._width, 3)
-        if filled and np.ptp(whole[:: SUPERSAMPLING + 1]) == 0:
+        image = vtk_to_numpy(pixels).reshape(self._height, self._width, 3)
+        if filled and np.ptp(image[:: SUPERSAMPLING + 1]) == 0:
             raise SystemExit("the window stays blank")
-        found, bottom = [], 0
+        images, bottom = [], 0
         for width, height in self._sizes:
             top = bottom + SUPERSAMPLING * height
-            part = np.ascontiguousarray(whole[bottom:top, : SUPERSAMPLING * width][::-1])
-            found.append(np.asarray(Image.fromarray(part).reduce(SUPERSAMPLING)))
+            part = np.ascontiguousarray(image[bottom:top, : SUPERSAMPLING * width][::-1])
+            images.append(np.asarray(Image.fromarray(part).reduce(SUPERSAMPLING)))
             bottom = top
-        return found
+        return images
 
 
 def _light(renderer):
     """A key light from above to the left, a fill light, and one from the viewer, all moving with the camera."""
     from vtkmodules.vtkRenderingCore import vtkLight
 
-    for place, strength in (((-0.45, 0.75, 1.0), 0.62), ((0.7, -0.3, 0.8), 0.28), ((0.0, 0.0, 1.0), 0.22)):
+    for direction, strength in (((-0.45, 0.75, 1.0), 0.62), ((0.7, -0.3, 0.8), 0.28), ((0.0, 0.0, 1.0), 0.22)):
         light = vtkLight()
         light.SetLightTypeToCameraLight()
-        light.SetPosition(*place)
+        light.SetPosition(*direction)
         light.SetFocalPoint(0.0, 0.0, 0.0)
         light.SetIntensity(strength)
         renderer.AddLight(light)
@@ -155,19 +155,19 @@ class _Mesh:
         self.data, self.actor, self._mapper, self._held = vtkPolyData(), vtkActor(), vtkPolyDataMapper(), {}
         self._mapper.SetInputData(self.data)
         self.actor.SetMapper(self._mapper)
-        look = self.actor.GetProperty()
-        look.SetAmbient(AMBIENT)
-        look.SetDiffuse(DIFFUSE)
-        look.SetSpecular(specular)
-        look.SetSpecularPower(POWER)
-        look.SetInterpolationToPhong()
+        properties = self.actor.GetProperty()
+        properties.SetAmbient(AMBIENT)
+        properties.SetDiffuse(DIFFUSE)
+        properties.SetSpecular(specular)
+        properties.SetSpecularPower(POWER)
+        properties.SetInterpolationToPhong()
 
     def _points(self, points):
         from vtkmodules.vtkCommonCore import vtkPoints
 
-        place = vtkPoints()
-        place.SetData(self._array("points", points, np.float32))
-        self.data.SetPoints(place)
+        vtk_points = vtkPoints()
+        vtk_points.SetData(self._array("points", points, np.float32))
+        self.data.SetPoints(vtk_points)
 
     def _faces(self, faces):
         """Triangles or quadrangles, shape (faces, corners)."""

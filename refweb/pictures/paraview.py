@@ -47,8 +47,8 @@ def script(folder, field=None, out=None):
     number = record.chosen()
     frame = record.frame(number)
     stage = stage_of(record, frame, field, SIZE)
-    look = stage.look
-    factor, unit = scaled_unit(look.field, max(map(abs, look.limits)))
+    options = stage.look
+    factor, unit = scaled_unit(options.field, max(map(abs, options.limits)))
     points, cells = _arrays(folder, number)
     given = {
         "folder": str(folder.resolve()),
@@ -57,15 +57,15 @@ def script(folder, field=None, out=None):
         "time": record.times[number],
         "clock": CLOCKS.get(record.kind, CLOCKS["dynamic"]).replace("{:", "{time:"),
         "size": list(SIZE),
-        "field": look.field,
-        "label": look.field.replace("_", " ") + (f" [{unit}]" if unit else ""),
-        "of_cells": look.field in cells,
-        "vector": points.get(look.field, 1) > 1,
+        "field": options.field,
+        "label": options.field.replace("_", " ") + (f" [{unit}]" if unit else ""),
+        "of_cells": options.field in cells,
+        "vector": points.get(options.field, 1) > 1,
         "factor": factor,
-        "limits": list(look.limits),
-        "grey": look.field in GREY_WHERE_SLACK and "slack" in cells,
+        "limits": list(options.limits),
+        "grey": options.field in GREY_WHERE_SLACK and "slack" in cells,
         "colours": colour_map()(np.linspace(0, 1, 33))[:, :3].round(4).tolist(),
-        "two": [list(colour) for colour in TWO.values()] if look.field == "slack" else None,
+        "two": [list(colour) for colour in TWO.values()] if options.field == "slack" else None,
         "slack_colour": list(SLACK),
         "support_colour": list(SUPPORT),
         "body_colours": [list(colour) for colour in BODIES],
@@ -87,10 +87,10 @@ def _arrays(folder, number):
     return {name: int(values[0].size) for name, values in mesh.point_data.items()}, set(mesh.cell_data)
 
 
-def camera_of(stage, size, room=1.0):
+def camera_of(stage, size, margin=1.0):
     """The first view of a stage in a window of some size [pixel], as plain values.
 
-    Beside what it shows there is room for a colour bar, and ``room`` times its height.
+    Beside what it shows there is room for a colour bar, and ``margin`` times its height.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def camera_of(stage, size, room=1.0):
         ``half_height`` [m] of parallel projection.
     """
     view = stage.views[0]
-    half = max(room * float(view.half[1]), 1.12 * float(view.half[0]) * size[1] / size[0])
+    half = max(margin * float(view.half[1]), 1.12 * float(view.half[0]) * size[1] / size[0])
     eye = view.centre + (0.0 if view.perspective else 3.0 * sum(view.half)) * view.axes[2]
     away = float((eye - stage.middle) @ view.axes[2])
     return {

@@ -81,24 +81,24 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
 def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view=None):
     """The page of a frame of a `refweb.pictures.record.Record`, as `picture` gives it."""
     number = record.chosen(frame, time)
-    found = record.frame(number)
-    look = look_of(record, found, field, range, scale, view)
-    posed = with_supports(record, found).posed(look.scale)
-    stage = Stage.of(Seen.of(posed, look.field), look, SIZE[0] / SIZE[1])
+    frame_drawn = record.frame(number)
+    options = look_of(record, frame_drawn, field, range, scale, view)
+    posed = with_supports(record, frame_drawn).posed(options.scale)
+    stage = Stage.of(Seen.of(posed, options.field), options, SIZE[0] / SIZE[1])
     model = stage.model(posed)
     images = render.images([model], stage.views, stage.pixels(SIZE))
     page = blank_page(stage, record.title, SIZE)
     rest = images[0] if images and images[0] else [None] * len(stage.views)
     for axes, view, image, (_, height) in zip(page.axes, stage.views, rest, stage.pixels(SIZE), strict=False):
         if image is not None:
-            shown = with_clear_white(image) if stage.beneath else image
+            image_shown = with_clear_white(image) if stage.beneath else image
             axes.imshow(
-                shown, extent=view.extent, aspect="auto", interpolation="none", zorder=1 if stage.beneath else 0
+                image_shown, extent=view.extent, aspect="auto", interpolation="none", zorder=1 if stage.beneath else 0
             )
         else:
             polygons(axes, model, view, height)
         axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
-    page.text(0.03, 0.905, clock_line(record, number, look), size=16, color=DARK, parse_math=False)
+    page.text(0.03, 0.905, clock_line(record, number, options), size=16, color=DARK, parse_math=False)
     page.text(0.985, 0.015, f"frame {number}", size=11, color=PALE, ha="right")
     return page
 
@@ -120,8 +120,8 @@ def look_of(record, frame, field, limits, scale, view):
 
 def stage_of(record, frame, field, size):
     """The stage of a frame by itself, in a view of some size [pixel], as without any other option."""
-    look = look_of(record, frame, field, None, 1.0, None)
-    return Stage.of(Seen.of(frame, look.field), look, size[0] / size[1])
+    options = look_of(record, frame, field, None, 1.0, None)
+    return Stage.of(Seen.of(frame, options.field), options, size[0] / size[1])
 
 
 def with_supports(record, frame):
@@ -130,11 +130,11 @@ def with_supports(record, frame):
     return frame if len(frame.supports) or frame.number == last else frame.held_as(record.frame(last))
 
 
-def clock_line(record, number, look, decimals=None):
+def clock_line(record, number, options, decimals=None):
     """Line below the title: the time, the exaggeration, and how a run that is not solved ended."""
     parts = [record.clock(number, decimals)]
-    if look.scale != 1:
-        parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {look.scale:g}")
+    if options.scale != 1:
+        parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {options.scale:g}")
     return "  —  ".join(filter(None, [*parts, record.ending]))
 
 

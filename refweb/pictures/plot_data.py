@@ -57,7 +57,7 @@ class Shown:
     @property
     def observables(self):
         """Names of the observables among the columns."""
-        names = [one.get("name") for one in self.record.scene.get("observe") or []] or list(self.results)
+        names = [entry.get("name") for entry in self.record.scene.get("observe") or []] or list(self.results)
         return [name for name in names if name in self.units]
 
     @property
@@ -74,8 +74,8 @@ class Shown:
     @property
     def events(self):
         """Names and times [s] of the events that happened."""
-        found = [event for event in self.record.summary.get("events") or [] if event.get("time") is not None]
-        return [(str(event.get("name")), float(event["time"])) for event in found]
+        happened = [event for event in self.record.summary.get("events") or [] if event.get("time") is not None]
+        return [(str(event.get("name")), float(event["time"])) for event in happened]
 
     @functools.cached_property
     def steps(self):
@@ -102,15 +102,15 @@ def refuse_spoilt(record):
     lists = [run.get("steps"), run.get("events"), scene.get("observe"), scene.get("load")]
     tables = [run.get("web"), run.get("solver"), run.get("bodies"), scene.get("web")]
     try:
-        found = [isinstance(one, dict) for several in lists for one in several or []]
-        found += [isinstance(one or {}, dict) for one in tables] + [isinstance(run.get("kind"), str | None)]
+        checks = [isinstance(entry, dict) for several in lists for entry in several or []]
+        checks += [isinstance(entry or {}, dict) for entry in tables] + [isinstance(run.get("kind"), str | None)]
         results = [_results(given) for given in (run, *(run.get("steps") or []))]
-        found += [math.isfinite(one.time) for given in results for one in given.values()]
-        found += [math.isfinite(step["step"]) for step in run.get("steps") or []]
-        found += [math.isfinite(body["overlap"]) and "line" in body for body in (run.get("bodies") or {}).values()]
+        checks += [math.isfinite(entry.time) for given in results for entry in given.values()]
+        checks += [math.isfinite(step["step"]) for step in run.get("steps") or []]
+        checks += [math.isfinite(body["overlap"]) and "line" in body for body in (run.get("bodies") or {}).values()]
     except (TypeError, ValueError, AttributeError, KeyError):
-        found = [False]
-    if not all(found):
+        checks = [False]
+    if not all(checks):
         raise InputError(f"{record.name}: its run.json or scene.toml is not what a run of refweb writes")
 
 
@@ -136,6 +136,6 @@ def told(result: Result):
     """A result in words, with its ±."""
     words = readable(result.value, result.error, result.unit, result.within)
     if result.interval is not None:
-        least, most = (readable(end, None, result.unit) if np.isfinite(end) else "any" for end in result.interval)
-        return f"{words}, may be from {least} to {most}"
+        lower, upper = (readable(end, None, result.unit) if np.isfinite(end) else "any" for end in result.interval)
+        return f"{words}, may be from {lower} to {upper}"
     return words

@@ -35,32 +35,32 @@ def kinds(record):
     Besides these any column of its table can be drawn, and ``spectrum:`` before one of a dynamic run.
     """
     refuse_spoilt(record)
-    shown = Shown(record, "", Ink.of(0))
+    run = Shown(record, "", Ink.of(0))
     if record.kind == "modes":
         return {"frequencies": "Natural frequencies with ±"}
-    rows, dynamic = len(shown.along), record.kind == "dynamic"
+    rows, dynamic = len(run.along), record.kind == "dynamic"
     over = "time" if dynamic else "the load step, with ±"
-    found = {name: f"{name} over {over}" for name in shown.observables if dynamic or rows > 1}
+    lines = {name: f"{name} over {over}" for name in run.observables if dynamic or rows > 1}
     offered = {}
-    if shown.energies:
+    if run.energies:
         offered["energy"] = "Energy by kind" + (", and how far its book is open" if dynamic else "")
-    if dynamic and balances.has_momentum(shown):
+    if dynamic and balances.has_momentum(run):
         offered["momentum"] = "Momentum against the impulses of supports and loads"
-    if dynamic and rows >= spectra.FEWEST and shown.observables:
-        offered["spectrum"] = f"Spectrum of {shown.observables[0]}"
+    if dynamic and rows >= spectra.FEWEST and run.observables:
+        offered["spectrum"] = f"Spectrum of {run.observables[0]}"
     if record.times:
         offered |= {f"{field}{DISTANCE}": f"{field} of lines over distance" for field in distances.FIELDS}
-    return found | {name: words for name, words in offered.items() if name not in found}
+    return lines | {name: words for name, words in offered.items() if name not in lines}
 
 
 def usual(record):
     """Names of what is drawn of a record where nothing is asked for."""
-    shown = Shown(record, "", Ink.of(0))
+    run = Shown(record, "", Ink.of(0))
     if record.kind == "modes":
         return ["frequencies"]
     if record.kind == "dynamic":
-        return [*shown.observables, *(["energy"] if shown.energies else [])]
-    return shown.observables if len(shown.along) > 1 or not record.times else [f"stress{DISTANCE}"]
+        return [*run.observables, *(["energy"] if run.energies else [])]
+    return run.observables if len(run.along) > 1 or not record.times else [f"stress{DISTANCE}"]
 
 
 def draw(records, what=None, title=None):
@@ -92,60 +92,60 @@ def draw(records, what=None, title=None):
 
 def _drawn(records, what, title=None):
     """The figure of some records, and which of them lack what, in words."""
-    shown, notes = _beside(records)
+    runs, notes = _beside(records)
     panels, missing, asked = [], {}, {}
-    for typed in _asked(shown, what):
-        asked.setdefault(_meant(shown, typed), typed)
+    for typed in _asked(runs, what):
+        asked.setdefault(_meant(runs, typed), typed)
     for name, typed in asked.items():
-        having = [s for s in shown if _has(s, name)]
+        having = [s for s in runs if _has(s, name)]
         if not having:
-            _refuse(shown, name, typed)
+            _refuse(runs, name, typed)
         panels += _panels(having, name)
-        for s in shown:
+        for s in runs:
             missing.setdefault(s.name, []).extend([typed] if s not in having else [])
     lacking = tuple(f"{who} has no {', '.join(names)}" for who, names in missing.items() if names)
-    figure = sheet(panels, _title(shown) if title is None else title, [*notes, *lacking])
+    figure = sheet(panels, _title(runs) if title is None else title, [*notes, *lacking])
     return shows_itself(figure), lacking
 
 
-def _asked(shown, what):
+def _asked(runs, what):
     """Names of what is to be drawn, as they were typed; the usual ones where there are none."""
     several = isinstance(what, Iterable) and not isinstance(what, str)
-    names = _usual_of_all(shown) if what is None else list(what) if several else [what]
+    names = _usual_of_all(runs) if what is None else list(what) if several else [what]
     for name in names:
         if not isinstance(name, str):
-            raise InputError(f"quantity = {as_shown(name)}: is not a name, {nearest(name, _known(shown))}")
-    return names or _usual_of_all(shown)
+            raise InputError(f"quantity = {as_shown(name)}: is not a name, {nearest(name, _known(runs))}")
+    return names or _usual_of_all(runs)
 
 
-def _known(shown):
+def _known(runs):
     """Names of all that can be drawn of some records, and of the columns of their tables."""
-    return dict.fromkeys(name for s in shown for name in (*kinds(s.record), *s.units))
+    return dict.fromkeys(name for s in runs for name in (*kinds(s.record), *s.units))
 
 
-def _refuse(shown, name, typed):
+def _refuse(runs, name, typed):
     """Say why there is nothing to draw of a name that stands for nothing here."""
-    known, kind = _known(shown), shown[0].record.kind
+    known, kind = _known(runs), runs[0].record.kind
     if name.startswith(SPECTRUM) or name == "spectrum":
         if kind != "dynamic":
             has = "modes have" if kind == "modes" else f"a {kind} run has"
             raise InputError(f"quantity = {as_shown(typed)}: {has} no spectrum, which is of a history over time")
-        known = [f"{SPECTRUM}{column}" for s in shown for column in list(s.units)[1:]]
+        known = [f"{SPECTRUM}{column}" for s in runs for column in list(s.units)[1:]]
     raise InputError(f"quantity = {as_shown(typed)}: there is nothing of that name, {nearest(typed, known)}")
 
 
-def _meant(shown, name):
+def _meant(runs, name):
     """Full meaning of a name: a spectrum is of the first observable there is, a field is over distance."""
-    if any(name in s.units for s in shown):
+    if any(name in s.units for s in runs):
         return name
     if name == "spectrum":
-        return next((SPECTRUM + s.observables[0] for s in shown if s.observables), name)
+        return next((SPECTRUM + s.observables[0] for s in runs if s.observables), name)
     return f"{name}{DISTANCE}" if name in distances.FIELDS else name
 
 
-def _usual_of_all(shown):
+def _usual_of_all(runs):
     """Names of what is drawn of several records where nothing is asked for: what two have at least, else all."""
-    names = [name for s in shown for name in usual(s.record)]
+    names = [name for s in runs for name in usual(s.record)]
     return [name for name in names if names.count(name) > 1] or names
 
 
@@ -156,16 +156,16 @@ def _beside(records):
     for record in records:
         refuse_spoilt(record)
         record.refuse_others("plots")
-    if len(found := dict.fromkeys(record.kind for record in records)) > 1:
-        raise InputError(f"{' and '.join(found)} runs have no axis in common: plot them one by one")
+    if len(kinds_of := dict.fromkeys(record.kind for record in records)) > 1:
+        raise InputError(f"{' and '.join(kinds_of)} runs have no axis in common: plot them one by one")
     single = len(records) == 1
-    shown = [Shown(r, "" if single else r.name, Ink.of(n)) for n, r in enumerate(records)]
-    notes = [_remark(s) for s in shown if s.record.ending]
-    empty = [s for s in shown if not len(s.along)]
-    if len(empty) == len(shown):
+    runs = [Shown(r, "" if single else r.name, Ink.of(n)) for n, r in enumerate(records)]
+    notes = [_remark(s) for s in runs if s.record.ending]
+    empty = [s for s in runs if not len(s.along)]
+    if len(empty) == len(runs):
         raise InputError(f"{records[0].name}: its history has no rows, so there is nothing to plot")
     notes += [f"{s.name} has no rows" for s in empty]
-    return [s for s in shown if s not in empty], notes
+    return [s for s in runs if s not in empty], notes
 
 
 def _remark(s):
@@ -174,11 +174,11 @@ def _remark(s):
     return s.said(": ".join(filter(None, [s.record.ending if s.name else "", message])))
 
 
-def _title(shown):
-    titles = list(dict.fromkeys(s.record.title[:100] for s in shown))
-    words = shown[0].record.ending if len(shown) == 1 else ""
-    note = f" — {words}" if words else ""
-    return (", ".join(titles) if len(titles) <= 3 else f"{len(shown)} runs") + note
+def _title(runs):
+    titles = list(dict.fromkeys(s.record.title[:100] for s in runs))
+    words = runs[0].record.ending if len(runs) == 1 else ""
+    remark = f" — {words}" if words else ""
+    return (", ".join(titles) if len(titles) <= 3 else f"{len(runs)} runs") + remark
 
 
 def _has(s, name):
@@ -188,20 +188,20 @@ def _has(s, name):
     return name in s.units or (name in kinds(s.record) and name != "spectrum")
 
 
-def _panels(shown, name):
+def _panels(runs, name):
     """Panels of what a name stands for: columns before all else."""
-    kind = shown[0].record.kind
-    if any(name in s.units for s in shown):
+    kind = runs[0].record.kind
+    if any(name in s.units for s in runs):
         if kind == "dynamic":
-            return histories.history(shown, name)
-        return histories.steps(shown, name) if kind == "static" else histories.of_modes(shown, name)
+            return histories.history(runs, name)
+        return histories.steps(runs, name) if kind == "static" else histories.of_modes(runs, name)
     if name == "frequencies":
-        return histories.frequencies(shown)
+        return histories.frequencies(runs)
     if name.startswith(SPECTRUM):
-        return spectra.spectrum(shown, name.removeprefix(SPECTRUM))
+        return spectra.spectrum(runs, name.removeprefix(SPECTRUM))
     if name.endswith(DISTANCE):
-        return distances.distances(shown, name.removesuffix(DISTANCE))
-    return balances.energy(shown) if name == "energy" else balances.momentum(shown)
+        return distances.distances(runs, name.removesuffix(DISTANCE))
+    return balances.energy(runs) if name == "energy" else balances.momentum(runs)
 
 
 class Plotted(NamedTuple):
@@ -233,7 +233,7 @@ def plot(folders, quantity=None, out=None):
         As for `draw`, for what is no result folder, and a place or format that cannot be written.
     """
     folders = [Path(folder) for folder in folders]
-    records = [of_folder(folder, seen=False) for folder in folders]
+    records = [of_folder(folder, with_frames=False) for folder in folders]
     if len({record.name for record in records}) < len(records):
         records = [r._replace(name=str(folder)) for r, folder in zip(records, folders, strict=True)]
     path = target(folders[0] / "plot.png" if out is None else out, ENDINGS)

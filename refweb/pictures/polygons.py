@@ -15,7 +15,7 @@ def flat_images(model, views, sizes):
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    found = []
+    images = []
     for view, (width, height) in zip(views, sizes, strict=True):
         page = Figure(figsize=(width / 100, height / 100), dpi=100)
         axes = page.add_axes((0, 0, 1, 1))
@@ -24,8 +24,8 @@ def flat_images(model, views, sizes):
         axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
         canvas = FigureCanvasAgg(page)
         canvas.draw()
-        found.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
-    return found
+        images.append(np.asarray(canvas.buffer_rgba())[..., :3].copy())
+    return images
 
 
 def polygons(axes, model, view, pixels):

@@ -98,8 +98,8 @@ class Record(NamedTuple):
         if self.kind == "dynamic" and decimals is not None and decimals <= 6:
             text = f"t = {self.times[number]:.{decimals}f} s"
         if self.kind == "modes":
-            found = (self._steps or [{}])[-1].get("results", {}).get(f"frequency_{number}")
-            text += f", {readable(found['value'], found['error'], found['unit'])}" if found else ""
+            frequency = (self._steps or [{}])[-1].get("results", {}).get(f"frequency_{number}")
+            text += f", {readable(frequency['value'], frequency['error'], frequency['unit'])}" if frequency else ""
         return text
 
     def chosen(self, frame=None, time=None):
@@ -142,19 +142,19 @@ class Record(NamedTuple):
             return next(iter(self.times.values()))
         if self.kind == "static":
             first = [(step["step"], next(iter(step.get("results", {}).values()), None)) for step in self._steps]
-            found = [(abs(one["value"]), step) for step, one in first if one and one["value"] is not None]
-            return max(found, key=lambda pair: pair[0])[1] if found else None
-        return next((one["time"] for one in self.summary.get("results", {}).values()), None)
+            candidates = [(abs(entry["value"]), step) for step, entry in first if entry and entry["value"] is not None]
+            return max(candidates, key=lambda pair: pair[0])[1] if candidates else None
+        return next((entry["time"] for entry in self.summary.get("results", {}).values()), None)
 
 
-def of_folder(folder, seen=True):
+def of_folder(folder, with_frames=True):
     """The record of a result folder.
 
     Parameters
     ----------
     folder : path-like
         The folder.
-    seen : bool
+    with_frames : bool
         Whether there have to be frames: a run that failed at once has none, and may have a history.
 
     Raises
@@ -170,37 +170,37 @@ def of_folder(folder, seen=True):
     except (OSError, ValueError, KeyError, TypeError):
         scene, kind = {}, "dynamic"
     kind = "modes" if summary.get("kind") == "modes" else kind
-    found = _listed(folder, seen)
-    times = {number: one.time for number, one in found.items()}
+    frames = _listed(folder, with_frames)
+    times = {number: listed_frame.time for number, listed_frame in frames.items()}
     name = folder.name or folder.resolve().name
     table = functools.cache(functools.partial(_table, folder))
 
     def values(number, field):
-        arrays = cell_arrays(found[number].paths["web"], (field, "slack"))
+        arrays = cell_arrays(frames[number].paths["web"], (field, "slack"))
         return _values(frame(number), field) if arrays is None else Values(arrays[field], arrays["slack"] > 0.5)
 
-    frame = functools.partial(read, folder, found=found)
+    frame = functools.partial(read, folder, found=frames)
     return Record(name, kind, summary, scene, times, frame, table, values)
 
 
-def _listed(folder, seen):
+def _listed(folder, with_frames):
     """The frames of a folder by number; none of a run that has a summary and no frames, where that may be."""
     try:
         return listed(folder)
     except InputError:
-        if seen or read_summary(folder) is None:
+        if with_frames or read_summary(folder) is None:
             raise
         return {}
 
 
-def of_solution(solution, seen=True):
+def of_solution(solution, with_frames=True):
     """The record of a `refweb.results.solution.SolutionData`, of its folder where it holds no frames in memory."""
     summary = solution.summary()
     states = {number: (state, None) for number, state in solution.frames}
     if summary.get("kind") == "modes" and solution.table is not None and solution.spectra:
         states = {number: (solution.state, shape) for number, shape in enumerate(solution.shapes, start=1)}
     if not states and solution.path is not None:
-        return of_folder(solution.path, seen)
+        return of_folder(solution.path, with_frames)
     from ..results.vtu import meshes
 
     def frame(number):
@@ -233,10 +233,12 @@ def _table(folder):
     try:
         with open(path, encoding="utf-8") as lines:
             columns = lines.readline().rstrip("\n").split(",")
-            whole = (line for line in lines if line.endswith("\n"))  # a run that is alive may be writing the last
+            complete_lines = (
+                line for line in lines if line.endswith("\n")
+            )  # a run that is alive may be writing the last
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", UserWarning)  # that there are no rows
-                rows = np.loadtxt(whole, delimiter=",", ndmin=2)
+                rows = np.loadtxt(complete_lines, delimiter=",", ndmin=2)
         return columns, as_history(columns, rows)
     except (OSError, ValueError) as error:
         raise InputError(f"{short(str(path))}: cannot be read: {error}") from None

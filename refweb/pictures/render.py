@@ -79,12 +79,12 @@ def images(models, views, sizes):
         RGB, shape (height, width, 3), uint8, of each view of each model; None where OpenGL is not to be had.
     """
     with Renderer(views, sizes) as renderer:
-        found = []
+        drawn_images = []
         for model in models:
-            found.append(renderer.images(model))
-            if found[-1] is None:
+            drawn_images.append(renderer.images(model))
+            if drawn_images[-1] is None:
                 return None
-    return found
+    return drawn_images
 
 
 class Renderer:
@@ -143,8 +143,8 @@ class Renderer:
         limit = threading.Timer(seconds, self._child.kill)
         limit.start()
         try:
-            for one in sent:
-                pickle.dump(one, self._child.stdin, protocol=5)
+            for item in sent:
+                pickle.dump(item, self._child.stdin, protocol=5)
             self._child.stdin.flush()
             return pickle.load(self._child.stdout)
         finally:

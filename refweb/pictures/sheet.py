@@ -35,8 +35,8 @@ class Ink(NamedTuple):
     @classmethod
     def of(cls, number):
         """Style of a number from 0 on: beyond the colours, these with another style and marker."""
-        again, own = divmod(number, len(COLOURS))
-        return cls(COLOURS[own], STYLES[(own + again) % len(STYLES)], MARKERS[(own + again) % len(MARKERS)])
+        again, colour = divmod(number, len(COLOURS))
+        return cls(COLOURS[colour], STYLES[(colour + again) % len(STYLES)], MARKERS[(colour + again) % len(MARKERS)])
 
 
 class Panel(NamedTuple):
@@ -65,8 +65,8 @@ def sheet(panels, title, notes=()):
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    notes = dict.fromkeys(filter(None, [*(note for panel in panels for note in panel.notes), *notes]))
-    words, below = textwrap.wrap(title, 48), [line for note in notes for line in textwrap.wrap(note, 84)]
+    notes = dict.fromkeys(filter(None, [*(remark for panel in panels for remark in panel.notes), *notes]))
+    words, below = textwrap.wrap(title, 48), [line for remark in notes for line in textwrap.wrap(remark, 84)]
     heights = [panel.height for panel in panels]
     size = (WIDTH, sum(heights) + 0.25 * len(words) + 0.2 * len(below) + 0.5)
     figure = Figure(figsize=size, dpi=RESOLUTION, layout=ConstrainedLayoutEngine(h_pad=0.06, w_pad=0.06))
@@ -83,11 +83,11 @@ def sheet(panels, title, notes=()):
         axes.set_xlabel(panel.along, size=LETTERS, color=DARK)
         panel.draw(axes)
         true_ticks(axes)
-    look = {"x": 0.02, "ha": "left", "parse_math": False}
+    style = {"x": 0.02, "ha": "left", "parse_math": False}
     if words:
-        figure.suptitle("\n".join(words), size=LETTERS + 2, weight="bold", color=DARK, **look)
+        figure.suptitle("\n".join(words), size=LETTERS + 2, weight="bold", color=DARK, **style)
     if below:
-        figure.supxlabel("\n".join(below), size=LETTERS - 1, color=DARK, **look)
+        figure.supxlabel("\n".join(below), size=LETTERS - 1, color=DARK, **style)
     return figure
 
 
@@ -110,10 +110,16 @@ def legend(axes, entries, columns=1):
     """Name what is drawn above the axes, where it covers nothing; ``entries`` are (handle, words)."""
     if entries:
         handles, words = zip(*entries, strict=True)
-        look = {"frameon": False, "borderaxespad": 0.1, "handlelength": 2.2, "columnspacing": 1.2, "labelspacing": 0.25}
-        place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns, "fontsize": LETTERS - 1}
+        style = {
+            "frameon": False,
+            "borderaxespad": 0.1,
+            "handlelength": 2.2,
+            "columnspacing": 1.2,
+            "labelspacing": 0.25,
+        }
+        position = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns, "fontsize": LETTERS - 1}
         words = ["\n ".join([""] + textwrap.wrap(text, 58 // columns))[1:] for text in words]
-        drawn = axes.legend(handles, words, **place, **look)
+        drawn = axes.legend(handles, words, **position, **style)
         for text in drawn.get_texts():
             text.set(parse_math=False, color=DARK)
 
@@ -128,21 +134,21 @@ def dot(rows):
     return "." if len(rows) == 1 else ""
 
 
-def telling(*columns, most=MOST):
-    """Numbers of the rows that a drawing of long columns needs: extremes of each column in each of ``most`` parts.
+def telling(*columns, limit=MOST):
+    """Numbers of the rows that a drawing of long columns needs: extremes of each column in each of ``limit`` parts.
 
     All rows of columns that are short; the first and the last row in any case.
     """
     rows = len(columns[0])
-    if rows <= 4 * most:
+    if rows <= 4 * limit:
         return np.arange(rows)
-    size = -(-rows // most)
-    found = [np.array([0, rows - 1])]
+    size = -(-rows // limit)
+    indices = [np.array([0, rows - 1])]
     for column in columns:
         padded = np.full(size * -(-rows // size), np.nan)
         padded[:rows] = column
         parts = padded.reshape(-1, size)
         begin = size * np.arange(len(parts))
-        for least in (np.where(np.isnan(parts), np.inf, parts), np.where(np.isnan(parts), np.inf, -parts)):
-            found.append(begin + least.argmin(axis=1))
-    return np.unique(np.minimum(np.concatenate(found), rows - 1))
+        for values in (np.where(np.isnan(parts), np.inf, parts), np.where(np.isnan(parts), np.inf, -parts)):
+            indices.append(begin + values.argmin(axis=1))
+    return np.unique(np.minimum(np.concatenate(indices), rows - 1))

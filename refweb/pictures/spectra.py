@@ -96,24 +96,24 @@ def _stands_out(amplitude, number):
     return True
 
 
-def spectrum(shown, name):
+def spectrum(runs, name):
     """The panel of the spectrum of a column of the history."""
-    having = [s for s in shown if name in s.units]
-    found = [spectrum_of(s.along, s.history[name], name) for s in having]
-    factor, called = unit_of(having[0].units[name], *(one.amplitude for one in found))
-    cycle, hertz = scale_of(max(float(one.frequency[-1]) for one in found), "Hz")
+    having = [s for s in runs if name in s.units]
+    spectra = [spectrum_of(s.along, s.history[name], name) for s in having]
+    factor, called = unit_of(having[0].units[name], *(item.amplitude for item in spectra))
+    cycle, hertz = scale_of(max(float(item.frequency[-1]) for item in spectra), "Hz")
 
     def draw(axes):
         entries = []
-        largest = max(float(one.amplitude.max()) for one in found) / factor
-        for s, one in zip(having, found, strict=True):
+        largest = max(float(item.amplitude.max()) for item in spectra) / factor
+        for s, item in zip(having, spectra, strict=True):
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
-            keep = telling(one.amplitude)
-            (line,) = axes.plot(one.frequency[keep] / cycle, one.amplitude[keep] / factor, **style)
-            if one.peak is not None:
-                look = {"color": s.ink.colour, "marker": "v", "markeredgecolor": DARK, "markersize": 8}
-                axes.plot(one.frequency[one.peak] / cycle, one.amplitude[one.peak] / factor, **look)
-            entries.append((line, s.said(_peak(one, s.units[name]))))
+            mask = telling(item.amplitude)
+            (line,) = axes.plot(item.frequency[mask] / cycle, item.amplitude[mask] / factor, **style)
+            if item.peak is not None:
+                point_style = {"color": s.ink.colour, "marker": "v", "markeredgecolor": DARK, "markersize": 8}
+                axes.plot(item.frequency[item.peak] / cycle, item.amplitude[item.peak] / factor, **point_style)
+            entries.append((line, s.said(_peak(item, s.units[name]))))
         if largest > 0.0:
             axes.set_yscale("log")
             axes.set_ylim(10.0**-DECADES * largest, 2.0 * largest)
@@ -121,23 +121,23 @@ def spectrum(shown, name):
         label(axes, f"amplitude of {name}", called)
         legend(axes, entries)
 
-    finest = max(one.resolution for one in found)
-    note = f"Frequencies that are {finest:.2g} Hz apart are told apart, by a Hann window on the mean."
-    return [Panel(draw, f"frequency [{hertz}]", 3.0, (note,))]
+    finest = max(item.resolution for item in spectra)
+    remark = f"Frequencies that are {finest:.2g} Hz apart are told apart, by a Hann window on the mean."
+    return [Panel(draw, f"frequency [{hertz}]", 3.0, (remark,))]
 
 
-def _peak(one, unit):
+def _peak(spectrum_, unit):
     """The peak of a spectrum in words, and where it is highest if that is elsewhere."""
-    if one.peak is None:
+    if spectrum_.peak is None:
         return "no peak stands out"
-    error = 0.5 * one.resolution
-    words = f"highest peak that stands out at {_near(one, one.peak, unit, error)}"
-    top = int(one.amplitude.argmax())
-    return words if top == one.peak else f"{words}; most of all at {_near(one, top, unit, error)}"
+    error = 0.5 * spectrum_.resolution
+    words = f"highest peak that stands out at {_near(spectrum_, spectrum_.peak, unit, error)}"
+    top = int(spectrum_.amplitude.argmax())
+    return words if top == spectrum_.peak else f"{words}; most of all at {_near(spectrum_, top, unit, error)}"
 
 
-def _near(one, number, unit, error):
+def _near(spectrum_, number, unit, error):
     """A frequency with ± and its amplitude, in words."""
-    height = float(one.amplitude[number])
+    height = float(spectrum_.amplitude[number])
     factor, name = scale_of(height, unit)
-    return f"{with_error(float(one.frequency[number]), error)} Hz: {height / factor:.3g} {name}".rstrip()
+    return f"{with_error(float(spectrum_.frequency[number]), error)} Hz: {height / factor:.3g} {name}".rstrip()

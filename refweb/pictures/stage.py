@@ -87,15 +87,15 @@ class Seen(NamedTuple):
         grey = _grey(frame, field)
         values = frame.fields[field][~grey]
         values = values[np.isfinite(values)]
-        least, most = (float(values.min()), float(values.max())) if len(values) else (np.inf, -np.inf)
+        lower, upper = (float(values.min()), float(values.max())) if len(values) else (np.inf, -np.inf)
         bodies = {name: body.points for name, body in frame.bodies.items()}
         moved = float(np.abs(frame.paths - frame.origin).max())
         slack = bool(frame.slack.any() if field == "slack" else (grey & ~frame.broken).any())
         points = frame.paths.reshape(-1, 3)
         if len(points) > MANY and frame.paths.shape[1] == 2:  # each node once, not with every line that ends there
-            place = np.zeros(frame.ends.max() + 1, dtype=int)
-            place[frame.ends.ravel()] = np.arange(len(points))
-            points = points[place]
+            index = np.zeros(frame.ends.max() + 1, dtype=int)
+            index[frame.ends.ravel()] = np.arange(len(points))
+            points = points[index]
         return cls(
             points,
             frame.supports,
@@ -105,8 +105,8 @@ class Seen(NamedTuple):
             frame.tree,
             slack,
             bool(frame.broken.any()),
-            least,
-            most,
+            lower,
+            upper,
         )
 
     def spanned(self):
@@ -114,21 +114,21 @@ class Seen(NamedTuple):
         bodies = {name: outermost(points) for name, points in self.bodies.items()}
         return self._replace(points=outermost(self.points), supports=outermost(self.supports), bodies=bodies)
 
-    def joined(self, other):
+    def joined(self, second):
         """Limits of both together."""
         bodies = {
-            name: np.concatenate([*(seen.bodies[name] for seen in (self, other) if name in seen.bodies)])
-            for name in {**self.bodies, **other.bodies}
+            name: np.concatenate([*(limits.bodies[name] for limits in (self, second) if name in limits.bodies)])
+            for name in {**self.bodies, **second.bodies}
         }
         return self._replace(
-            points=np.concatenate([self.points, other.points]),
-            supports=np.concatenate([self.supports, other.supports]),
+            points=np.concatenate([self.points, second.points]),
+            supports=np.concatenate([self.supports, second.supports]),
             bodies=bodies,
-            moved=max(self.moved, other.moved),
-            slack=self.slack or other.slack,
-            broken=self.broken or other.broken,
-            least=min(self.least, other.least),
-            most=max(self.most, other.most),
+            moved=max(self.moved, second.moved),
+            slack=self.slack or second.slack,
+            broken=self.broken or second.broken,
+            least=min(self.least, second.least),
+            most=max(self.most, second.most),
         )
 
 
@@ -150,18 +150,18 @@ class Stage:
     seen: Seen
 
     @classmethod
-    def of(cls, seen, look, aspect):
+    def of(cls, limits, options, aspect):
         """The stage that shows what has been seen, on a page of this width/height."""
-        solid = np.concatenate([np.zeros((0, 3)), *seen.bodies.values()])
-        origin = seen.origin
+        solid = np.concatenate([np.zeros((0, 3)), *limits.bodies.values()])
+        origin = limits.origin
         some = origin[:: 1 + len(origin) // MANY].reshape(-1, 3)
-        chosen = choose(some, seen.points, solid, seen.moved, seen.tree, aspect, look.view)
-        extent = np.linalg.norm(np.ptp(seen.points, axis=0))
+        chosen = choose(some, limits.points, solid, limits.moved, limits.tree, aspect, options.view)
+        extent = np.linalg.norm(np.ptp(limits.points, axis=0))
         length = np.median(np.linalg.norm(np.diff(origin, axis=1), axis=2).sum(axis=1))
         thinnest = 0.0018 if len(chosen[0]) == 1 else 0.0008
         radius = np.clip(0.06 * length, thinnest * extent, 0.0025 * extent)
-        origin = origin if seen.moved > 0 else origin[:0]
-        return cls(look, *chosen, radius, origin, seen.points.mean(axis=0), seen)
+        origin = origin if limits.moved > 0 else origin[:0]
+        return cls(options, *chosen, radius, origin, limits.points.mean(axis=0), limits)
 
     @property
     def beneath(self):
@@ -230,8 +230,8 @@ class Stage:
         for i, (name, points) in enumerate(self.seen.bodies.items()):
             if self._seen_in(self.views, points):
                 marks.append(Line2D([], [], color=BODIES[i % len(BODIES)], marker="o", ls="", ms=13, label=_cut(name)))
-        look = {"frameon": False, "fontsize": 13, "labelcolor": DARK, "handlelength": 1.6}
-        figure.legend(handles=marks, loc="upper left", bbox_to_anchor=(0.876, 0.32), **look)
+        style = {"frameon": False, "fontsize": 13, "labelcolor": DARK, "handlelength": 1.6}
+        figure.legend(handles=marks, loc="upper left", bbox_to_anchor=(0.876, 0.32), **style)
 
     @staticmethod
     def _seen_in(views, points):
@@ -283,8 +283,8 @@ def _marked(lines, extent, width, height):
     return image
 
 
-def _cut(name, most=14):
-    return name if len(name) <= most else name[: most - 1] + "…"
+def _cut(name, limit=14):
+    return name if len(name) <= limit else name[: limit - 1] + "…"
 
 
 def _grey(frame, field):
@@ -298,8 +298,8 @@ def _triad(axes, view, corner, length):
         start, end, tip = view.project(np.array([corner, corner + arm, corner + 1.2 * arm]))[0]
         axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": DARK, "lw": 1.4, "shrinkA": 0})
         axes.text(*tip, name, size=14, color=DARK, ha="center", va="center")
-    place, _, scale = view.project(corner)
-    axes.text(*(place - [0, 0.6 * length * scale]), f"each {length:g} m", size=12, color=DARK, va="top")
+    position, _, scale = view.project(corner)
+    axes.text(*(position - [0, 0.6 * length * scale]), f"each {length:g} m", size=12, color=DARK, va="top")
 
 
 def colour_map():

@@ -48,17 +48,17 @@ class Rows(NamedTuple):
     @property
     def groups(self):
         """(Words, rows) of each combination of what is no number."""
-        named = [path for path, one in self.summary["study"]["parameters"].items() if _is_named(one)]
-        found = {}
+        named = [path for path, values in self.summary["study"]["parameters"].items() if _is_named(values)]
+        groups_found = {}
         for row in self.rows:
             words = ", ".join(f"{path.rpartition('.')[2]} = {_word(row[path])}" for path in named)
-            found.setdefault(words, []).append(row)
-        return list(found.items())
+            groups_found.setdefault(words, []).append(row)
+        return list(groups_found.items())
 
 
-def _is_named(one):
+def _is_named(values):
     """Tell if a parameter is a list of several items that are no numbers."""
-    return isinstance(one, list) and len(one) > 1 and not all(isinstance(v, int | float) for v in one)
+    return isinstance(values, list) and len(values) > 1 and not all(isinstance(v, int | float) for v in values)
 
 
 def _word(value):
@@ -93,7 +93,7 @@ def draw(study, result):
     column = f"{result.name} [{result.unit}]"
     values = [row[column] for row in study.rows if row.get(column) is not None]
     factor, unit = scale_of(max(map(abs, values), default=1.0), result.unit)
-    paths = [path for path, one in study.summary["study"]["parameters"].items() if _is_number(one)]
+    paths = [path for path, value_list in study.summary["study"]["parameters"].items() if _is_number(value_list)]
     panels = [_over(study, result, column, path, factor, unit) for path in paths[:MOST_PANELS]]
     if study.summary["study"]["sample"] not in ("grid", "zip") or not panels:
         panels.append(_shares(study, result, column, factor, unit))
@@ -102,9 +102,9 @@ def draw(study, result):
     return sheet(panels, f"{study.summary['title']}: {result.name}"[:200], notes)
 
 
-def _is_number(one):
+def _is_number(values):
     """Tell if a parameter is several numbers."""
-    return isinstance(one, dict) or (len(one) > 1 and all(isinstance(v, int | float) for v in one))
+    return isinstance(values, dict) or (len(values) > 1 and all(isinstance(v, int | float) for v in values))
 
 
 def _inked(study):
@@ -120,11 +120,11 @@ def _over(study, result, column, path, factor, unit):
     def plot(axes):
         entries = []
         for words, rows, ink in _inked(study):
-            there = [row for row in rows if row.get(column) is not None and isinstance(row[path], int | float)]
-            x, y = ([row[name] for row in there] for name in (path, column))
-            error = np.array([row.get(f"{result.name} ±") or 0.0 for row in there]) / factor
-            look = {"color": ink.colour, "markersize": 4.0, "elinewidth": 1.0, "capsize": 2.0}
-            drawn = axes.errorbar(x, np.array(y) / factor, error, fmt=ink.marker, linestyle="none", **look)
+            valid = [row for row in rows if row.get(column) is not None and isinstance(row[path], int | float)]
+            x, y = ([row[name] for row in valid] for name in (path, column))
+            error = np.array([row.get(f"{result.name} ±") or 0.0 for row in valid]) / factor
+            style = {"color": ink.colour, "markersize": 4.0, "elinewidth": 1.0, "capsize": 2.0}
+            drawn = axes.errorbar(x, np.array(y) / factor, error, fmt=ink.marker, linestyle="none", **style)
             entries += [(drawn, words)] if words else []
         if ratio:
             axes.set_xscale("log")
@@ -139,9 +139,9 @@ def _shares(study, result, column, factor, unit):
 
     def plot(axes):
         for _, rows, ink in _inked(study):
-            there = [row for row in rows if row.get(column) is not None]
-            y = np.array([row[column] for row in there]) / factor
-            error = np.array([row.get(f"{result.name} ±") or 0.0 for row in there]) / factor
+            valid = [row for row in rows if row.get(column) is not None]
+            y = np.array([row[column] for row in valid]) / factor
+            error = np.array([row.get(f"{result.name} ±") or 0.0 for row in valid]) / factor
             steps = np.arange(1, len(y) + 1) / max(len(y), 1)
             axes.step(np.sort(y), steps, where="post", color=ink.colour, linestyle=ink.style)
             axes.fill_betweenx(steps, np.sort(y - error), np.sort(y + error), color=ink.colour, alpha=0.2, step="pre")
@@ -156,9 +156,9 @@ def _shares(study, result, column, factor, unit):
 
 def _limit(text, name):
     """The number that a condition compares a result with, where it does no more."""
-    found = re.fullmatch(rf"\s*{re.escape(name)}\s*[<>]=?\s*([-+\d.eE]+)\s*", text)
+    match = re.fullmatch(rf"\s*{re.escape(name)}\s*[<>]=?\s*([-+\d.eE]+)\s*", text)
     try:
-        value = float(found[1]) if found else math.nan
+        value = float(match[1]) if match else math.nan
     except ValueError:
         return None
     return value if math.isfinite(value) else None

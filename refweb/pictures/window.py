@@ -64,14 +64,14 @@ def prepared(record, field=None, off_screen=False):
     plotter.background_color = "white"
     plotter.add_axes(color=DARK)
 
-    def show(place):
-        number = numbers[int(np.clip(round(place), 0, len(numbers) - 1))]
+    def show(frame_number):
+        number = numbers[int(np.clip(round(frame_number), 0, len(numbers) - 1))]
         try:
-            found = record.frame(number)
+            frame = record.frame(number)
         except InputError as error:
             plotter.add_text(str(error)[:120], name="clock", position="lower_left", font_size=12, color=DARK)
             return
-        _draw(plotter, found, stage)
+        _draw(plotter, frame, stage)
         plotter.add_text(record.clock(number), name="clock", position="lower_left", font_size=12, color=DARK)
 
     show(numbers.index(first))
@@ -104,8 +104,8 @@ def _draw(plotter, frame, stage):
             continue
         tubes = _tubes(frame.paths[chosen], values[chosen], share * stage.radius)
         plain = {"slack": SLACK, "broken": BROKEN}
-        look = {"color": plain[part]} if part in plain else {"scalars": "value", **colours}
-        actor = plotter.add_mesh(tubes, name=part, reset_camera=False, **look, **MATTER)
+        style = {"color": plain[part]} if part in plain else {"scalars": "value", **colours}
+        actor = plotter.add_mesh(tubes, name=part, reset_camera=False, **style, **MATTER)
         if part == "lines" and name not in plotter.scalar_bars:
             plotter.add_scalar_bar(name, mapper=actor.mapper, color=DARK, vertical=True, fmt="%.3g", n_labels=5)
     if len(frame.supports):
@@ -142,7 +142,7 @@ def _surface(plotter, name, mesh, colour):
 
 def _aim(plotter, stage):
     """The first view of the stage, above the slider."""
-    given, camera = camera_of(stage, SIZE, room=1.3), plotter.camera
+    given, camera = camera_of(stage, SIZE, margin=1.3), plotter.camera
     camera.position, camera.focal_point, camera.up = given["eye"], given["focus"], given["up"]
     camera.parallel_projection = given["angle"] is None
     if given["angle"] is None:

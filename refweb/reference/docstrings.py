@@ -9,17 +9,17 @@ import textwrap
 
 def sections(documented):
     """Lines of the sections of a docstring by title; what stands before the first one has the title ""."""
-    lines, found = (inspect.getdoc(documented) or "").splitlines(), {"": []}
+    lines, parts = (inspect.getdoc(documented) or "").splitlines(), {"": []}
     title, skipped = "", 0
     for line, below in zip(lines, [*lines[1:], ""], strict=True):
         if skipped:
             skipped -= 1
         elif line and re.fullmatch("-{3,}", below):
             title, skipped = line, 1
-            found[title] = []
+            parts[title] = []
         else:
-            found[title].append(line)
-    return found
+            parts[title].append(line)
+    return parts
 
 
 def plain(text):
@@ -31,7 +31,7 @@ def paragraphs(lines):
     """Paragraphs as one line each; tables and what is indented stay as they are."""
     blocks = [block for block in re.split(r"\n\s*\n", "\n".join(lines)) if block.strip()]
     kept = [bool(re.search(r"(?m)^( {2,}|=+ +=)", block)) for block in blocks]
-    return [plain(block if keep else " ".join(block.split())) for block, keep in zip(blocks, kept, strict=True)]
+    return [plain(block if verbatim else " ".join(block.split())) for block, verbatim in zip(blocks, kept, strict=True)]
 
 
 def summary(documented):
@@ -41,20 +41,20 @@ def summary(documented):
 
 def prose(documented):
     """Paragraphs behind the first one, and those of its notes."""
-    found = sections(documented)
-    return [*paragraphs(found[""])[1:], *paragraphs(found.get("Notes", []))]
+    parts = sections(documented)
+    return [*paragraphs(parts[""])[1:], *paragraphs(parts.get("Notes", []))]
 
 
 def parameters(documented):
     """Descriptions of parameters, by name."""
-    found, names = {}, []
+    descriptions, names = {}, []
     for line in sections(documented).get("Parameters", []):
         if line and not line.startswith(" "):
             names = [name.strip() for name in line.partition(" : ")[0].split(",")]
-            found |= dict.fromkeys(names, "")
+            descriptions |= dict.fromkeys(names, "")
         else:
-            found |= {name: f"{found[name]} {line.strip()}".strip() for name in names}
-    return {name: plain(text) for name, text in found.items()}
+            descriptions |= {name: f"{descriptions[name]} {line.strip()}".strip() for name in names}
+    return {name: plain(text) for name, text in descriptions.items()}
 
 
 def refusals(documented):

@@ -100,16 +100,21 @@ def pages_of(name):
     table = "scene" if table in (f.name for f in dataclasses.fields(Head)) else table
     head = table.partition(".")[0]
     if head not in known:
-        owners = [page.name for one in known for page in pages_of(one) if head in (key.name for key in page.keys)]
+        owners = [
+            page.name
+            for table_name in known
+            for page in pages_of(table_name)
+            if head in (key.name for key in page.keys)
+        ]
         hint = f"it is a key of {', '.join(owners)}" if owners else nearest(head, known)
         raise InputError(f"help {name}: there is no such table, {hint}")
-    found = list(_PAGES.get(head, _part)(head))
+    pages = list(_PAGES.get(head, _part)(head))
     if table == head:
-        return found
-    kinds = [page.name for page in found]
+        return pages
+    kinds = [page.name for page in pages]
     if table not in kinds:
         raise InputError(f"help {name}: there is no such table, {nearest(table, [head, *kinds])}")
-    return [page for page in found if page.name == table]
+    return [page for page in pages if page.name == table]
 
 
 def line_of(name):
@@ -165,44 +170,48 @@ def takes(schema):
     if kind in ("number", "integer"):
         return ("number" if kind == "number" else "whole number") + _bounds(schema)
     if kind == "array":
-        item, most = schema["items"], schema.get("maxItems")
-        one = takes(item)
-        if one.endswith(" numbers"):
-            return f"rows of {one}"
-        return f"{most} {one}s" if most else f"[{one}, ...]"
+        item, maximum = schema["items"], schema.get("maxItems")
+        item_text = takes(item)
+        if item_text.endswith(" numbers"):
+            return f"rows of {item_text}"
+        return f"{maximum} {item_text}s" if maximum else f"[{item_text}, ...]"
     if kind == "object":
-        own = schema["additionalProperties"]
-        if own is True:
+        value_schema = schema["additionalProperties"]
+        if value_schema is True:
             return "{" + ", ".join([*schema["properties"], "..."]) + "}"
-        return "tables by name" if "properties" in own else f"{{name = {takes(own)}}}"
+        return "tables by name" if "properties" in value_schema else f"{{name = {takes(value_schema)}}}"
     return {"boolean": "true, false", "string": "text"}.get(kind, "value")
 
 
 def _bounds(schema):
     """Bounds of a number in words."""
-    least, most = schema.get("minimum"), schema.get("maximum")
-    least = None if least is None or least <= -LARGE else least
-    most = None if most is None or most >= LARGE else most
+    lower, upper = schema.get("minimum"), schema.get("maximum")
+    lower = None if lower is None or lower <= -LARGE else lower
+    upper = None if upper is None or upper >= LARGE else upper
     above, below = schema.get("exclusiveMinimum"), schema.get("exclusiveMaximum")
-    if None not in (least, most) and not above and not below:
-        return f", {_toml(least)} … {_toml(most)}"
-    parts = [] if least is None else [f"{'>' if above else '≥'} {_toml(least)}"]
-    parts += [] if most is None else [f"{'<' if below else '≤'} {_toml(most)}"]
+    if None not in (lower, upper) and not above and not below:
+        return f", {_toml(lower)} … {_toml(upper)}"
+    parts = [] if lower is None else [f"{'>' if above else '≥'} {_toml(lower)}"]
+    parts += [] if upper is None else [f"{'<' if below else '≤'} {_toml(upper)}"]
     return (" " + ", ".join(parts)) if parts else ""
 
 
 def _inner(name, kind):
     """Pages of the tables by name inside a table."""
     for f in dataclasses.fields(kind):
-        own = getattr(f.metadata["read"], "accepts", None)
-        inner = own.get("additionalProperties") if isinstance(own, dict) else None
+        schema_of = getattr(f.metadata["read"], "accepts", None)
+        inner = schema_of.get("additionalProperties") if isinstance(schema_of, dict) else None
         if isinstance(inner, type):
             yield _page(f"{name}.{f.name}", f"[{name}.{f.name}.NAME]", inner, like=kind)
 
 
 def _scene(name):
     example = 'schema = 1\ntitle = "Net with a weight"\nseed = 7'
-    rows = [[f"`{header_of(one)}`", line_of(one)] for one in names() if one not in ("scene", "study")]
+    rows = [
+        [f"`{header_of(table_name)}`", line_of(table_name)]
+        for table_name in names()
+        if table_name not in ("scene", "study")
+    ]
     yield _page("scene", header_of("scene"), Head, example=example, listing=Listing(("table", "what it is"), rows))
 
 
@@ -241,7 +250,10 @@ def _observe(name):
 
 def _solve(name):
     yield _page("solve.static", '[solve] kind = "static"', load(SOLVES["static"]), without=["kind"])
-    rows = [[f'`"{method}"`', ", ".join(f"`{key}`" for key in own.keys)] for method, own in INTEGRATORS.items()]
+    rows = [
+        [f'`"{method}"`', ", ".join(f"`{key}`" for key in integrator.keys)]
+        for method, integrator in INTEGRATORS.items()
+    ]
     rows.append(['`"auto"`', ""])
     more = {"without": ["kind"], "listing": Listing(("method", "keys that it has alone"), rows)}
     yield _page("solve.dynamic", '[solve] kind = "dynamic"', load(SOLVES["dynamic"]), **more)

@@ -85,9 +85,9 @@ def _keys(path):
     """The keys of a path, as TOML reads them."""
     keys = []
     try:
-        here = tomllib.loads(f"{path} = 0") if len(str(path)) <= LONGEST else None
-        while isinstance(here, dict):
-            ((key, here),) = here.items()
+        table = tomllib.loads(f"{path} = 0") if len(str(path)) <= LONGEST else None
+        while isinstance(table, dict):
+            ((key, table),) = table.items()
             keys.append(key)
     except (ValueError, RecursionError):
         keys = []
@@ -97,38 +97,38 @@ def _keys(path):
     return keys
 
 
-def _put(here, keys, above, value) -> Any:
-    """Value ``here``, below the keys ``above``, with a value put at ``keys``; None where nothing stands here."""
+def _put(value_here, keys, above, value) -> Any:
+    """Value ``value_here``, below the keys ``above``, with a value put at ``keys``; None where nothing stands here."""
     if not keys:
         return value
     key, rest = keys[0], keys[1:]
     at = (*above, key)
-    if here is None and key == "0" and len(above) == 1:
+    if value_here is None and key == "0" and len(above) == 1:
         return [_put(None, rest, at, value)]
-    if here is None or isinstance(here, dict):
-        here = here or {}
-        return {**here, key: _put(here.get(key), rest, at, value)}
-    if isinstance(here, (list, tuple)):
-        number, changed = _number(here, key, at), list(here)
-        changed[number : number + 1] = [_put(here[number] if number < len(here) else None, rest, at, value)]
+    if value_here is None or isinstance(value_here, dict):
+        value_here = value_here or {}
+        return {**value_here, key: _put(value_here.get(key), rest, at, value)}
+    if isinstance(value_here, (list, tuple)):
+        number, changed = _number(value_here, key, at), list(value_here)
+        changed[number : number + 1] = [_put(value_here[number] if number < len(value_here) else None, rest, at, value)]
         return changed
-    raise InputError(f"{short('.'.join(above))} = {shown(here)} has no keys")
+    raise InputError(f"{short('.'.join(above))} = {shown(value_here)} has no keys")
 
 
 def _number(entries, key, at):
     """Number of an entry of a list, by number or by name; one more than there are adds a table."""
-    place, last = short(".".join(at[:-1])), len(entries) - 1
+    parent, last = short(".".join(at[:-1])), len(entries) - 1
     if not entries:
-        raise InputError(f"{place} = [] is empty, give it whole")
-    tables = any(isinstance(one, dict) for one in entries)
+        raise InputError(f"{parent} = [] is empty, give it whole")
+    tables = any(isinstance(entry, dict) for entry in entries)
     if key.isascii() and key.isdecimal():
         if len(key) < 10 and int(key) <= last + tables:
             return int(key)
         adds = f"; {last + 1} adds one" if tables else ""
-        raise InputError(f"{place}.{short(key)}: the number must be 0 … {last}{adds}")
-    names = [one.get("name") if isinstance(one, dict) else None for one in entries]
+        raise InputError(f"{parent}.{short(key)}: the number must be 0 … {last}{adds}")
+    names = [entry.get("name") if isinstance(entry, dict) else None for entry in entries]
     if key in names:
         return names.index(key)
     known = [name for name in names if isinstance(name, str)]
     hint = f" or its name, {nearest(key, known)}" if known else ""
-    raise InputError(f"{place} is a list: {shown(key)} must be a number, 0 … {last},{hint}".removesuffix(","))
+    raise InputError(f"{parent} is a list: {shown(key)} must be a number, 0 … {last},{hint}".removesuffix(","))

@@ -21,8 +21,8 @@ def schema():
     tables |= {key: _list(_table(load(reference))) for key, reference in LISTS.items()}
     for key, reference in EFFECTS.items():
         kind = load(reference)
-        own = _bodies(kind) if key == "body" else _table(kind)
-        tables[key] = _list(own) if kind.several else own
+        properties_of = _bodies(kind) if key == "body" else _table(kind)
+        tables[key] = _list(properties_of) if kind.several else properties_of
     return {
         "$schema": DRAFT,
         "title": "A scene of refweb",
@@ -73,12 +73,12 @@ def _table(kind, *more, fixed=None, without=(), optional=(), like=None) -> dict:
         for f in dataclasses.fields(owner):
             if f.name in without or (f.name in properties and f.name in fixed):
                 continue
-            own = {"enum": [fixed[f.name]]} if f.name in fixed else accepted(f, kind)
-            properties[key_of(f)] = {**own, **_described(f, said.get(key_of(f), ""))}
+            property_ = {"enum": [fixed[f.name]]} if f.name in fixed else accepted(f, kind)
+            properties[key_of(f)] = {**property_, **_described(f, said.get(key_of(f), ""))}
             if f.default is MISSING and f.default_factory is MISSING and f.name not in fixed:
                 required.append(key_of(f))
-    found = {"type": "object", "description": summary(kind), "properties": properties}
-    return found | ({"required": required} if required else {}) | {"additionalProperties": False}
+    schema_found = {"type": "object", "description": summary(kind), "properties": properties}
+    return schema_found | ({"required": required} if required else {}) | {"additionalProperties": False}
 
 
 def _described(f, text):
@@ -86,12 +86,12 @@ def _described(f, text):
     unit = f.metadata["unit"]
     text += f" [{unit}]" if unit and f"[{unit}]" not in text else ""
     default = f.default.to_dict() if isinstance(f.default, Table) else f.default
-    told = {"description": text.strip()} if text.strip() else {}
-    return told | ({} if default is MISSING or default is None else {"default": _listed(default)})
+    entry = {"description": text.strip()} if text.strip() else {}
+    return entry | ({} if default is MISSING or default is None else {"default": _listed(default)})
 
 
 def _listed(value):
-    return [_listed(one) for one in value] if isinstance(value, tuple) else value
+    return [_listed(item) for item in value] if isinstance(value, tuple) else value
 
 
 def _list(table):
@@ -114,11 +114,11 @@ def _solves():
     kinds = {kind: load(reference) for kind, reference in SOLVES.items()}
     default = next(f.default for f in dataclasses.fields(kinds["dynamic"]) if f.name == "method")
     keys = {name: method.keys for name, method in INTEGRATORS.items()} | {"auto": ()}
-    every = {key for own in keys.values() for key in own}
+    every = {key for keys_of in keys.values() for key in keys_of}
     forms = [_table(kinds["static"], fixed={"kind": "static"})]
-    for method, own in keys.items():
+    for method, keys_of in keys.items():
         fixed, optional = {"kind": "dynamic", "method": method}, ["method"] if method == default else []
-        forms.append(_table(kinds["dynamic"], fixed=fixed, optional=optional, without=every - set(own)))
+        forms.append(_table(kinds["dynamic"], fixed=fixed, optional=optional, without=every - set(keys_of)))
     return {"oneOf": forms}
 
 

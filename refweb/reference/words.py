@@ -39,10 +39,10 @@ def _text(page, width):
     parts += [text if "\n" in text else wrapped(text, "  ") for text in page.prose]
     keys = []
     for key in page.keys:
-        told = key.takes + (f" [{key.unit}]" if key.unit else "")
-        told += {"": "", "required": "; required"}.get(key.default, f"; default {key.default}")
+        type_text = key.takes + (f" [{key.unit}]" if key.unit else "")
+        type_text += {"": "", "required": "; required"}.get(key.default, f"; default {key.default}")
         keys.append(f"    {key.name}")
-        keys += [wrapped(text, "        ") for text in (told, key.meaning) if text]
+        keys += [wrapped(text, "        ") for text in (type_text, key.meaning) if text]
     parts.append("\n".join(keys))
     if page.listing is not None:
         rows = [[cell.replace("`", "") for cell in row] for row in (page.listing.columns, *page.listing.rows)]
@@ -60,11 +60,11 @@ def as_markdown():
     """The whole reference."""
     parts = ["# Reference of scene files", *RULES]
     for name in names():
-        found = pages_of(name)
+        pages = pages_of(name)
         parts.append(f"## {header_of(name) if name == 'scene' else f'`{header_of(name)}`'}")
-        if len(found) > 1 and found[0].name != name:
+        if len(pages) > 1 and pages[0].name != name:
             parts.append(line_of(name))
-        for page in found:
+        for page in pages:
             parts += [f"### `{page.header}`"] if page.name != name else []
             parts += _markdown(page)
     return "\n\n".join([*parts, glossary.as_markdown()]) + "\n"

@@ -46,9 +46,11 @@ def results_among(columns):
 
 def own(row):
     """The cells of a row that its case alone determines: without parameters, whose names may be others by now."""
-    names = {one.name for one in results_among(row)}
+    names = {result.name for result in results_among(row)}
     ends = (" ±", " least", " most", " mean", " deviation")
-    mine = {f"{one.name} [{one.unit}]" for one in results_among(row)} | {f"{n}{end}" for n in names for end in ends}
+    mine = {f"{result.name} [{result.unit}]" for result in results_among(row)} | {
+        f"{n}{end}" for n in names for end in ends
+    }
     return {column: value for column, value in row.items() if column in mine or column in (*FIRST, *LAST)}
 
 
@@ -154,12 +156,12 @@ class CaseRows:
             return
         lines = b"".join(_line([_cell(row.get(name)) for name in self._columns]) for row in rows)
         with self._written():
-            whole = os.fstat(self._file.fileno()).st_size
+            size = os.fstat(self._file.fileno()).st_size
             try:
                 while lines:
                     lines = lines[self._file.write(lines) :]
             except OSError:
-                self._file.truncate(whole)
+                self._file.truncate(size)
                 raise
 
     def order(self, rows):

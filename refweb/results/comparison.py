@@ -43,12 +43,12 @@ def compare(folders):
     folders = [pathlib.Path(folder) for folder in folders]
     summaries, scenes = zip(*map(_read, folders), strict=True)
     several = any(len(summary["steps"]) > 1 for summary in summaries)
-    found = [_results(folder, summary, several) for folder, summary in zip(folders, summaries, strict=True)]
-    keys = dict.fromkeys(key for results in found for key in results)
-    rows = [_row(key, [results.get(key) for results in found]) for key in keys]
+    tables = [_results(folder, summary, several) for folder, summary in zip(folders, summaries, strict=True)]
+    keys = dict.fromkeys(key for results in tables for key in results)
+    rows = [_row(key, [results.get(key) for results in tables]) for key in keys]
     common = [row for row in rows if row["agree"] is not None]
     if not common:
-        has = "; ".join(map(_has, folders, summaries, found))
+        has = "; ".join(map(_has, folders, summaries, tables))
         raise InputError(f"no two folders have a result in common: {has}")
     return {
         "folders": list(map(str, folders)),
@@ -92,15 +92,15 @@ def _has(folder, summary, results):
 
 def _row(key, values):
     """Row of one result in all folders."""
-    there = [value for value in values if value is not None]
-    first = there[0]
+    known = [value for value in values if value is not None]
+    first = known[0]
     return {
         "name": key[0],
         "step": key[1],
         "unit": first["unit"],
         "values": [value and {k: value.get(k) for k in ("value", "error", "interval", "unit")} for value in values],
         "differences": [_difference(value, first) for value in values],
-        "agree": _agree(there) if len(there) > 1 else None,
+        "agree": _agree(known) if len(known) > 1 else None,
     }
 
 
@@ -116,14 +116,14 @@ def _agree(results):
     if len({result["value"] for result in results}) == 1:
         return True
     spans = [span for result in results if (span := _span(result)) is not None]
-    return len(spans) == len(results) and max(least for least, _ in spans) <= min(most for _, most in spans)
+    return len(spans) == len(results) and max(lower for lower, _ in spans) <= min(upper for _, upper in spans)
 
 
 def _span(result):
     """Least and largest value that a result may have, None where that is not known."""
     if result.get("interval") is not None:
-        least, most = result["interval"]
-        return -math.inf if least is None else least, math.inf if most is None else most
+        lower, upper = result["interval"]
+        return -math.inf if lower is None else lower, math.inf if upper is None else upper
     if result["error"] is None:
         return None
     return result["value"] - result["error"], result["value"] + result["error"]
@@ -132,8 +132,13 @@ def _span(result):
 def _scenes(scenes):
     """Paths at which scenes differ, and what stands there in each."""
     leaves = [dict(_leaves(scene)) for scene in scenes]
-    rows = [(path, [own.get(path) for own in leaves]) for path in dict.fromkeys(path for own in leaves for path in own)]
-    return [{"path": path, "values": values} for path, values in rows if any(one != values[0] for one in values)]
+    rows = [
+        (path, [leaf_values.get(path) for leaf_values in leaves])
+        for path in dict.fromkeys(path for leaf_values in leaves for path in leaf_values)
+    ]
+    return [
+        {"path": path, "values": values} for path, values in rows if any(value_n != values[0] for value_n in values)
+    ]
 
 
 def _leaves(value, path=""):
@@ -141,12 +146,12 @@ def _leaves(value, path=""):
     parts = None
     if isinstance(value, dict):
         parts = value.items()
-    elif isinstance(value, list) and value and all(isinstance(one, dict) for one in value):
-        names = [one.get("name") for one in value]
+    elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+        names = [item.get("name") for item in value]
         named = all(isinstance(name, str) for name in names) and len(set(names)) == len(names)
         parts = zip(names if named else range(len(value)), value, strict=True)
     if parts is None:
         yield path, value
     else:
-        for key, one in parts:
-            yield from _leaves(one, f"{path}.{key}" if path else str(key))
+        for key, item in parts:
+            yield from _leaves(item, f"{path}.{key}" if path else str(key))

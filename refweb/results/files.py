@@ -37,7 +37,7 @@ def as_toml(given):
     parts = []
     for key, value in sorted(given.items(), key=lambda item: isinstance(item[1], (dict, list))):
         if isinstance(value, list):
-            parts += [f"[[{key}]]\n{tomli_w.dumps(one)}" for one in value]
+            parts += [f"[[{key}]]\n{tomli_w.dumps(entry)}" for entry in value]
         else:
             parts.append(tomli_w.dumps({key: value}))
     return "\n".join(parts)

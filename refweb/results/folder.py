@@ -40,8 +40,8 @@ def read_summary(folder):
         run = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return None
-    own = isinstance(run, dict) and isinstance(run.get("versions"), dict) and "refweb" in run["versions"]
-    return run if own else None
+    is_record = isinstance(run, dict) and isinstance(run.get("versions"), dict) and "refweb" in run["versions"]
+    return run if is_record else None
 
 
 def is_alive(folder):
@@ -148,11 +148,11 @@ def check_folder(folder, force=False):
         raise InputError(f"{name}: holds no run.json of refweb, so it is not a result folder: nothing was removed")
 
 
-def clear(folder, keep=("run.json",)):
-    """Remove what a run wrote except ``keep``, and nothing else."""
+def clear(folder, kept=("run.json",)):
+    """Remove what a run wrote except ``kept``, and nothing else."""
     for path in [*folder.iterdir(), *(folder / "frames").glob("*")]:
         name = path.relative_to(folder).as_posix()
-        if path.is_file() and RESULT_FILES.fullmatch(name) and name not in keep:
+        if path.is_file() and RESULT_FILES.fullmatch(name) and name not in kept:
             path.unlink()
 
 
@@ -163,10 +163,10 @@ def copy(source, target):
         return
     (target / "frames").mkdir(parents=True, exist_ok=True)
     clear(target)
-    own = [p for p in source.rglob("*") if p.is_file() and RESULT_FILES.fullmatch(p.relative_to(source).as_posix())]
-    for path in sorted(own, key=lambda p: p.name == "run.json"):
-        place = target / path.relative_to(source)
-        write_atomically(place, lambda name, path=path: shutil.copyfile(path, name))
+    paths = [p for p in source.rglob("*") if p.is_file() and RESULT_FILES.fullmatch(p.relative_to(source).as_posix())]
+    for path in sorted(paths, key=lambda p: p.name == "run.json"):
+        copy_path = target / path.relative_to(source)
+        write_atomically(copy_path, lambda name, path=path: shutil.copyfile(path, name))
 
 
 class Folder:
@@ -267,19 +267,19 @@ class Folder:
             (self.path / "checkpoint.npz").unlink(missing_ok=True)
         self.summary(run)
         with self._written():
-            clear(self.path, keep=("run.json", "scene.toml"))
+            clear(self.path, kept=("run.json", "scene.toml"))
         self._start()
 
     def row(self, values):
         """Append a row to the history, or nothing where it does not fit on the disk."""
         line = (",".join(v if isinstance(v, str) else number(v) for v in values) + "\n").encode()
-        whole = self._history.tell()
+        length = self._history.tell()
         with self._written():
             try:
                 while line:
                     line = line[self._history.write(line) :]
             except OSError:
-                self._history.truncate(whole)
+                self._history.truncate(length)
                 raise
 
     def frame(self, number, state, shape=None, run=None):

@@ -12,9 +12,16 @@ def of_solution(solution):
     dynamic = not solution.steps
     head = ["result", "value", *(["time"] if dynamic else []), "at"]
     rows = []
-    for name, one in solution.results.items():
-        time = [f"{one.time:.6g} s"] if dynamic else []
-        rows.append([name, readable(one.value, one.error, one.unit, one.within), *time, place(one.where, one.at)])
+    for name, result in solution.results.items():
+        time = [f"{result.time:.6g} s"] if dynamic else []
+        rows.append(
+            [
+                name,
+                readable(result.value, result.error, result.unit, result.within),
+                *time,
+                place(result.where, result.at),
+            ]
+        )
     remarks = other_errors(solution.summary()["results"])
     said = [*remarks, solution.message, *(f"warning: {text}" for text in solution.warnings)]
     cost = f"{solution.solver.get('method')}, {solution.cost['cpu_s']:.2f} s CPU"
@@ -27,16 +34,16 @@ def of_scene(given, title):
     """The tables of a scene as its file has them."""
     rows = []
     for name, value in given.items():
-        for one in value if isinstance(value, list) else [value]:
-            if isinstance(one, dict):
-                keys = ", ".join(f"{key} = {_short(content)}" for key, content in one.items())
+        for entry in value if isinstance(value, list) else [value]:
+            if isinstance(entry, dict):
+                keys = ", ".join(f"{key} = {_short(content)}" for key, content in entry.items())
                 rows.append([f"[[{name}]]" if isinstance(value, list) else f"[{name}]", keys])
     return _part(title, _table(["table", "keys"], rows), [])
 
 
-def _short(value, most=60):
+def _short(value, limit=60):
     text = str(value)
-    return text if len(text) <= most else f"{text[: most - 1]}…"
+    return text if len(text) <= limit else f"{text[: limit - 1]}…"
 
 
 def _table(head, rows):

@@ -103,12 +103,12 @@ NODES, LINES = 1, 2
 def largest_in(lines, column, first, last):
     """Largest of a column over the elements from ``first`` to ``last`` − 1: four maxima at once."""
     a = b = c = d = -math.inf
-    k, whole = np.uint64(column), (last - first) // 4 * 4
-    for n in range(first, first + whole, 4):
+    k, fours = np.uint64(column), (last - first) // 4 * 4
+    for n in range(first, first + fours, 4):
         m = np.uint64(n)
         a, b = _larger(a, lines[m, k]), _larger(b, lines[m + np.uint64(1), k])
         c, d = _larger(c, lines[m + np.uint64(2), k]), _larger(d, lines[m + np.uint64(3), k])
-    for n in range(first + whole, last):
+    for n in range(first + fours, last):
         a = _larger(a, lines[np.uint64(n), k])
     return _larger(_larger(a, b), _larger(c, d))
 
@@ -117,14 +117,14 @@ def largest_in(lines, column, first, last):
 def farthest(x, first, last):
     """Largest magnitude of x, given in a row, over the rows from ``first`` to ``last`` − 1, four at once."""
     a = b = c = d = -math.inf
-    whole = (last - first) // 4 * 4
-    for n in range(first, first + whole, 4):
+    fours = (last - first) // 4 * 4
+    for n in range(first, first + fours, 4):
         q = np.uint64(3 * n)
         a = _larger(a, _size(x, q))
         b = _larger(b, _size(x, q + np.uint64(3)))
         c = _larger(c, _size(x, q + np.uint64(6)))
         d = _larger(d, _size(x, q + np.uint64(9)))
-    for n in range(first + whole, last):
+    for n in range(first + fours, last):
         a = _larger(a, _size(x, np.uint64(3 * n)))
     return math.sqrt(_larger(_larger(a, b), _larger(c, d)))
 
@@ -248,13 +248,13 @@ def deepest(t, x, v, f, lines, rows, data, where):
     """
     values = data.reshape(-1)[rows[0] : rows[1]]
     a = b = c = d = e = g = h = i = 0.0
-    whole = values.size // 8 * 8
-    for n in range(0, whole, 8):
+    eights = values.size // 8 * 8
+    for n in range(0, eights, 8):
         a, b = _larger(a, values[n]), _larger(b, values[n + 1])
         c, d = _larger(c, values[n + 2]), _larger(d, values[n + 3])
         e, g = _larger(e, values[n + 4]), _larger(g, values[n + 5])
         h, i = _larger(h, values[n + 6]), _larger(i, values[n + 7])
-    for n in range(whole, values.size):
+    for n in range(eights, values.size):
         a = _larger(a, values[n])
     best = _larger(_larger(_larger(a, b), _larger(c, d)), _larger(_larger(e, g), _larger(h, i)))
     if where[1] == PLACE:
@@ -274,8 +274,8 @@ def surface_speed(t, x, v, f, lines, rows, data, where):
     """
     best = 0.0
     for n in range(data.shape[0]):
-        place, spin = rows[2 * n], rows[2 * n + 1]
-        speed = math.sqrt(v[place, 0] ** 2 + v[place, 1] ** 2 + v[place, 2] ** 2)
+        row, spin = rows[2 * n], rows[2 * n + 1]
+        speed = math.sqrt(v[row, 0] ** 2 + v[row, 1] ** 2 + v[row, 2] ** 2)
         if spin >= 0:
             speed += data[n, 0] * math.sqrt(v[spin, 0] ** 2 + v[spin, 1] ** 2 + v[spin, 2] ** 2)
         best = max(best, speed)

@@ -27,8 +27,8 @@ def web_of(system):
 def versions():
     """Versions of refweb, Python and the libraries that solve, by name."""
     names = ("numpy", "scipy", "scikit-fem", "scikit-sundae", "numba", "meshio", "qdldl")
-    own = {"refweb": __version__, "python": sys.version.split()[0]}
-    found = {**own, **{name: importlib.metadata.version(name) for name in names}}
+    base = {"refweb": __version__, "python": sys.version.split()[0]}
+    versions_found = {**base, **{name: importlib.metadata.version(name) for name in names}}
     with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        found["rslab"] = importlib.metadata.version("rslab")
-    return found
+        versions_found["rslab"] = importlib.metadata.version("rslab")
+    return versions_found

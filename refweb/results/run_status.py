@@ -54,12 +54,12 @@ class Clock:
 
 
 @contextlib.contextmanager
-def recorded(found, clock, done=None):
+def recorded(target, clock, done=None):
     """Write to what is found how the run inside ends, and what it cost.
 
     Parameters
     ----------
-    found : object
+    target : object
         Gets ``status``, "solved", "failed" or "interrupted", unless the run sets another than "running" itself; of a
         failure its ``message``; and in the dict ``cost`` what the clock says.
     clock : Clock
@@ -69,18 +69,18 @@ def recorded(found, clock, done=None):
     """
     try:
         yield
-        if found.status == "running":
-            found.status = "solved"
+        if target.status == "running":
+            target.status = "solved"
     except KeyboardInterrupt:
-        found.status = "interrupted"
+        target.status = "interrupted"
         if done is not None:
-            found.message = f"interrupted after {done()}"
+            target.message = f"interrupted after {done()}"
         raise
     except SolverError as error:
-        found.status, found.message = "failed", str(error)
+        target.status, target.message = "failed", str(error)
         raise
     except Exception as error:
-        found.status, found.message = "failed", f"{type(error).__name__}: {error}"
+        target.status, target.message = "failed", f"{type(error).__name__}: {error}"
         raise
     finally:
-        found.cost = {**found.cost, **clock.spent()}
+        target.cost = {**target.cost, **clock.spent()}

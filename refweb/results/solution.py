@@ -54,14 +54,14 @@ class Result(NamedTuple):
     at: str | None = None
     within: tuple[float, float] | None = None
 
-    def bounded(self, least, most):
-        """The result where only what lies from ``least`` to ``most`` is possible."""
+    def bounded(self, lower, upper):
+        """The result where only what lies from ``lower`` to ``upper`` is possible."""
         if self.error is None or not np.isfinite(self.error):
             return self
-        error = min(self.error, max(self.value - least, most - self.value, 0.0))
+        error = min(self.error, max(self.value - lower, upper - self.value, 0.0))
         low, high = self.value - self.error, self.value + self.error
-        cut = (low < least or high > most) and least <= self.value <= most
-        return self._replace(error=error, within=(max(low, least), min(high, most)) if cut else None)
+        cut = (low < lower or high > upper) and lower <= self.value <= upper
+        return self._replace(error=error, within=(max(low, lower), min(high, upper)) if cut else None)
 
     def plain(self):
         """Convert to a dict, without the errors that were not looked for; an infinite end of an interval is None."""
@@ -77,19 +77,21 @@ class Result(NamedTuple):
 
 def read_results(given):
     """Results by name of what ``run.json`` says of them; a `TypeError` where no run has said that."""
-    found = {name: Result(**one) for name, one in given.items()}
-    for name, one in found.items():
+    results = {name: Result(**entry) for name, entry in given.items()}
+    for name, entry in results.items():
         if not (
-            isinstance(one.value, float | int) and isinstance(one.error, float | None) and isinstance(one.unit, str)
+            isinstance(entry.value, float | int)
+            and isinstance(entry.error, float | None)
+            and isinstance(entry.unit, str)
         ):
             raise TypeError(f"{name} is not a number")
-        if one.within is not None:
-            found[name] = one = one._replace(within=tuple(one.within))
-        if one.interval is not None:
-            least, most = one.interval
-            ends = -np.inf if least is None else least, np.inf if most is None else most
-            found[name] = one._replace(interval=ends)
-    return found
+        if entry.within is not None:
+            results[name] = entry = entry._replace(within=tuple(entry.within))
+        if entry.interval is not None:
+            lower, upper = entry.interval
+            ends = -np.inf if lower is None else lower, np.inf if upper is None else upper
+            results[name] = entry._replace(interval=ends)
+    return results
 
 
 @dataclass(eq=False, repr=False)

@@ -97,10 +97,10 @@ class State:
     def slack_nodes(self):
         """Free nodes that no taut line holds, whose position is not unique; bars hold under compression as well."""
         net = self.system.net
-        held = self.system.supported.all(axis=1)
-        held[net.web.bare] = True  # by a link
-        held[net.cells[(net.laws == LINEAR) | ~self.element_slack].ravel()] = True
-        return np.flatnonzero(~held[: net.nodes])
+        fixed = self.system.supported.all(axis=1)
+        fixed[net.web.bare] = True  # by a link
+        fixed[net.cells[(net.laws == LINEAR) | ~self.element_slack].ravel()] = True
+        return np.flatnonzero(~fixed[: net.nodes])
 
     @cached_property
     def reaction(self):

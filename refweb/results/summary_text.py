@@ -93,8 +93,8 @@ def on_run(summary):
         for name, r in horizon.get("ensemble", {}).items():
             text = readable(r["mean"], r["deviation"], summary["results"][name]["unit"])
             yield "", f"{name} {text} over the ensemble, standard deviation"
-    for n, (name, one) in enumerate(summary.get("throw", {}).items()):
-        yield "throw" * (n == 0), f"{name.replace('_', ' ')} {_of_throw(one)}"
+    for n, (name, thrown) in enumerate(summary.get("throw", {}).items()):
+        yield "throw" * (n == 0), f"{name.replace('_', ' ')} {_of_throw(thrown)}"
     for name, body in summary.get("bodies", {}).items():
         text = f'body "{name}" at most {readable(body["overlap"], None, "m")} deep'
         text += f" at line {body['line']}" if body["line"] is not None else ""
@@ -109,14 +109,14 @@ def on_run(summary):
             f"lines at most {readable(lines['overlap'], None, 'm')} deep in each other, of radius {lines['radius']:g}"
         )
         yield "contact", f"{text} m, stiffness {lines['stiffness']:.3g}" + ", chosen" * lines.get("chosen", False)
-    for name, shown in summary.get("passage", {}).items():
-        text = "nothing can have passed: certified" if shown == "certified" else shown
+    for name, status in summary.get("passage", {}).items():
+        text = "nothing can have passed: certified" if status == "certified" else status
         yield "passage", f"{name}: {text}"
     if (breaks := summary.get("breaks")) is not None:
         yield from _breaks(breaks)
     if before := summary.get("broken_before"):
-        told = f"{', '.join(map(str, before[:FEW_BREAKS]))}{', ...' * (len(before) > FEW_BREAKS)}"
-        yield "broken", f"{len(before)} line{'s' * (len(before) > 1)} before the run began: {told}"
+        line = f"{', '.join(map(str, before[:FEW_BREAKS]))}{', ...' * (len(before) > FEW_BREAKS)}"
+        yield "broken", f"{len(before)} line{'s' * (len(before) > 1)} before the run began: {line}"
     if worst := summary.get("utilisation"):
         digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
         yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"
@@ -150,11 +150,11 @@ def on_cost(cost):
 
 def between(interval, unit):
     """An interval in words; an end of None is infinite."""
-    least, most = interval
-    if least is None or most is None:
-        ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", least), ("below", most)) if end is not None]
+    lower, upper = interval
+    if lower is None or upper is None:
+        ends = [f"{word} {end:.6g} {unit}" for word, end in (("above", lower), ("below", upper)) if end is not None]
         return "".join(ends) or "on its axis"
-    return f"from {least:.6g} to {most:.6g} {unit}"
+    return f"from {lower:.6g} to {upper:.6g} {unit}"
 
 
 def _place(result):
@@ -165,18 +165,21 @@ def _breaks(breaks):
     """(Name, sentence) of the first breaks, and how many there are."""
     if not breaks:
         yield "breaks", "none"
-    for n, one in enumerate(breaks[:FEW_BREAKS]):
-        when = readable(one["time"], one["error"], "s")
-        yield "breaks" * (n == 0), f"line {one['line']} at t = {when}, which held {readable(one['energy'], None, 'J')}"
+    for n, entry in enumerate(breaks[:FEW_BREAKS]):
+        when = readable(entry["time"], entry["error"], "s")
+        yield (
+            "breaks" * (n == 0),
+            f"line {entry['line']} at t = {when}, which held {readable(entry['energy'], None, 'J')}",
+        )
     if len(breaks) > FEW_BREAKS:
         yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
 
 
-def _of_throw(one):
+def _of_throw(thrown):
     """A number of a throw, or whether something is so, in words."""
-    if "unit" not in one:
-        return {True: "yes", False: "no", None: "not known"}[one["value"]]
-    return "at least " * one.get("at_least", False) + readable(one["value"], one["error"], one["unit"])
+    if "unit" not in thrown:
+        return {True: "yes", False: "no", None: "not known"}[thrown["value"]]
+    return "at least " * thrown.get("at_least", False) + readable(thrown["value"], thrown["error"], thrown["unit"])
 
 
 def _horizon(horizon):
@@ -190,6 +193,8 @@ def _horizon(horizon):
     return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
 
 
-def _equal(one, other):
-    within = min(one["error"] + other["error"], 1e-6 * abs(one["value"]))  # in a turning frame ± says nothing of that
-    return abs(one["value"] - other["value"]) <= max(within, 1e-9 * abs(one["value"]))
+def _equal(first, second):
+    within = min(
+        first["error"] + second["error"], 1e-6 * abs(first["value"])
+    )  # in a turning frame ± says nothing of that
+    return abs(first["value"] - second["value"]) <= max(within, 1e-9 * abs(first["value"]))

@@ -115,19 +115,19 @@ class Throw(Table):
             Time from which on the twin tells nothing of the run [s].
         """
         names = [o.name for o in observables]
-        own = self._of(rows, names)
-        half, other = self._of(rows[::2], names), None if twin is None else self._of(twin[0], names)
+        values = self._of(rows, names)
+        half, refined_values = self._of(rows[::2], names), None if twin is None else self._of(twin[0], names)
         mouth = observables[names.index(self.area)].node
         if self.target is not None:
-            own |= self._capture(state, mouth, own["largest_area"])
-            if twin is not None and other is not None:
-                other |= self._capture(twin[1], mouth, other["largest_area"])
-        settled, end, told = own.pop("settled"), rows[-1, 0], {}
-        for name, value in own.items():
+            values |= self._capture(state, mouth, values["largest_area"])
+            if twin is not None and refined_values is not None:
+                refined_values |= self._capture(twin[1], mouth, refined_values["largest_area"])
+        settled, end, record = values.pop("settled"), rows[-1, 0], {}
+        for name, value in values.items():
             if name != "bounds":
-                compared = other if settled.get(name, end) < known else None
-                told[name] = _told(name, value, half, compared, factor, own, known)
-        return told
+                compared = refined_values if settled.get(name, end) < known else None
+                record[name] = _told(name, value, half, compared, factor, values, known)
+        return record
 
     def _of(self, rows, names):
         """Values by name; ``bounds`` are names of those that are lower bounds, ``settled`` is when values are [s]."""
@@ -136,10 +136,10 @@ class Throw(Table):
         near = slice(top - 1, top + 2) if 0 < top < len(area) - 1 else slice(top, top + 1)
         when, largest = _vertex(times[near], area[near])
         bounds = ["largest_area", "deployment_time", "travelled"] if top == len(area) - 1 else []
-        found = {"largest_area": largest, "deployment_time": when}
+        values = {"largest_area": largest, "deployment_time": when}
         if self.travel is not None:
-            way = rows[:, 1 + names.index(self.travel)]
-            found["travelled"] = abs(_parabola(times[near], way[near], when) - way[0])
+            travel = rows[:, 1 + names.index(self.travel)]
+            values["travelled"] = abs(_parabola(times[near], travel[near], when) - travel[0])
         level, ends = self.share * largest, []
         for step, edge in ((-1, 0), (1, len(area) - 1)):
             n = top
@@ -151,8 +151,8 @@ class Throw(Table):
             else:
                 m = n + step
                 ends.append(times[n] + (times[m] - times[n]) * (area[n] - level) / (area[n] - area[m]))
-        settled = dict.fromkeys(found, times[near][-1]) | {"effective_period": ends[1]}
-        return {**found, "effective_period": float(ends[1] - ends[0]), "bounds": bounds, "settled": settled}
+        settled = dict.fromkeys(values, times[near][-1]) | {"effective_period": ends[1]}
+        return {**values, "effective_period": float(ends[1] - ends[0]), "bounds": bounds, "settled": settled}
 
     def _capture(self, state, mouth, largest):
         """Capture of the target by the net in a state."""
@@ -168,15 +168,15 @@ class Throw(Table):
         }
 
 
-def _told(name, value, half, other, factor, own, known):
+def _told(name, value, half, refined, factor, own_value, known):
     """A number with its ±, or whether something is so, for ``run.json``."""
     if isinstance(value, bool):
-        same = known == np.inf if other is None else other[name] == value
+        same = known == np.inf if refined is None else refined[name] == value
         return {"value": value if same else None, "drawn": value}
     error = None
-    if other is not None:
-        error = factor * abs(value - other[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value)
-    bound = {"at_least": True} if name in own["bounds"] else {}
+    if refined is not None:
+        error = factor * abs(value - refined[name]) + abs(value - half.get(name, value)) + 4e-16 * abs(value)
+    bound = {"at_least": True} if name in own_value["bounds"] else {}
     return {"value": float(value), "error": None if bound else error, "unit": UNITS[name], **bound}
 
 
@@ -197,7 +197,7 @@ def _vertex(times, values):
     return float(times[1] - 0.5 * b / a), float(c - 0.25 * b * b / a)
 
 
-def in_hull(points, place):
+def in_hull(points, point):
     """Tell if a position is in the convex hull of points; that of points in a plane has no inside."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -205,7 +205,7 @@ def in_hull(points, place):
         hull = ConvexHull(points)
     except QhullError:
         return False
-    return bool((hull.equations[:, :3] @ place + hull.equations[:, 3] < 0.0).all())
+    return bool((hull.equations[:, :3] @ point + hull.equations[:, 3] < 0.0).all())
 
 
 def solid_angle(outline, centre):
@@ -216,7 +216,7 @@ def solid_angle(outline, centre):
     """
     a, b = outline - centre, np.roll(outline, -1, axis=0) - centre
     c = np.broadcast_to(outline.mean(axis=0) - centre, a.shape)
-    la, lb, lc = (np.linalg.norm(one, axis=1) for one in (a, b, c))
+    la, lb, lc = (np.linalg.norm(vector, axis=1) for vector in (a, b, c))
     volume = (a * np.cross(b, c)).sum(axis=1)
     below = la * lb * lc + (a * b).sum(axis=1) * lc + (b * c).sum(axis=1) * la + (c * a).sum(axis=1) * lb
     return float(abs(2.0 * np.arctan2(volume, below).sum()))

@@ -36,9 +36,9 @@ def with_error(value, error):
     if error >= 1e4 or abs(value) >= 1e7:
         return f"{value:.{MOST_DIGITS}g} ± {error:.1e}"
     left = max(0, left)
-    whole = max(1, _exponent(value) + 1) if value else 1
+    digits_before = max(1, _exponent(value) + 1) if value else 1
     text = f"{error:.{left}f}" if error >= FIXED else f"{error:.1e}"
-    return f"{value:.{min(left, MOST_DIGITS - whole)}f} ± {text}"
+    return f"{value:.{min(left, MOST_DIGITS - digits_before)}f} ± {text}"
 
 
 def readable(value, error, unit, within=None):
@@ -50,8 +50,8 @@ def readable(value, error, unit, within=None):
     text = f"{with_error(value / factor, error and error / factor)} {name}".rstrip()
     if within is None:
         return text
-    least, most = (f"{end / factor:.3g}" for end in within)
-    return f"{text}, from {least} to {most}"
+    lower, upper = (f"{end / factor:.3g}" for end in within)
+    return f"{text}, from {lower} to {upper}"
 
 
 def larger(value, error):

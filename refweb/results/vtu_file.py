@@ -76,14 +76,14 @@ def write(path, mesh):
     mesh : Mesh or meshio.Mesh
         Points, cells and their data.
     """
-    whole = np.int32 if max(len(mesh.points), sum(block.data.size for block in mesh.cells)) < 2**31 else np.int64
+    integer_type = np.int32 if max(len(mesh.points), sum(block.data.size for block in mesh.cells)) < 2**31 else np.int64
     nodes = [block.data.shape[1] for block in mesh.cells]
     counts = [len(block.data) for block in mesh.cells]
     sections = {
         "Points": {"Points": mesh.points},
         "Cells": {
-            "connectivity": np.concatenate([block.data.ravel() for block in mesh.cells]).astype(whole),
-            "offsets": np.cumsum(np.repeat(nodes, counts)).astype(whole),
+            "connectivity": np.concatenate([block.data.ravel() for block in mesh.cells]).astype(integer_type),
+            "offsets": np.cumsum(np.repeat(nodes, counts)).astype(integer_type),
             "types": np.repeat([CELLS[block.type] for block in mesh.cells], counts).astype(np.uint8),
         },
         "PointData": mesh.point_data,
@@ -227,7 +227,7 @@ def cell_arrays(path, names):
         file = Reader(path)
         if not np.isin(file.array("Cells", "types"), LINES).all():
             return None
-        found = {name: file.array("CellData", name) for name in names}
+        arrays = {name: file.array("CellData", name) for name in names}
     except (OSError, ValueError):
         return None
-    return found if all(values.ndim == 1 for values in found.values()) else None
+    return arrays if all(values.ndim == 1 for values in arrays.values()) else None

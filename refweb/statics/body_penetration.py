@@ -59,28 +59,28 @@ class Passage:
                 self._look_back(body, deep, state)
         self._x = state.x
 
-    def _looks(self, body, way):
+    def _looks(self, body, path):
         """Shares of a way (rows, 3) at which lines may be deepest: about where its nodes are nearest to a body."""
         net = self._system.net
-        begin, own = net.points[: net.nodes] + self._x[: net.nodes] - net.points[body.row], way[: net.nodes]
-        length = np.linalg.norm(own, axis=1)
+        begin, nodes_seen = net.points[: net.nodes] + self._x[: net.nodes] - net.points[body.row], path[: net.nodes]
+        length = np.linalg.norm(nodes_seen, axis=1)
         moved = np.flatnonzero(PARTS * length > body.thickness)
-        begin, own, length = begin[moved], own[moved], length[moved]
-        nearest = np.clip(-(begin * own).sum(axis=1) / length**2, 0.0, 1.0)
-        order = np.argsort(np.linalg.norm(begin + nearest[:, None] * own, axis=1))[:MOST]
+        begin, nodes_seen, length = begin[moved], nodes_seen[moved], length[moved]
+        nearest = np.clip(-(begin * nodes_seen).sum(axis=1) / length**2, 0.0, 1.0)
+        order = np.argsort(np.linalg.norm(begin + nearest[:, None] * nodes_seen, axis=1))[:MOST]
         step = body.thickness / (PARTS * length[order])
         around = nearest[order, None] + step[:, None] * np.arange(-PARTS, PARTS + 1)
         return np.unique(around[(around > 0.0) & (around < 1.0)])
 
     def _look_back(self, body, deep, state):
         """Look at the way that leads to an equilibrium."""
-        system, way = self._system, state.x - self._x
-        looks = self._looks(body, way) if math.isfinite(body.thickness) else []
+        system, path = self._system, state.x - self._x
+        looks = self._looks(body, path) if math.isfinite(body.thickness) else []
         before = State(system, state.time, self._x).overlap(body) if len(looks) else deep
         ends = np.maximum(np.maximum(deep, before), CORE * body.thickness)
         for share in looks:
-            there = State(system, state.time, self._x + share * way).overlap(body)
-            if ((passed := there - ends) > 1e-9 * body.thickness).any():
+            overlap = State(system, state.time, self._x + share * path).overlap(body)
+            if ((passed := overlap - ends) > 1e-9 * body.thickness).any():
                 line = system.net.line[int(passed.argmax())]
                 raise SolverError(
                     f'line {line} passes the core of body "{body.name}" on its way to load step {state.time:g}: it '

@@ -48,12 +48,12 @@ def check_speed(system, t):
     net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
     axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
-    held = system.assemble_lines(net.unit_tension * axial[:, None, None])
+    tension_stiffness = system.assemble_lines(net.unit_tension * axial[:, None, None])
     for part in system.unsupported_parts:
-        held[system.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
+        tension_stiffness[system.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
 
     def stands(share):
-        factor.update(held + share * share * taken)
+        factor.update(tension_stiffness + share * share * taken)
         return factor.negative_pivots() <= allowed
 
     if stands(1.0):

@@ -78,9 +78,9 @@ def duality_bound(system, equilibrium, factor=None):
     if factor.held is not None:
         bound = balance.bound(*balance.by_tangent(factor))
     if bound is None or not bound.sharp:
-        other = balance.bound(*balance.by_laplacian(factor))
+        improved = balance.bound(*balance.by_laplacian(factor))
         equilibrium.stats["nlu"] = equilibrium.stats.get("nlu", 0) + 1
-        bound = other if bound is None or other.gap < bound.gap else bound
+        bound = improved if bound is None or improved.gap < bound.gap else bound
     return bound
 
 
@@ -102,8 +102,8 @@ class _Balance:
         self._resultant = -self._of_bars.T.tocsc().astype(np.longdouble)
         self._force = bars.tension[:, None] * bars.direction
         self._reach = 2.0 * np.linalg.norm(x, axis=1).max()
-        own = 0.5 * bars.tension**2 / bars.stiffness + bars.tension * bars.length * np.finfo(float).eps
-        self._rounding = np.finfo(float).eps * (own.sum() + np.abs(outer * x).sum())
+        per_bar = 0.5 * bars.tension**2 / bars.stiffness + bars.tension * bars.length * np.finfo(float).eps
+        self._rounding = np.finfo(float).eps * (per_bar.sum() + np.abs(outer * x).sum())
         # Sums of forces leave at least this of them.
         self._least = self._rounding + np.finfo(np.longdouble).eps * bars.tension.sum() * self._reach
 

@@ -55,7 +55,7 @@ def relax(count, t, x, v, f, inverse, kernels, cells, data, per_cell):
             kernels[i](t, x, v, f, cells[i], data[i], per_cell[i])
 
 
-def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANCE):
+def solve(system, load_steps, progress=None, limit=10_000_000, tolerance=TOLERANCE):
     """Equilibria at load steps, one after another, each from the one before.
 
     Parameters
@@ -66,7 +66,7 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
         Values of t.
     progress : callable, optional
         Called with a line of text as it goes.
-    most : int
+    limit : int
         Largest number of steps for one load step.
     tolerance : float
         Residual to stop at.
@@ -81,7 +81,7 @@ def solve(system, load_steps, progress=None, most=10_000_000, tolerance=TOLERANC
         Where there is no equilibrium, or none is found.
     """
     system = at_rest(system)
-    relaxation, x = Relaxation(system, progress, most, tolerance), np.zeros((system.rows, 3))
+    relaxation, x = Relaxation(system, progress, limit, tolerance), np.zeros((system.rows, 3))
     for t in load_steps:
         state = relaxation.solve(t, x)
         x = state.x
@@ -99,9 +99,9 @@ class Relaxation:
         See `solve`.
     """
 
-    def __init__(self, system, progress=None, most=10_000_000, tolerance=TOLERANCE):
+    def __init__(self, system, progress=None, limit=10_000_000, tolerance=TOLERANCE):
         self.system, self.progress = system, progress or (lambda text: None)
-        self.most, self.tolerance, self.scale = most, tolerance, 0.0
+        self.most, self.tolerance, self.scale = limit, tolerance, 0.0
         self._stalled = TOUCHING if system.contact else STALLED
         self._kernels = Functions(FORCE, [f.force for f in system.families])
         self._cells = Arrays(INDICES, [f.cells for f in system.families])

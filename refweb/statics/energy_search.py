@@ -56,8 +56,8 @@ class EnergySearch:
             self._energy = system.energy(self._t, y)
             stats["nfev"] += 1
             if drowned:
-                here = system.force(self._t, y).ravel()[system.free] @ p
-                if here >= -0.9 * slope:
+                derivative = system.force(self._t, y).ravel()[system.free] @ p
+                if derivative >= -0.9 * slope:
                     break
                 a *= 0.5
                 continue

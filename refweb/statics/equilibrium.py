@@ -94,10 +94,10 @@ class Equilibrium:
     may_turn_over: bool = False
 
 
-def add_spent(stats, other):
+def add_spent(stats, more):
     """Add what another iteration has spent to the ``stats`` of one."""
     for key in ("nsteps", "nfev", "njev", "nlu"):
-        stats[key] += other.get(key, 0)
+        stats[key] += more.get(key, 0)
 
 
 def check_supported(system, t):

@@ -83,25 +83,25 @@ class Parts:
         A row that floats is no farther from one that is held than the lines between them are long: an outer bound.
         """
         rows = len(self.of)
-        found = np.array([self.position, self.position])
+        limits = np.array([self.position, self.position])
         for axis in range(3):
-            held = np.flatnonzero(self.held[self.of, axis])
+            fixed = np.flatnonzero(self.held[self.of, axis])
             for side, sign in enumerate((-1.0, 1.0)):
-                if not len(held):
-                    found[side, :, axis] = sign * np.inf
+                if not len(fixed):
+                    limits[side, :, axis] = sign * np.inf
                     continue
-                ahead = sign * self.position[held, axis]
+                ahead = sign * self.position[fixed, axis]
                 start = ahead.min() - 1.0  # edges of no length would be none
-                i = np.concatenate([self.pairs[:, 0], np.full(len(held), rows)])
-                j = np.concatenate([self.pairs[:, 1], held])
+                i = np.concatenate([self.pairs[:, 0], np.full(len(fixed), rows)])
+                j = np.concatenate([self.pairs[:, 1], fixed])
                 length = np.concatenate([self.longest, ahead - start])
                 both = np.concatenate([i, j[: len(self.pairs)]]), np.concatenate([j, i[: len(self.pairs)]])
                 graph = coo_array((np.append(length, self.longest), both), shape=(rows + 1, rows + 1))
-                least = _least_of_each(graph)
-                far = dijkstra(least, indices=rows)[:rows] + start
+                smallest = _least_of_each(graph)
+                far = dijkstra(smallest, indices=rows)[:rows] + start
                 open_ = ~self.held[self.of, axis]
-                found[side, open_, axis] = sign * far[open_]
-        return found
+                limits[side, open_, axis] = sign * far[open_]
+        return limits
 
     def limits(self, row, axis):
         """Least and largest position of a row along an axis [m], infinite where nothing holds it; None if unknown."""
@@ -132,9 +132,9 @@ def between_slack_lines(system, equilibrium):
     joined = np.tile(taut, net.cells.shape[1] - 1)
     graph = coo_array((joined[joined], tuple(pairs[joined].T)), shape=(system.rows, system.rows))
     count, part = connected_components(graph, directed=False)
-    held = np.zeros((count, 3), dtype=bool)
-    np.logical_or.at(held, part, system.supported)
-    free = ~held[part]
+    fixed = np.zeros((count, 3), dtype=bool)
+    np.logical_or.at(fixed, part, system.supported)
+    free = ~fixed[part]
     if not free.any():
         return None
     position = net.points + x
@@ -142,7 +142,7 @@ def between_slack_lines(system, equilibrium):
     reach = np.tile(net.natural_length, net.cells.shape[1] - 1)
     longest = np.where(joined, apart, np.maximum(apart, reach * (1.0 if net.cells.shape[1] == 2 else 2.0)))
     moves = np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, count, 3))[:, part] * free
-    parts = Parts(part, held, position, pairs, longest, len(net.weights) == 1)
+    parts = Parts(part, fixed, position, pairs, longest, len(net.weights) == 1)
     return Floating(free, moves / np.abs(moves).max(axis=(1, 2), keepdims=True), parts)
 
 
@@ -188,11 +188,11 @@ class NullSpace:
         for move, p in zip(
             moves, np.random.default_rng(0).uniform(-1.0, 1.0, (SAMPLES, len(system.free))), strict=True
         ):
-            found = self.part(p)
-            if found is not None and np.abs(found).max(initial=0.0) > OPEN:
-                move.ravel()[system.free] = found / np.abs(found).max()
-        for held in system.unsupported_parts:  # which the tangent's anchors hold
-            moves[:, held.rows, held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (SAMPLES, 1))
+            change = self.part(p)
+            if change is not None and np.abs(change).max(initial=0.0) > OPEN:
+                move.ravel()[system.free] = change / np.abs(change).max()
+        for part_held in system.unsupported_parts:  # which the tangent's anchors hold
+            moves[:, part_held.rows, part_held.axis] += np.random.default_rng(1).uniform(0.5, 1.0, (SAMPLES, 1))
         free = np.any(np.abs(moves) > OPEN, axis=0)
         # What may move at no cost turns as well, where it goes on: its other components change to second order.
         free |= free.any(axis=1)[:, None] & ~system.supported

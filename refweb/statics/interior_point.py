@@ -65,7 +65,7 @@ def by_interior_point(newton, t, x):
     for tolerance in nearer:
         start, last = inner.follow(tolerance), tolerance == nearer[-1]
         try:
-            state = newton.solve(t, start, warm=True, most=200 if last else 15)
+            state = newton.solve(t, start, warm=True, limit=200 if last else 15)
         except NotFound as error:
             add_spent(spent, error.stats)
             if last:
@@ -128,14 +128,14 @@ class InteriorPoint:
     def _lines(self):
         return self._bars @ (self._reference + self.x)
 
-    def follow(self, tolerance, most=80):
+    def follow(self, tolerance, limit=80):
         """Go on until forces, lengths and what the cones leave open are below ``tolerance``; return the displacement.
 
-        ``most`` bounds the iterations of this call; where they run out, or lead away, it ends at the best so far.
+        ``limit`` bounds the iterations of this call; where they run out, or lead away, it ends at the best so far.
         """
         best, nearest = np.inf, self._place()
         with np.errstate(all="ignore"):  # where rounding has come to the surface, steps may lead anywhere
-            for _ in range(most):
+            for _ in range(limit):
                 worst = self._worst()
                 if worst < best:
                     best, nearest = worst, self._place()
@@ -185,7 +185,7 @@ class InteriorPoint:
         for share, corrector in (((1.0 - ahead) ** 3, second), (1.0, 0.0)):
             aim = shift - corrector
             aim[:, 0] += share * mean
-            step = self._step(scaling, kept, [(1.0 - share) * one for one in still], aim) or step
+            step = self._step(scaling, kept, [(1.0 - share) * term for term in still], aim) or step
             length = min(1.0, CENTRED * min(_longest(self._s, step[2], np.inf), _longest(self._y, step[3], np.inf)))
             if length > SHORT:
                 break
@@ -208,8 +208,8 @@ class InteriorPoint:
         """Stiffness of each cell from one (3, 3) block per bar."""
         nodes, points = self._ends.shape[1], self._ends.shape[0]
         unit = np.einsum("qa,qb->qab", self._ends, self._ends)
-        whole = np.einsum("qab,cqij->caibj", unit, blocks.reshape(-1, points, 3, 3))
-        return whole.reshape(-1, 3 * nodes, 3 * nodes)
+        blocks_all = np.einsum("qab,cqij->caibj", unit, blocks.reshape(-1, points, 3, 3))
+        return blocks_all.reshape(-1, 3 * nodes, 3 * nodes)
 
     def _step(self, scaling, kept, still, shift):
         """Changes of displacement, extension, cone vectors and multipliers; None where the factor breaks down."""
@@ -270,9 +270,9 @@ class _Scaling:
 
     def __init__(self, s, y):
         size, weight = _size(s), _size(y)
-        one, other = s / size[:, None], y / weight[:, None]
-        between = np.sqrt(0.5 * (1.0 + np.maximum((one * other).sum(axis=1), 1.0)))
-        self.w = (one + _mirrored(other)) / (2.0 * between)[:, None]
+        first, second = s / size[:, None], y / weight[:, None]
+        between = np.sqrt(0.5 * (1.0 + np.maximum((first * second).sum(axis=1), 1.0)))
+        self.w = (first + _mirrored(second)) / (2.0 * between)[:, None]
         self.w[:, 0] = np.sqrt(1.0 + (self.w[:, 1:] ** 2).sum(axis=1))
         self.ratio = np.sqrt(size / weight)
         self.point = self.multiply(y)
@@ -308,14 +308,14 @@ def _size(vectors):
     return np.sqrt(np.maximum((vectors[:, 0] - rest) * (vectors[:, 0] + rest), np.finfo(float).tiny))
 
 
-def _product(one, other):
+def _product(a, b):
     """Jordan's product u ∘ v of the second-order cone."""
-    head = (one * other).sum(axis=1)
-    return np.column_stack([head, one[:, :1] * other[:, 1:] + other[:, :1] * one[:, 1:]])
+    head = (a * b).sum(axis=1)
+    return np.column_stack([head, a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]])
 
 
-def _longest(vectors, change, most=1.0):
-    """Largest step, at most ``most``, that leaves all vectors in their cones."""
+def _longest(vectors, change, limit=1.0):
+    """Largest step, at most ``limit``, that leaves all vectors in their cones."""
     a = change[:, 0] ** 2 - (change[:, 1:] ** 2).sum(axis=1)
     b = vectors[:, 0] * change[:, 0] - (vectors[:, 1:] * change[:, 1:]).sum(axis=1)
     c = _size(vectors) ** 2
@@ -323,4 +323,4 @@ def _longest(vectors, change, most=1.0):
     with np.errstate(divide="ignore", invalid="ignore"):
         hit = c / (root - b)  # of a τ² + 2 b τ + c = 0 the smaller positive root
     hit = hit[(root > b) & ((b < 0.0) | (a < 0.0)) & (b * b >= a * c)]
-    return float(min(most, hit.min(initial=np.inf)))
+    return float(min(limit, hit.min(initial=np.inf)))

@@ -45,20 +45,20 @@ class Interval:
         between &= (np.where(moving[ends], group[ends], -1) == group[part]).any(axis=1)
         ends, pairs = ends[between], parts.pairs[between]
         self._number = np.full((len(moving), 3), -1)
-        own = (moving & (group == group[part]))[:, None] & ~parts.held
+        mask = (moving & (group == group[part]))[:, None] & ~parts.held
         touched = np.zeros_like(moving)
         touched[ends] = True
         # Along an axis that holds none of these parts all of them can go on together: one of them stays.
         self.bounded = bool((parts.held[:, axis] & touched).any())
         for k in range(3):
             if not (parts.held[:, k] & touched).any():
-                own[part, k] = False
-        own &= touched[:, None]
-        self._number[own] = np.arange(own.sum())
+                mask[part, k] = False
+        mask &= touched[:, None]
+        self._number[mask] = np.arange(mask.sum())
         self._goal = self._number[part, axis]
         self._line = parts.position[pairs[:, 1]] - parts.position[pairs[:, 0]]
         self._longest = parts.longest[between]
-        self._count = int(own.sum())
+        self._count = int(mask.sum())
         lines, rows, columns, signs = np.arange(len(pairs)), [], [], []
         for end, sign in ((1, 1.0), (0, -1.0)):
             for k in range(3):
@@ -81,13 +81,13 @@ class Interval:
         goal, size = np.zeros(self._count), self._longest.max()
         goal[self._goal] = sign
         t, weight, rest = np.zeros(self._count), np.full(len(self._line), 1.0 / size), 0.1 * self._longest**2
-        most = np.inf
+        farthest = np.inf
         for _ in range(MOST):
             line = self._line + (self._turns @ t).reshape(-1, 3)
             left = 0.5 * (self._longest**2 - (line**2).sum(axis=1))
             open_ = goal - self._turns.T @ (weight[:, None] * line).ravel()
             if np.abs(open_).max() < CLOSE:
-                most = min(most, float(goal @ t + weight @ left))
+                farthest = min(farthest, float(goal @ t + weight @ left))
                 if (weight @ rest) < CLOSE * size and np.abs(left - rest).max() < CLOSE * size**2:
                     break
             off, mean = left - rest, weight @ rest / len(rest)
@@ -99,7 +99,7 @@ class Interval:
             closer = off - _dot(line, (self._turns @ moved).reshape(-1, 3))
             length = min(_longest_step(weight, change), _longest_step(rest, closer))
             t, weight, rest = t + length * moved, weight + length * change, rest + length * closer
-        return most
+        return farthest
 
     def _newton(self, line, weight, rest, open_, off, target):
         """Changes of t and of the multipliers."""
@@ -109,12 +109,12 @@ class Interval:
         along = spread @ self._turns
         across = self._turns.T @ diags_array(np.repeat(weight, 3)) @ self._turns
         matrix = block_array([[across, along.T], [along, diags_array(-rest / weight)]], format="csc")
-        found = splu(matrix).solve(np.concatenate([open_, off - target / weight + rest]))
-        return found[:count], found[count:]
+        change = splu(matrix).solve(np.concatenate([open_, off - target / weight + rest]))
+        return change[:count], change[count:]
 
 
-def _dot(one, other):
-    return (one * other).sum(axis=1)
+def _dot(a, b):
+    return (a * b).sum(axis=1)
 
 
 def _longest_step(value, change):

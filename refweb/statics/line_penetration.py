@@ -47,14 +47,14 @@ class LinePassage:
             For one, where the stiffness was given.
         """
         family, still = self._family, np.zeros((self._system.rows, 3))
-        shown = np.zeros((len(family.cells), 1))
-        family.force(state.time, state.x, still, np.zeros_like(still), family.cells, family.data, shown)
-        if len(shown):
-            cell = int(shown.argmax())
-            self.deepest.note(float(shown[cell, 0]), None)
-            self.deepest.refuse(float(shown[cell, 0]), f"load step {state.time:g}", cell)
-        met, way = np.zeros(4, dtype=np.int64), state.x - self._x
-        numbers = 0.0, 0.0, 0.0, 1.0, self._x, way, still, still, family.cells, family.data, met
+        depth = np.zeros((len(family.cells), 1))
+        family.force(state.time, state.x, still, np.zeros_like(still), family.cells, family.data, depth)
+        if len(depth):
+            cell = int(depth.argmax())
+            self.deepest.note(float(depth[cell, 0]), None)
+            self.deepest.refuse(float(depth[cell, 0]), f"load step {state.time:g}", cell)
+        met, path = np.zeros(4, dtype=np.int64), state.x - self._x
+        numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, family.cells, family.data, met
         if self.why == UNFOLLOWED and family.crossing.meets(*numbers):
             self.why = (
                 f"{lines_of(self._system.net, met)} meet on their straight ways to load step {state.time:g}; smaller "

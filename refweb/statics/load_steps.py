@@ -44,7 +44,7 @@ def solve(system, load_steps, progress=None):
     SolverError
         Where there is no equilibrium, or none is found; the states before have been yielded.
     """
-    whole, system = system, at_rest(system)
+    full_system, system = system, at_rest(system)
     newton, states = Newton(system, progress, load_steps[0]), []
     for t in load_steps:
         try:
@@ -62,7 +62,7 @@ def solve(system, load_steps, progress=None):
         if not system.convex:
             from .stability import ask
 
-            ask(whole, system, state, newton.factor if newton.follows else None)
+            ask(full_system, system, state, newton.factor if newton.follows else None)
         state.deviations = newton.deviations(state)
         states = [*states[-1:], state]
         yield state
@@ -86,7 +86,7 @@ def _equilibrium(newton, t, x, warm):
     pulling = bool((laws == TENSION_ONLY).all())
     convex = pulling and not newton.turns
     try:
-        state = newton.solve(t, x, warm=warm, most=WITH_A_WAY_AROUND if path else MOST)
+        state = newton.solve(t, x, warm=warm, limit=WITH_A_WAY_AROUND if path else MOST)
     except NotFound as error:
         if not path:
             raise
@@ -127,7 +127,7 @@ def _by_stiffening(newton, t, x, spent):
 def _by_patience(newton, t, x):
     """Equilibrium of the smooth law by many small steps; where none is found, the message says how slack lines push."""
     try:
-        return newton.solve(t, x, most=PATIENCE)
+        return newton.solve(t, x, limit=PATIENCE)
     except NotFound as error:
         data = newton.system.net.line_data
         push = f"{(data[:, AXIAL_STIFFNESS] * data[:, G0]).max():.3g} N"

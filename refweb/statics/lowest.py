@@ -59,14 +59,14 @@ def lowest(newton, state):
     above, none = _above(system, state, forces), NOTHING * _scale(system, state)
     if above > none:
         try:
-            other = newton.solve(state.step, plain.x, warm=True)
+            start_state = newton.solve(state.step, plain.x, warm=True)
         except SolverError as error:
-            other, spent = state, getattr(error, "stats", {})
+            start_state, spent = state, getattr(error, "stats", {})
         else:
-            spent = other.stats
-        starts = [system.energy(state.step, one.x) for one in (state, other)]
+            spent = start_state.stats
+        starts = [system.energy(state.step, equilibrium_.x) for equilibrium_ in (state, start_state)]
         if starts[1] < starts[0] - none:
-            state, above, spent = other, _above(system, other, forces), state.stats
+            state, above, spent = start_state, _above(system, start_state, forces), state.stats
         add_spent(state.stats, spent)
         state.stats["starts"] = starts
     state.stats |= {"above_lowest": above, "unsure": above > SURE * _scale(system, state)}
@@ -80,13 +80,13 @@ def _without_smoothing(newton, state):
     numbers[:, R0] = np.abs(numbers[:, SLACKNESS])
     plain, t = type(newton)(newton.system.with_line_data(numbers), newton.progress, state.step), state.step
     try:
-        return plain.solve(t, state.x, most=WITH_A_WAY_AROUND)
+        return plain.solve(t, state.x, limit=WITH_A_WAY_AROUND)
     except NotFound as error:
         from .interior_point import by_interior_point
 
-        found = by_interior_point(plain, t, state.x)
-        add_spent(found.stats, error.stats)
-        return found
+        smooth_free = by_interior_point(plain, t, state.x)
+        add_spent(smooth_free.stats, error.stats)
+        return smooth_free
 
 
 def _forces(system, plain):
@@ -107,13 +107,13 @@ def _above(system, state, forces):
     law = Law("smooth")  # which without smoothing is that of lines that only pull
     size = np.linalg.norm(forces, axis=1)
     g = size / axial + g0  # = (s + √(s² + 4η²))/2 at s = ε − ε0, so that s = g − η²/g
-    there = np.where(size > 0.0, slackness + g - smoothing**2 / np.where(g > 0.0, g, 1.0), 0.0)
+    dual_energy = np.where(size > 0.0, slackness + g - smoothing**2 / np.where(g > 0.0, g, 1.0), 0.0)
     stored = axial * (
         law.energy_density(strains(net, state.x).ravel(), 1.0, slackness, smoothing)
-        - law.energy_density(there, 1.0, slackness, smoothing)
+        - law.energy_density(dual_energy, 1.0, slackness, smoothing)
     )
     along = (forces * net.bar_vectors(state.x)).sum(axis=1)
-    above = float((net.bar_lengths * (stored + size * (1.0 + there)) - along).sum())
+    above = float((net.bar_lengths * (stored + size * (1.0 + dual_energy)) - along).sum())
     return float(max(above, 0.0)) + 2.0 * np.finfo(float).eps * float(np.abs(along).sum())
 
 

@@ -108,11 +108,11 @@ class Newton:
             from .critical_speed import drifting
 
             self.drifting = drifting(system)
-        held = np.concatenate([np.zeros(0, dtype=int), *(part.unknowns for part in system.unsupported_parts)])
-        self.anchors = system.pattern.diagonal[held]
+        anchors = np.concatenate([np.zeros(0, dtype=int), *(part.unknowns for part in system.unsupported_parts)])
+        self.anchors = system.pattern.diagonal[anchors]
         self.scale = 0.0
 
-    def solve(self, t, x, warm=False, most=200):
+    def solve(self, t, x, warm=False, limit=200):
         """Equilibrium at load step t from the displacement x.
 
         Parameters
@@ -124,7 +124,7 @@ class Newton:
         warm : bool
             Whether x is near an equilibrium, as after a load step: the first prestress τ is then 1e-4 of the one that
             (load/EA)^(2/3) EA suggests, the tension scale of a flat net.
-        most : int
+        limit : int
             Largest number of factorizations.
 
         Returns
@@ -141,15 +141,15 @@ class Newton:
         x, net = x.copy(), system.at(t).net
         system.drive(t, x)
         stats: dict = dict(nsteps=0, nfev=0, njev=0, nlu=0)
-        here, search = self._evaluated(t, x, stats), self._search(t, x)
-        scale, best, last, made = self._scale(t, here), np.inf, np.inf, np.inf
+        iterate, search = self._evaluated(t, x, stats), self._search(t, x)
+        scale, best, last, made = self._scale(t, iterate), np.inf, np.inf, np.inf
         shift = self.axial * min(max((scale / self.axial) ** (2 / 3), 1e-9), 1e-2) * (1e-4 if warm else 1.0)
         ahead = None
         while True:
-            scale = self._scale(t, here)
-            error = residual(system, here.force, scale)
+            scale = self._scale(t, iterate)
+            error = residual(system, iterate.force, scale)
             if not np.isfinite(error):
-                node = np.argmax(~np.isfinite(here.force).all(axis=1))
+                node = np.argmax(~np.isfinite(iterate.force).all(axis=1))
                 raise NotFound(
                     f"non-finite force at step {t:g}, node {node}: Newton's method went too far; raise the load in "
                     'smaller load_steps, or method = "relaxation"',
@@ -158,31 +158,31 @@ class Newton:
             if error <= TOLERANCE or (error <= LIMIT and error > 0.5 * best):
                 break
             best = min(best, error)
-            if max(stats["nlu"], stats["nsteps"]) >= most:
-                raise self._not_found(t, here, error, most, stats)
+            if max(stats["nlu"], stats["nsteps"]) >= limit:
+                raise self._not_found(t, iterate, error, limit, stats)
             if error < SETTLED:
                 shift = max(shift * error / SETTLED, min(shift, 1e-12 * self.axial))
-            r = here.force.ravel()[system.free]
+            r = iterate.force.ravel()[system.free]
             if ahead is not None and not warm:
                 ahead = ahead._replace(lent=LENT * min(1.0, FADES * error))
             again = error < 0.5 * last and (warm or made <= NEAR)
-            p = self._step_by_factor_at_hand(t, here, r, shift, error, stats, ahead) if again else None
+            p = self._step_by_factor_at_hand(t, iterate, r, shift, error, stats, ahead) if again else None
             if p is None:
-                (p, shift), made = self._step(t, here, r, shift, stats, ahead), error
-            x, shift = search.along(p, here.x, r, shift, stats)
-            if system.convex and error > SETTLED and here.tension.any():
-                ahead = self._tension_ahead(net, here.x, x, p, ahead)
+                (p, shift), made = self._step(t, iterate, r, shift, stats, ahead), error
+            x, shift = search.along(p, iterate.x, r, shift, stats)
+            if system.convex and error > SETTLED and iterate.tension.any():
+                ahead = self._tension_ahead(net, iterate.x, x, p, ahead)
             else:
                 ahead = None
-            here, last = self._evaluated(t, x, stats), error
+            iterate, last = self._evaluated(t, x, stats), error
             stats["nsteps"] += 1
             self.progress(f"step {t:g}, residual {error:.0e}")
         if stats["nsteps"]:
-            here = self._polished(t, here, shift, error, scale, stats)
-            error = residual(system, here.force, scale)
+            iterate = self._polished(t, iterate, shift, error, scale, stats)
+            error = residual(system, iterate.force, scale)
         stats["residual"] = float(error)
-        self.scale = self._scale(t, here)
-        return Equilibrium(t, here.x, here.tension, here.force, stats)
+        self.scale = self._scale(t, iterate)
+        return Equilibrium(t, iterate.x, iterate.tension, iterate.force, stats)
 
     def _evaluated(self, t, x, stats):
         """The `Iterate` at x."""
@@ -190,9 +190,9 @@ class Newton:
         stats["nfev"] += 1
         return Iterate(x, force, per_cell.tension.copy())
 
-    def _scale(self, t, here):
+    def _scale(self, t, iterate):
         """Scale of the residual at an `Iterate` [N]."""
-        return max(self.scale, force_scale(self.system, t, here.x, here.tension))
+        return max(self.scale, force_scale(self.system, t, iterate.x, iterate.tension))
 
     def _search(self, t, x):
         if not self.follows:
@@ -219,18 +219,18 @@ class Newton:
 
         ``before`` is the `Ahead` that the step was made with, None where it was with those at x.
         """
-        bars, whole = Bars(net, x), np.zeros((self.system.rows, 3))
-        whole.ravel()[self.system.free] = p
+        bars, all_rows = Bars(net, x), np.zeros((self.system.rows, 3))
+        all_rows.ravel()[self.system.free] = p
         before = bars.tension if before is None else before.tension
         share = (y - x).ravel()[self.system.free] @ p / (p @ p)
-        return Ahead(before + share * (bars.ahead(whole) - before), 0.0)
+        return Ahead(before + share * (bars.ahead(all_rows) - before), 0.0)
 
-    def _step(self, t, here, r, shift, stats, ahead):
+    def _step(self, t, iterate, r, shift, stats, ahead):
         """Newton step of the shifted tangent, and the shift that it took."""
-        compressed = bool((here.tension < 0.0).any()) and not (self.follows or self.turns)
+        compressed = bool((iterate.tension < 0.0).any()) and not (self.follows or self.turns)
         definite = False
         for _ in range(60):
-            self._factorize(self._matrix(t, here.x, shift, definite, ahead), None if definite else shift)
+            self._factorize(self._matrix(t, iterate.x, shift, definite, ahead), None if definite else shift)
             stats["njev"] += 1
             stats["nlu"] += 1
             if compressed and not definite and self.factor.negative_pivots():
@@ -242,14 +242,14 @@ class Newton:
             shift = max(4.0 * shift, 1e-12 * self.axial)
         raise NotFound(f"singular tangent at step {t:g}: no shift up to {shift:.3g} N makes it definite", stats)
 
-    def _step_by_factor_at_hand(self, t, here, r, shift, error, stats, ahead):
+    def _step_by_factor_at_hand(self, t, iterate, r, shift, error, stats, ahead):
         """The same step by a factorization of another tangent; None where it takes long or leads up."""
-        if not self._can_use_again(here.tension):
+        if not self._can_use_again(iterate.tension):
             return None
         stats["njev"] += 1
-        values = self._matrix(t, here.x, shift, False, ahead)
-        found = self._by_factor_at_hand(values, r, np.clip(error, CLOSE, NEAR))
-        return found.y if found.enough and r @ found.y > 0.0 else None
+        values = self._matrix(t, iterate.x, shift, False, ahead)
+        change = self._by_factor_at_hand(values, r, np.clip(error, CLOSE, NEAR))
+        return change.y if change.enough and r @ change.y > 0.0 else None
 
     def _can_use_again(self, tension):
         """Tell if a tangent is at hand, and that of lines in tension, without follower or centrifugal forces."""
@@ -266,24 +266,26 @@ class Newton:
             return p is not None
         return r @ p > 0.0 and not (self.turns and self.factor.negative_pivots() > self.drifting)
 
-    def _polished(self, t, here, shift, error, scale, stats):
+    def _polished(self, t, iterate, shift, error, scale, stats):
         """Take one more step with the factorization at hand, kept where it lowers the residual."""
-        r = here.force.ravel()[self.system.free]
-        if self._can_use_again(here.tension):
-            p = self._by_factor_at_hand(self._matrix(t, here.x, shift, False), r, np.clip(END / error, CLOSE, NEAR)).y
+        r = iterate.force.ravel()[self.system.free]
+        if self._can_use_again(iterate.tension):
+            p = self._by_factor_at_hand(
+                self._matrix(t, iterate.x, shift, False), r, np.clip(END / error, CLOSE, NEAR)
+            ).y
         else:
             p = self.factor.solve(r)
         if p is None:
-            return here
-        y = here.x.copy()
+            return iterate
+        y = iterate.x.copy()
         y.ravel()[self.system.free] += p
-        there = self._evaluated(t, y, stats)
-        return there if residual(self.system, there.force, scale) < error else here
+        next_iterate = self._evaluated(t, y, stats)
+        return next_iterate if residual(self.system, next_iterate.force, scale) < error else iterate
 
-    def _not_found(self, t, here, error, most, stats):
-        node = np.linalg.norm(np.where(self.system.supported, 0, here.force), axis=1).argmax()
+    def _not_found(self, t, iterate, error, limit, stats):
+        node = np.linalg.norm(np.where(self.system.supported, 0, iterate.force), axis=1).argmax()
         return NotFound(
-            f"no equilibrium found at step {t:g} in {most} factorizations: residual {error:.2e} at node {node}, limit "
+            f"no equilibrium found at step {t:g} in {limit} factorizations: residual {error:.2e} at node {node}, limit "
             f"{LIMIT:g}; raise the load in smaller load_steps, use a larger smoothing, or "
             'method = "relaxation"',
             stats,
@@ -315,8 +317,8 @@ class Newton:
         Moves at no cost are left out; where no duality bound tells what floats, the null space of the tangent does.
         """
         system, asked = self.system, self.follows or state.stats.get("smallest_pivot") is not None
-        if not asked and (found := self._deviations_by_factor_at_hand(state)) is not None:
-            return found
+        if not asked and (by_factor := self._deviations_by_factor_at_hand(state)) is not None:
+            return by_factor
         if not asked:
             self.factorize_at(state)
         solve = self.factor.solve
@@ -327,23 +329,23 @@ class Newton:
             if state.floating is not None:
                 solve = null.solve
         forces = self._disturbing(state)
-        found = np.zeros((len(forces), system.rows, 3))
-        for deviation, force in zip(found, forces, strict=True):
+        by_factor = np.zeros((len(forces), system.rows, 3))
+        for deviation, force in zip(by_factor, forces, strict=True):
             if (p := solve(force)) is None:
                 return None
             deviation.ravel()[system.free] = p
-        return found
+        return by_factor
 
     def _deviations_by_factor_at_hand(self, state):
         """The same where nothing floats, as its duality bound proves; None where that does not say or takes long."""
         if state.duality_bound is None or state.floating is not None or not self._can_use_again(state.tension):
             return None
         forces = np.column_stack(self._disturbing(state))
-        found = self._by_factor_at_hand(self._matrix(state.step, state.x, self._tiny, False), forces, ROUGH)
-        if not found.enough:
+        deviation = self._by_factor_at_hand(self._matrix(state.step, state.x, self._tiny, False), forces, ROUGH)
+        if not deviation.enough:
             return None
         deviations = np.zeros((forces.shape[1], self.system.rows, 3))
-        deviations.reshape(len(deviations), -1)[:, self.system.free] = found.y.T
+        deviations.reshape(len(deviations), -1)[:, self.system.free] = deviation.y.T
         return deviations
 
     def _disturbing(self, state):

@@ -26,18 +26,18 @@ def predicted(system, t, states):
         Those before, the last one last.
     """
     last = states[-1]
-    found, least = last.x, _energy(system, t, last.x)
+    start, lowest = last.x, _energy(system, t, last.x)
     before = [(0.0, np.zeros_like(last.x)), *((state.step, state.x) for state in states[-2:-1])]
     for step, x in before:
         if not min(t, last.step) > 0.0 or step == last.step:
             continue
         for power in POWERS:
             share = (t**power - last.step**power) / (last.step**power - step**power)
-            there = last.x + share * (last.x - x)
-            energy = _energy(system, t, there)
-            if energy < least:
-                found, least = there, energy
-    return found
+            trial = last.x + share * (last.x - x)
+            energy = _energy(system, t, trial)
+            if energy < lowest:
+                start, lowest = trial, energy
+    return start
 
 
 def _energy(system, t, x):

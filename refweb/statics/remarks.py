@@ -48,14 +48,14 @@ def remark_on_open(state, equilibrium):
 
 def on_stability(state, equilibrium, subject="the equilibrium"):
     """Remarks on the stability of an equilibrium, and on other equilibria: pairs of a kind and a text."""
-    found = equilibrium.stability
-    if found is None:
+    stability = equilibrium.stability
+    if stability is None:
         return
-    if found.sign == -1:
-        yield "saddle", f"{subject} is a saddle ({found.why}): {_way_out(state, found)}"
+    if stability.sign == -1:
+        yield "saddle", f"{subject} is a saddle ({stability.why}): {_way_out(state, stability)}"
         return
-    if found.sign is None:
-        yield "stability", f"whether {subject} is stable is not decided: {found.why}"
+    if stability.sign is None:
+        yield "stability", f"whether {subject} is stable is not decided: {stability.why}"
     pushing = "bars" if _bars_push(state) else "slack lines"
     if equilibrium.may_turn_over:
         pull = (state.element_tension[state.system.net.laws == LINEAR] >= 0.0).all()
@@ -69,11 +69,11 @@ def on_stability(state, equilibrium, subject="the equilibrium"):
         yield "others", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
 
 
-def _way_out(state, found):
+def _way_out(state, stability):
     """Consequence of a saddle, and the remedy."""
     system = state.system
     deflect = "start from a web that is deflected"
-    if found.held:
+    if stability.held:
         return (
             "the web would leave this state by itself as soon as anything damps its motion in these axes; until then "
             f"Coriolis forces hold it; {deflect}"

@@ -16,12 +16,12 @@ TRIALS = 30
 """Largest number of equilibria that are looked for to find it."""
 
 
-def shares(system, found):
+def shares(system, equilibrium):
     """Tension of each element over its limit in a `refweb.statics.equilibrium.Equilibrium`."""
-    return system.forces(found.step, found.x).per_cell.tension / system.weakness.limits
+    return system.forces(equilibrium.step, equilibrium.x).per_cell.tension / system.weakness.limits
 
 
-def refuse_break(system, solve, found, before):
+def refuse_break(system, solve, equilibrium, before):
     """Refuse an equilibrium in which a line is broken.
 
     Parameters
@@ -30,7 +30,7 @@ def refuse_break(system, solve, found, before):
         With a `refweb.effects.base.BreakLimits`.
     solve : callable
         The method of statics, see `refweb.registry.STATICS`.
-    found : refweb.statics.equilibrium.Equilibrium
+    equilibrium : refweb.statics.equilibrium.Equilibrium
         The equilibrium.
     before : float
         A load step at which no line breaks, 0 where none is known.
@@ -40,11 +40,11 @@ def refuse_break(system, solve, found, before):
     SolverError
         With the load step and the line of the first break.
     """
-    net, due = system.net, [(t, element) for t, element in system.weakness.times if t <= found.step]
-    own = shares(system, found)
-    step, element = found.step, int(own.argmax())
-    if own[element] >= 1.0:
-        step, element = _first(system, solve, found, before)
+    net, due = system.net, [(t, element) for t, element in system.weakness.times if t <= equilibrium.step]
+    utilisation = shares(system, equilibrium)
+    step, element = equilibrium.step, int(utilisation.argmax())
+    if utilisation[element] >= 1.0:
+        step, element = _first(system, solve, equilibrium, before)
     elif not due:
         return
     if due and due[0][0] <= step:
@@ -59,20 +59,20 @@ def refuse_break(system, solve, found, before):
     )
 
 
-def _first(system, solve, found, before):
+def _first(system, solve, equilibrium, before):
     """(Load step, element) of the first break, as far as equilibria before it are found."""
-    known = [found]
+    known = [equilibrium]
 
     def over(step):
-        known[0] = next(iter(solve(system, [step], None))) if step != found.step else found
+        known[0] = next(iter(solve(system, [step], None))) if step != equilibrium.step else equilibrium
         return float(shares(system, known[0]).max()) - 1.0
 
     try:
-        if found.step > before and over(before) < 0.0:
+        if equilibrium.step > before and over(before) < 0.0:
             from scipy.optimize import brentq
 
-            step = brentq(over, before, found.step, xtol=FINE * abs(found.step), maxiter=TRIALS)
+            step = brentq(over, before, equilibrium.step, xtol=FINE * abs(equilibrium.step), maxiter=TRIALS)
             return step, int(np.argmax(shares(system, known[0])))
     except (SolverError, RuntimeError):  # nothing to be found between: what is known is the load step itself
-        known[0] = found
+        known[0] = equilibrium
     return known[0].step, int(np.argmax(shares(system, known[0])))

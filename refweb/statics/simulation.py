@@ -57,8 +57,8 @@ class Simulation:
         solve, smoothing = load(STATICS[scene.solve.method]), self._smoothing()
         solution.solver = {**SOLVER, "method": scene.solve.method, **self._totals}
         try:
-            for found in solve(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
-                row = self._take(found, smoothing)
+            for equilibrium in solve(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
+                row = self._take(equilibrium, smoothing)
                 self.rows.append(row)
                 if folder is not None:
                     folder.row(row)
@@ -87,16 +87,16 @@ class Simulation:
 
         return Smoothing(scene)
 
-    def _take(self, found, smoothing):
+    def _take(self, equilibrium, smoothing):
         """Write down an equilibrium; its history row."""
-        scene, solution, state = self.scene, self.solution, State(self.system, found.step, found.x)
+        scene, solution, state = self.scene, self.solution, State(self.system, equilibrium.step, equilibrium.x)
         rest = at_rest(self.system)
-        if found.stability is None and not rest.convex:  # of a method that knows no tangents
+        if equilibrium.stability is None and not rest.convex:  # of a method that knows no tangents
             from .stability import ask
 
-            ask(self.system, rest, found)
+            ask(self.system, rest, equilibrium)
         if self.system.weakness is not None:
-            self._refuse_break(found)
+            self._refuse_break(equilibrium)
         if self._passage is not None:
             self._passage.note(state)
             solution.bodies = self._passage.overlaps.plain()
@@ -105,51 +105,51 @@ class Simulation:
             self._lines.note(state)
             solution.passage = {**solution.passage, "lines": f"not certified: {self._lines.why}"}
             solution.lines = self._lines.deepest.plain()
-        results = self._results(found, state, smoothing)
-        row = [found.step, *(result.value for result in results.values()), *state.energies.values()]
+        results = self._results(equilibrium, state, smoothing)
+        row = [equilibrium.step, *(result.value for result in results.values()), *state.energies.values()]
         if not np.isfinite(row).all():
             bad = self.columns[np.isfinite(row).argmin()]
-            raise SolverError(f"non-finite {bad} at step {found.step:g}: the numbers of the scene overflow")
-        stats = {key: found.stats.get(key) for key in SOLVER} | {
+            raise SolverError(f"non-finite {bad} at step {equilibrium.step:g}: the numbers of the scene overflow")
+        stats = {key: equilibrium.stats.get(key) for key in SOLVER} | {
             "method": scene.solve.method,
             "factorization": self.system.factorized_by,
-            "duality_gap": found.duality_bound.gap if found.duality_bound else None,
-            "slack_nodes": len(open_rows(state, found)),
+            "duality_gap": equilibrium.duality_bound.gap if equilibrium.duality_bound else None,
+            "slack_nodes": len(open_rows(state, equilibrium)),
         }
         self._totals = {key: total + stats[key] for key, total in self._totals.items()}
-        load = {"load": load} if (load := _load(self.system, found)) is not None else {}
-        solution.steps.append({"step": found.step, **load, "results": results, "solver": stats})
+        load = {"load": load} if (load := _load(self.system, equilibrium)) is not None else {}
+        solution.steps.append({"step": equilibrium.step, **load, "results": results, "solver": stats})
         solution.solver = {**stats, **self._totals}
         solution.state = state
         if (used := state.utilisation) is not None:
             solution.utilisation = float(used.max()), int(used.argmax())
-        self._remarks.note(found.step, remarks_on(state, stats, solution.utilisation, found))
+        self._remarks.note(equilibrium.step, remarks_on(state, stats, solution.utilisation, equilibrium))
         return row
 
-    def _refuse_break(self, found):
+    def _refuse_break(self, equilibrium):
         """Refuse an equilibrium in which a line is broken."""
         from .rupture import refuse_break
 
         before = self.solution.steps[-1]["step"] if self.solution.steps else 0.0
-        refuse_break(self.system, load(STATICS[self.scene.solve.method]), found, before)
+        refuse_break(self.system, load(STATICS[self.scene.solve.method]), equilibrium, before)
 
-    def _results(self, found, state, smoothing):
+    def _results(self, equilibrium, state, smoothing):
         """The observables of an equilibrium by name, with their errors."""
         observables = self.scene.observables
         values = [o.value(state) for o in observables]
-        errors = [o.error(state, found) for o in observables]
+        errors = [o.error(state, equilibrium) for o in observables]
         smoothed = [None] * len(values)
         share = None
         if (radius := self.system.orbit_radius) is not None:
             places = state.position[: self.system.rows - self.system.net.spins]
             share = float(np.linalg.norm(places, axis=1).max()) / radius
         if smoothing is not None:
-            smoothed = smoothing.errors(found, [value.value for value in values])
+            smoothed = smoothing.errors(equilibrium, [value.value for value in values])
         return {
             o.name: o.bounded(
                 Result(
-                    *(value.value, error, o.unit, found.step, value.where, moved),
-                    interval=o.interval(state, found),
+                    *(value.value, error, o.unit, equilibrium.step, value.where, moved),
+                    interval=o.interval(state, equilibrium),
                     neglected=None if share is None else abs(value.value) * share,
                     at=None if value.where is None else o.observable.at,
                 ),
@@ -167,9 +167,9 @@ class Simulation:
             folder.frame(self._framed, self.solution.state)
 
 
-def _load(system, found):
+def _load(system, equilibrium):
     """Sum of the sizes of the forces of ``[[load]]`` at an equilibrium [N], None without any."""
-    forces = [system.force_of(f, found.step, found.x) for f in system.families if f.name == "load"]
+    forces = [system.force_of(f, equilibrium.step, equilibrium.x) for f in system.families if f.name == "load"]
     return float(np.linalg.norm(sum(forces), axis=1).sum()) if forces else None
 
 

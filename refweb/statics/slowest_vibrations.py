@@ -49,18 +49,18 @@ class Weighed:
     """
 
     def __init__(self, solver, M, C=None):
-        own = M.diagonal()
-        self.massive = np.flatnonzero(own > 0.0)
-        self._root, self._size, self._solver = np.sqrt(own[self.massive]), len(own), solver
+        diagonal = M.diagonal()
+        self.massive = np.flatnonzero(diagonal > 0.0)
+        self._root, self._size, self._solver = np.sqrt(diagonal[self.massive]), len(diagonal), solver
         self.M = M.tocsr()[self.massive][:, self.massive]
         self.C: Any = None if C is None else C.tocsr()[self.massive][:, self.massive]
         self.omega = 1.0
 
     def soft(self, force, transposed=False):
         """Weighed displacement under weighed forces."""
-        whole = np.zeros(self._size)
-        whole[self.massive] = force
-        return self._solver.solve(whole, transposed)[self.massive]
+        full = np.zeros(self._size)
+        full[self.massive] = force
+        return self._solver.solve(full, transposed)[self.massive]
 
     def once(self, u):
         """K⁻¹ M."""

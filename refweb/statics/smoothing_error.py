@@ -30,12 +30,12 @@ class Smoothing:
     def errors(self, equilibrium, values):
         """Distance of each value in an equilibrium from the value at η → 0; None where that was not found."""
         try:
-            found = self._newton.solve(equilibrium.step, equilibrium.x, warm=True, most=60)
+            equilibrium_near = self._newton.solve(equilibrium.step, equilibrium.x, warm=True, limit=60)
         except SolverError:
             return [None] * len(values)
-        state = State(self._system, found.step, found.x)
-        there = [o.value(state).value for o in self._observables]
-        return [abs(here - other) / (1.0 - SHARE) for here, other in zip(values, there, strict=True)]
+        state = State(self._system, equilibrium_near.step, equilibrium_near.x)
+        values_near = [o.value(state).value for o in self._observables]
+        return [abs(value - value_near) / (1.0 - SHARE) for value, value_near in zip(values, values_near, strict=True)]
 
 
 def _less_smooth(table):

@@ -196,10 +196,10 @@ class Question:
         if not heavy.any():
             return K, None, False
         inner = K[~heavy][:, ~heavy]
-        own, stands = K[heavy][:, heavy], True
+        block, stands = K[heavy][:, heavy], True
         if inner.size:
             try:
-                own = own - K[heavy][:, ~heavy] @ np.linalg.solve(inner, K[~heavy][:, heavy])
+                block = block - K[heavy][:, ~heavy] @ np.linalg.solve(inner, K[~heavy][:, heavy])
                 stands = not _negative(*_eigenvalues(inner)).any()
             except np.linalg.LinAlgError:
                 stands = False
@@ -210,7 +210,7 @@ class Question:
             half = scipy.linalg.solve_triangular(root, matrix, lower=True)
             return scipy.linalg.solve_triangular(root, half.T, lower=True).T
 
-        return scaled(own), None if C is None else scaled(C.toarray()[heavy][:, heavy]), stands
+        return scaled(block), None if C is None else scaled(C.toarray()[heavy][:, heavy]), stands
 
     # Answers
 
@@ -229,9 +229,9 @@ class Question:
         if len(self.rest.free) > DENSE:
             return self._of_many(solver)
         K, C, stands = self._reduced()
-        found, off = _eigenvalues(K)
-        loose = not (stands and (abs(found) > off).all())
-        negative = 0 if self.definite >= 0 else int(_negative(found, off).sum())
+        values, off = _eigenvalues(K)
+        loose = not (stands and (abs(values) > off).all())
+        negative = 0 if self.definite >= 0 else int(_negative(values, off).sum())
         if negative > self._drifting:
             turned = bool(self.rest.rotating) and C is not None and not negative % 2
             return (self._in_frame(EIGENVALUE) if turned else Stability(-1, EIGENVALUE))._replace(loose=loose)
@@ -314,27 +314,27 @@ def _eigenvalues(A):
     """Eigenvalues of a matrix, and what rounding may make of each, to first order."""
     import scipy.linalg
 
-    found, before, behind = scipy.linalg.eig(A, left=True, right=True)
+    eigenvalues, before, behind = scipy.linalg.eig(A, left=True, right=True)
     overlap = abs((before.conj() * behind).sum(axis=0))  # of unit vectors: 1 over the condition number
-    least = np.finfo(float).eps
-    return found, ROUNDING * np.linalg.norm(A) / np.maximum(overlap, least)
+    epsilon = np.finfo(float).eps
+    return eigenvalues, ROUNDING * np.linalg.norm(A) / np.maximum(overlap, epsilon)
 
 
-def _negative(found, off):
+def _negative(eigenvalues, off):
     """Mask of the eigenvalues that are real and negative."""
-    return (found.real < -off) & (abs(found.imag) <= off)
+    return (eigenvalues.real < -off) & (abs(eigenvalues.imag) <= off)
 
 
 def _growth(K, C):
     """Largest real part of s [1/s], of unit masses; 0 where none is positive beyond rounding."""
-    found, off = _eigenvalues(K)
+    values, off = _eigenvalues(K)
     if C is None:
-        complex_ = abs(found.imag) > off
-        grows = complex_ | (found.real < -off)
-        return float(abs(np.sqrt(-found[grows] + 0j).real).max(initial=0.0))
+        complex_ = abs(values.imag) > off
+        grows = complex_ | (values.real < -off)
+        return float(abs(np.sqrt(-values[grows] + 0j).real).max(initial=0.0))
     scale = np.sqrt(np.linalg.norm(K)) + np.linalg.norm(C)
     if scale == 0.0:
         return 0.0
     size = len(K)
-    found, off = _eigenvalues(np.block([[np.zeros_like(K), np.eye(size)], [-K / scale**2, -C / scale]]))
-    return scale * float(found.real[found.real > off].max(initial=0.0))
+    values, off = _eigenvalues(np.block([[np.zeros_like(K), np.eye(size)], [-K / scale**2, -C / scale]]))
+    return scale * float(values.real[values.real > off].max(initial=0.0))

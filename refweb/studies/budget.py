@@ -67,27 +67,27 @@ def _expected(ladder, rung, runner):
         return runner.expected(trial)
     power = 1.0 if trial.key == "safety" else 0.2
     if len(spent) > 1:
-        (first, one), (last, other) = spent[-2:]
-        power = max(power, math.log(other / one) / math.log(first / last))
+        (first, cost_before), (last, cost_last) = spent[-2:]
+        power = max(power, math.log(cost_last / cost_before) / math.log(first / last))
     return spent[-1][1] * (spent[-1][0] / trial.value) ** power
 
 
 def _try(trial, runner, until):
     """Run a trial, several times where it is cheap, and note how it ended."""
-    least = np.inf
+    cheapest = np.inf
     for _ in range(REPEATS):
         began = trials.clock()
         try:
             runner.run(trial, until)
         except trials.OverBudget:
-            if least < np.inf:
+            if cheapest < np.inf:
                 break
             trial.message = "took more than its share of the budget"
             return
         except SolverError as error:
             trial.status, trial.message, trial.cpu_s = "failed", str(error), trials.clock() - began
             return
-        trial.status, least = "solved", min(least, trial.cpu_s)
+        trial.status, cheapest = "solved", min(cheapest, trial.cpu_s)
         if trial.cpu_s > CHEAP or 2.0 * trials.clock() - began > until:
             break
-    trial.cpu_s = least
+    trial.cpu_s = cheapest

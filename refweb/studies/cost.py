@@ -148,45 +148,45 @@ class Cost:
         write_atomically(folder / "cost.png", self.draw().savefig)
 
 
-def _sentence(found):
-    if found.references:
-        yield _prices(found)
-        yield _agreement(found)
+def _sentence(costs):
+    if costs.references:
+        yield _prices(costs)
+        yield _agreement(costs)
     else:
         yield "No two runs can be compared, so nothing is known of errors."
 
 
-def _prices(found):
+def _prices(costs):
     """Prices of digits."""
     best = {}
     for digits in DIGITS:
-        if (trial := found.price(digits)) is not None:
+        if (trial := costs.price(digits)) is not None:
             best[trial] = digits
     best = {trial: digits for trial, digits in best.items() if digits >= min(3, max(best.values()))}
-    told = [
+    sentences = [
         f"{digits} digit{'s' if digits > 1 else ''}{' cost' if not i else ''} {trial.cpu_s:.2g} s with {trial.method}, "
         f"{trial.setting}"
         for i, (trial, digits) in enumerate(sorted(best.items(), key=lambda item: item[1]))
     ]
-    name = found.observable.name
-    return f"{name}: {'; '.join(told)}." if told else f"No run has a digit of {name} that can be trusted."
+    name = costs.observable.name
+    return f"{name}: {'; '.join(sentences)}." if sentences else f"No run has a digit of {name} that can be trusted."
 
 
-def _agreement(found):
+def _agreement(costs):
     """Agreement of the references, and its meaning."""
-    one, other = (f"{t.method} ({t.setting})" for t in found.references)
+    first, second = (f"{t.method} ({t.setting})" for t in costs.references)
     agreed, known = (
-        max(-math.log10(max(off / found.scale, 1e-16)), 0.0) if found.scale else 0.0
-        for off in (found.apart[0], found.trust[0])
+        max(-math.log10(max(off / costs.scale, 1e-16)), 0.0) if costs.scale else 0.0
+        for off in (costs.apart[0], costs.trust[0])
     )
-    if not found.independent:
+    if not costs.independent:
         return (
-            f"There are runs of only one kind of method: {one} and {other} are {agreed:.1f} digits apart, which says "
-            "how it converges, and no more."
+            f"There are runs of only one kind of method: {first} and {second} are {agreed:.1f} digits apart, which "
+            "says how it converges, and no more."
         )
     if f"{known:.1f}" == f"{agreed:.1f}":
-        return f"The references, {one} and {other}, agree to {agreed:.1f} digits."
+        return f"The references, {first} and {second}, agree to {agreed:.1f} digits."
     return (
-        f"The references, {one} and {other}, agree to {agreed:.1f} digits, which may be luck: {known:.1f} digits are "
-        "usual between the finest runs of different kinds."
+        f"The references, {first} and {second}, agree to {agreed:.1f} digits, which may be luck: {known:.1f} digits "
+        "are usual between the finest runs of different kinds."
     )

@@ -38,25 +38,25 @@ def diagram(cost):
     for axis in (halves[0].yaxis, halves[1].yaxis, halves[1].xaxis):
         _ticked(axis)
     halves[1].set_xlabel("CPU time [s]")
-    told = halves[0].get_legend_handles_labels()
-    page.legend(*told, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
+    handles = halves[0].get_legend_handles_labels()
+    page.legend(*handles, loc="outside lower center", ncols=2, frameon=False, fontsize=8.5)
     page.suptitle(cost.scene.title, fontsize=11)
     return page
 
 
 def _curves(plot, cost, key, trust):
-    seen = [getattr(t, key) for t in cost.trials if getattr(t, key) > 0.0]
-    floor = max(trust, 1e-3 * min(seen, default=1.0))
-    for place, method in enumerate(dict.fromkeys(t.method for t in cost.trials)):
+    values = [getattr(t, key) for t in cost.trials if getattr(t, key) > 0.0]
+    floor = max(trust, 1e-3 * min(values, default=1.0))
+    for index, method in enumerate(dict.fromkeys(t.method for t in cost.trials)):
         ladder = [t for t in cost.trials if t.method == method]
-        colour, marker = OUTSIDER if method == dop853.NAME else STYLES[place % len(STYLES)]
+        colour, marker = OUTSIDER if method == dop853.NAME else STYLES[index % len(STYLES)]
         solved = [t for t in ladder if t.status == "solved"]
         times, errors = [t.cpu_s for t in solved], [max(getattr(t, key), 0.3 * floor) for t in solved]
         plot.plot(times, errors, marker=marker, markersize=4, color=colour, linewidth=1.1, label=_label(method, ladder))
         failed = [t.cpu_s for t in ladder if t.status == "failed" and math.isfinite(t.cpu_s)]
         top = {"transform": plot.get_xaxis_transform(), "markersize": 7, "markeredgewidth": 1.8}  # no error has a place
         plot.plot(failed, [0.97] * len(failed), "x", color=colour, **top)
-    if seen:
+    if values:
         plot.set(xscale="log", yscale="log")
     if trust > 0.0:
         plot.axhspan(1e-9 * floor, trust, color="#bbbbbb", alpha=0.45, linewidth=0, label="references apart: not known")
@@ -79,6 +79,6 @@ def _label(method, ladder):
     count = {status: sum(t.status == status for t in ladder) for status in ("failed", "refused", "budget")}
     if count["refused"]:
         return f"{method} (refused)"
-    told = [f"{count['failed']} failed, ×"] * bool(count["failed"])
-    told += [f"{count['budget']} left out"] * bool(count["budget"])
-    return f"{method} ({'; '.join(told)})" if told else method
+    parts = [f"{count['failed']} failed, ×"] * bool(count["failed"])
+    parts += [f"{count['budget']} left out"] * bool(count["budget"])
+    return f"{method} ({'; '.join(parts)})" if parts else method

@@ -30,16 +30,16 @@ def discretisation_errors(scene, results, solve):
     solve : callable
         Gives such a list of another scene.
     """
-    found = [results]
+    results_by_mesh = [results]
     for times in FINER:
         cable = replace(scene.cable, subdivide=times * scene.cable.subdivide)
-        found.append(solve(scene.replace(cable=cable, accuracy=Accuracy(error="none"))))
+        results_by_mesh.append(solve(scene.replace(cable=cable, accuracy=Accuracy(error="none"))))
     return [
         {
             name: result._replace(discretisation=_left(*(step[name].value for step in steps)))
-            for name, result in here.items()
+            for name, result in coarse.items()
         }
-        for here, *steps in zip(results, *found, strict=True)
+        for coarse, *steps in zip(results, *results_by_mesh, strict=True)
     ]
 
 

@@ -11,17 +11,17 @@ from ..statics.remarks import remark_on_open
 from .pencil import STRAIN
 
 
-def remarks_on(here, state, equilibrium):
+def remarks_on(spectrum_here, state, equilibrium):
     """Remarks on the modes of an equilibrium: pairs of a kind and a text."""
     net = state.system.net
-    if here.unstable:
+    if spectrum_here.unstable:
         yield (
             "unstable",
-            f"{here.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium is a "
-            "saddle and the web leaves it by itself",
+            f"{spectrum_here.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium "
+            "is a saddle and the web leaves it by itself",
         )
-    if here.zero:
-        yield "zero", f"{here.zero} directions have no stiffness: they have no frequency and are not listed"
+    if spectrum_here.zero:
+        yield "zero", f"{spectrum_here.zero} directions have no stiffness: they have no frequency and are not listed"
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
     kinked = (net.laws != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)

@@ -61,8 +61,8 @@ class Modes(Solution):
         return self.spectra[-1].shapes[:, : self.state.system.net.nodes]
 
     def __repr__(self):
-        found = ", ".join(f"{f:.6g}" for f in self.frequency[:4]) if self.spectra else ""
-        return f'<Modes of "{self.scene.title}": {self.status}; {found} Hz>'
+        frequencies = ", ".join(f"{f:.6g}" for f in self.frequency[:4]) if self.spectra else ""
+        return f'<Modes of "{self.scene.title}": {self.status}; {frequencies} Hz>'
 
     def summary(self):
         """The content of ``run.json``, a dict of plain values; ``kind`` is "modes"."""
@@ -137,16 +137,16 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
         rest = _at_rest(system)
     if announce is not None:
         announce(scene, system)
-    found = Modes(scene, web=web_of(system), versions=versions(), columns=COLUMNS)
+    result = Modes(scene, web=web_of(system), versions=versions(), columns=COLUMNS)
     try:
-        with recorded(found, clock, lambda: f"{len(found.spectra)} load steps"), followed(progress) as tell:
-            _follow(found, rest, number, tell)
+        with recorded(result, clock, lambda: f"{len(result.spectra)} load steps"), followed(progress) as tell:
+            _follow(result, rest, number, tell)
     finally:
-        found.table = as_history(COLUMNS, [row for here in found.spectra for row in _rows(here)])
-        found.warnings += left_out(system)
+        result.table = as_history(COLUMNS, [row for spectrum_n in result.spectra for row in _rows(spectrum_n)])
+        result.warnings += left_out(system)
         if out is not None:
-            found.save(out, force)
-    return found
+            result.save(out, force)
+    return result
 
 
 def _at_rest(system):
@@ -162,47 +162,64 @@ def _at_rest(system):
     return rest
 
 
-def _follow(found, rest, number, tell):
+def _follow(result, rest, number, tell):
     """Equilibrium and modes of one load step after the other."""
-    scene, remarks, totals = found.scene, Remarks(), dict(nsteps=0, nfev=0, njev=0, nlu=0)
+    scene, remarks, totals = result.scene, Remarks(), dict(nsteps=0, nfev=0, njev=0, nlu=0)
     static = scene.solve.kind == "static"
     method, steps = (scene.solve.method, scene.solve.load_steps) if static else ("newton", (0.0,))
     solve = load(STATICS[method])
-    for equilibrium in solve(rest, steps, lambda text: tell(text, len(found.spectra) / len(steps))):
-        tell(f"step {equilibrium.step:g}, modes", len(found.spectra) / len(steps))
-        here = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
-        found.state = State(rest, equilibrium.step, equilibrium.x)
-        if found.spectra:
-            found.spectra[-1] = replace(found.spectra[-1], shapes=None)
-        found.spectra.append(here)
+    for equilibrium in solve(rest, steps, lambda text: tell(text, len(result.spectra) / len(steps))):
+        tell(f"step {equilibrium.step:g}, modes", len(result.spectra) / len(steps))
+        spectrum_n = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
+        result.state = State(rest, equilibrium.step, equilibrium.x)
+        if result.spectra:
+            result.spectra[-1] = replace(result.spectra[-1], shapes=None)
+        result.spectra.append(spectrum_n)
         stats = {key: equilibrium.stats.get(key) for key in SOLVER} | {
             "method": method,
             "factorization": rest.factorized_by,
             "duality_gap": equilibrium.duality_bound.gap if equilibrium.duality_bound else None,
-            "smallest_pivot": -1 if here.unstable else 0 if here.zero else 1,
-            "slack_nodes": len(open_rows(found.state, equilibrium)),
+            "smallest_pivot": -1 if spectrum_n.unstable else 0 if spectrum_n.zero else 1,
+            "slack_nodes": len(open_rows(result.state, equilibrium)),
         }
         totals = {key: totals[key] + stats[key] for key in totals}
-        found.solver = {**stats, **totals}
-        found.steps.append({"step": here.step, "results": _results(here), "solver": stats, **_described(here)})
-        remarks.note(here.step, remarks_on(here, found.state, equilibrium))
-        found.warnings = [*remarks.texts(), *rest.remarks()]
+        result.solver = {**stats, **totals}
+        result.steps.append(
+            {"step": spectrum_n.step, "results": _results(spectrum_n), "solver": stats, **_described(spectrum_n)}
+        )
+        remarks.note(spectrum_n.step, remarks_on(spectrum_n, result.state, equilibrium))
+        result.warnings = [*remarks.texts(), *rest.remarks()]
 
 
-def _results(here):
+def _results(spectrum_n):
     """Frequencies of a spectrum by name; a result stands where the displacement of its shape is largest."""
-    values = zip(here.frequency.tolist(), here.error.tolist(), here.nodes.tolist(), strict=True)
-    return {f"frequency_{k}": Result(f, error, "Hz", here.step, node) for k, (f, error, node) in enumerate(values, 1)}
+    values = zip(spectrum_n.frequency.tolist(), spectrum_n.error.tolist(), spectrum_n.nodes.tolist(), strict=True)
+    return {
+        f"frequency_{k}": Result(f, error, "Hz", spectrum_n.step, node) for k, (f, error, node) in enumerate(values, 1)
+    }
 
 
-def _described(here):
+def _described(spectrum_n):
     """Data of a spectrum for ``run.json`` besides its frequencies."""
     names = ("squared", "bound", "residual", "modal_mass", "shares", "moving")
-    return {"unstable": here.unstable, "zero": here.zero, **{name: getattr(here, name).tolist() for name in names}}
+    return {
+        "unstable": spectrum_n.unstable,
+        "zero": spectrum_n.zero,
+        **{name: getattr(spectrum_n, name).tolist() for name in names},
+    }
 
 
-def _rows(here):
+def _rows(spectrum_n):
     """A spectrum as rows of ``modes.csv``."""
-    count = np.arange(1, len(here.squared) + 1)
-    columns = [np.full(len(count), here.step), count, here.frequency, here.error, here.squared, here.residual]
-    return np.column_stack([*columns, here.modal_mass, here.shares, here.moving, here.nodes]).tolist()
+    count = np.arange(1, len(spectrum_n.squared) + 1)
+    columns = [
+        np.full(len(count), spectrum_n.step),
+        count,
+        spectrum_n.frequency,
+        spectrum_n.error,
+        spectrum_n.squared,
+        spectrum_n.residual,
+    ]
+    return np.column_stack(
+        [*columns, spectrum_n.modal_mass, spectrum_n.shares, spectrum_n.moving, spectrum_n.nodes]
+    ).tolist()

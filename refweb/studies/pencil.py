@@ -60,8 +60,8 @@ class Pencil:
         self.K, self.M = pattern.matrix(self._stiffness), pattern.matrix(self._mass)
         self._factor = Factor(pattern)
         self._inner: Any = None  # LU of the stiffness of what has no mass, where there is any
-        own = self.M.diagonal()
-        self.massive, self.massless = np.flatnonzero(own > 0.0), np.flatnonzero(own == 0.0)
+        diagonal = self.M.diagonal()
+        self.massive, self.massless = np.flatnonzero(diagonal > 0.0), np.flatnonzero(diagonal == 0.0)
         if not len(self.massive):
             raise SolverError("no mode: no free node has mass; give the cable a density, or nodes a [[point_mass]]")
         axial = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
@@ -72,9 +72,11 @@ class Pencil:
         self._ridge = STRAIN * strained
         self._ridge[pattern.diagonal] += ROUNDING * taut
         sums = abs(self.K).sum(axis=0) + taut
-        self._top = 10.0 * (sums[self.massive] / own[self.massive]).max()  # above every ω², of consistent mass as well
+        self._top = (
+            10.0 * (sums[self.massive] / diagonal[self.massive]).max()
+        )  # above every ω², of consistent mass as well
         if len(self.massless):
-            self._hold_massless(1e17 * sums.max() / own[self.massive].min(), taut)
+            self._hold_massless(1e17 * sums.max() / diagonal[self.massive].min(), taut)
 
     def _hold_massless(self, large, taut):
         """Refuse unknowns that have neither mass nor stiffness; factorize the stiffness of those without mass."""
@@ -106,9 +108,9 @@ class Pencil:
     def above(self, shift, wanted):
         """Vectors of the next eigenvalues above a shift, shape (unknowns, wanted)."""
         low = self.below(shift)
-        most = len(self.massive) - low
+        limit = len(self.massive) - low
         for attempt in range(4):
-            squared, vectors = self._nearest(shift, min(wanted + 20 * attempt, most), attempt)
+            squared, vectors = self._nearest(shift, min(wanted + 20 * attempt, limit), attempt)
             mark = squared[wanted - 1] - 1e-7 * abs(squared[wanted - 1] - shift)
             if self.below(mark) == low + np.count_nonzero(squared < mark):
                 return vectors[:, :wanted]
@@ -146,9 +148,9 @@ class Pencil:
 
     def _flexible(self, force):
         """Displacement of the unknowns with mass under forces on them."""
-        whole = np.zeros(self.system.pattern.size)
-        whole[self.massive] = force.ravel()
-        y = self._solve(whole)
+        vector = np.zeros(self.system.pattern.size)
+        vector[self.massive] = force.ravel()
+        y = self._solve(vector)
         if y is None:
             raise SolverError(f"no modes at step {self.t:g}: the stiffness is singular to rounding")
         return y[self.massive]

@@ -59,15 +59,15 @@ def horizon(simulation, results, ensemble=None, tell=None):
     end = digits[-1][1]
     known = when <= end if end is not None else np.ones(len(when), dtype=bool)
     growth = float(np.polyfit(when[known], np.log(np.maximum(apart, 1e-300))[known], 1)[0]) if known.sum() > 1 else None
-    found = {
+    horizon_data = {
         "perturbation": float(PERTURBATION * simulation.system.net.natural_length.min()),
         "growth": growth,
         "digits": digits,
         "statistical": [name for name, r in results.items() if end is not None and r.time > end],
     }
     if ensemble is not None:
-        found["ensemble"] = _ensemble(simulation, ensemble, tell)
-    return found
+        horizon_data["ensemble"] = _ensemble(simulation, ensemble, tell)
+    return horizon_data
 
 
 def _integrator(simulation):
@@ -79,8 +79,8 @@ def _beside(simulation, seed):
     """The `Start` of the run of a seed, a little beside that of the simulation."""
     system, x = simulation.system, simulation.begin.x
     x = np.zeros((system.rows, 3)) if x is None else x.copy()
-    most = PERTURBATION * system.net.natural_length.min()
-    x.ravel()[system.free] += most * np.random.default_rng(seed).uniform(-1.0, 1.0, len(system.free))
+    size = PERTURBATION * system.net.natural_length.min()
+    x.ravel()[system.free] += size * np.random.default_rng(seed).uniform(-1.0, 1.0, len(system.free))
     return Start(x, simulation.begin.v)
 
 

@@ -16,15 +16,15 @@ LUCK = 10.0
 """Factor between the median difference of the finest runs and the least one, below which the least may be luck."""
 
 
-def compare(found):
+def compare(trials):
     """Find the references, and the errors of all runs."""
-    solved = [t for t in found.trials if t.status == "solved"]
+    solved = [t for t in trials.trials if t.status == "solved"]
     able = [t for t in solved if t.key != "smoothing"]
     finest = {t.method: t for t in able}.values()
     pairs = [pair for pair in combinations(finest, 2) if pair[0].kind != pair[1].kind]
-    found.independent = bool(pairs)
+    trials.independent = bool(pairs)
     pairs = pairs or [pair for pair in zip(able[:-1], able[1:], strict=True) if pair[1] in finest]
-    pairs = [pair for pair in pairs if found.independent or pair[0].method == pair[1].method]
+    pairs = [pair for pair in pairs if trials.independent or pair[0].method == pair[1].method]
     if not pairs:
         return
     scale = max(np.abs(able[-1].values).max(), 1e-300), max(np.linalg.norm(able[-1].x, axis=1).max(), 1e-300)
@@ -32,17 +32,17 @@ def compare(found):
     def relative(pair):
         return max(off / size for off, size in zip(_apart(*pair), scale, strict=True))
 
-    first, second = found.references = min(pairs, key=relative)
-    found.apart, found.scale = _apart(first, second), float(np.abs(first.values).max())
+    first, second = trials.references = min(pairs, key=relative)
+    trials.apart, trials.scale = _apart(first, second), float(np.abs(first.values).max())
     usual = np.median([_apart(*pair) for pair in pairs], axis=0).tolist()
-    found.trust = tuple(max(u, off) if u < LUCK * off else off for u, off in zip(usual, found.apart, strict=True))
+    trials.trust = tuple(max(u, off) if u < LUCK * off else off for u, off in zip(usual, trials.apart, strict=True))
     for trial in solved:
-        trial.error_observable, trial.error_state = found.trust if trial is first else _apart(trial, first)
+        trial.error_observable, trial.error_state = trials.trust if trial is first else _apart(trial, first)
 
 
-def _apart(one, other):
+def _apart(first, second):
     """Largest differences of the observable and of displacement at the end."""
     return (
-        float(np.abs(one.values - other.values).max()),
-        float(np.linalg.norm(one.x - other.x, axis=1).max(initial=0.0)),
+        float(np.abs(first.values - second.values).max()),
+        float(np.linalg.norm(first.x - second.x, axis=1).max(initial=0.0)),
     )

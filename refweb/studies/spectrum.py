@@ -172,7 +172,7 @@ def _rounding(pencil, vectors):
 
 def _left(pencil, vectors):
     """Effect of the error of the equilibrium on ω²: K changes by another Newton step."""
-    system, there = pencil.system, pencil.x.copy()
-    there.ravel()[system.free] += pencil.moved(system.force(pencil.t, pencil.x).ravel()[system.free])
-    change = pencil.change(there)
+    system, neighbour = pencil.system, pencil.x.copy()
+    neighbour.ravel()[system.free] += pencil.moved(system.force(pencil.t, pencil.x).ravel()[system.free])
+    change = pencil.change(neighbour)
     return np.linalg.norm(vectors.conj().T @ (change @ vectors), axis=0)  # whole rows: what parts equal frequencies too

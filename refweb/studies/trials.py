@@ -138,13 +138,13 @@ def _variants(name):
 
 def dynamic_ladders():
     """The `Ladder` of each method of dynamics by name: variants of `INTEGRATORS`, and DOP853."""
-    found = {}
+    ladders = {}
     for name, method in INTEGRATORS.items():
         for label, variant in _variants(name).items():
             make = functools.partial(load(method.integrator), **variant.keys)
             settings = variant.settings or SETTINGS[method.knob]
-            found[label] = Ladder(method.knob, settings, variant.kind or label, make)
-    return found | {dop853.NAME: Ladder("rtol", dop853.TOLERANCES, dop853.NAME)}
+            ladders[label] = Ladder(method.knob, settings, variant.kind or label, make)
+    return ladders | {dop853.NAME: Ladder("rtol", dop853.TOLERANCES, dop853.NAME)}
 
 
 def label_of(solve):
@@ -158,18 +158,18 @@ def label_of(solve):
 def trials_of(scene):
     """The trials of each method from coarse to fine, a dict of lists of `Trial` by name."""
     ladders = dynamic_ladders() if scene.solve.kind == "dynamic" else STATIC_LADDERS
-    found = {
+    trials = {
         name: [Trial(name, ladder.key, value, kind=ladder.kind, make=ladder.make) for value in ladder.settings]
         for name, ladder in ladders.items()
     }
     if scene.solve.kind == "static":
         cable = scene.cable
-        own = [group.smoothing is not None or group.law is not None for group in cable.groups.values()]
-        if cable.law == "linear" or any(own):
-            del found["newton-smooth"]
+        differs = [group.smoothing is not None or group.law is not None for group in cable.groups.values()]
+        if cable.law == "linear" or any(differs):
+            del trials["newton-smooth"]
         elif cable.law == "smooth":
-            found["newton-smooth"] = [t for t in found["newton-smooth"] if t.value != cable.smoothing]
-    return found
+            trials["newton-smooth"] = [t for t in trials["newton-smooth"] if t.value != cable.smoothing]
+    return trials
 
 
 class Dynamics:
@@ -216,12 +216,12 @@ class Dynamics:
         That of explicit steps, by the last of them that have run; of implicit ones, whose number nobody knows before, a
         guess that gives them their turn.
         """
-        one = self._per_evaluation or step_price(self.system)
+        price = self._per_evaluation or step_price(self.system)
         if ahead := self._evaluations(trial):
             self._fewest = min(ahead, self._fewest or ahead)
-            return one * ahead
-        longest = one * (self._fewest or 0.0)
-        return OUTSIDE * longest * (1.0 + CALL / one) if trial.make is None else UNKNOWN * longest
+            return price * ahead
+        longest = price * (self._fewest or 0.0)
+        return OUTSIDE * longest * (1.0 + CALL / price) if trial.make is None else UNKNOWN * longest
 
     def _evaluations(self, trial):
         """Evaluations of forces of a trial, None where only a run can tell."""
@@ -255,9 +255,9 @@ class Dynamics:
     def _run_outside(self, trial, deadline):
         """Run DOP853."""
         outside, began = dop853.Dop853(self.system, self.begin), clock()
-        found = outside.follow(self.times, trial.value, self.observable, clock, lambda: _check(deadline))
-        trial.cpu_s, trial.values, trial.x = clock() - began - found.looking, found.values, found.x[: self._linear]
-        trial.work = {"nfev": found.nfev, "njev": 0, "nlu": 0, "nsteps": found.nsteps}
+        values = outside.follow(self.times, trial.value, self.observable, clock, lambda: _check(deadline))
+        trial.cpu_s, trial.values, trial.x = clock() - began - values.looking, values.values, values.x[: self._linear]
+        trial.work = {"nfev": values.nfev, "njev": 0, "nlu": 0, "nsteps": values.nsteps}
 
 
 class Statics:
@@ -289,12 +289,14 @@ class Statics:
 
     def _solved(self, trial, steps, deadline):
         """States of a trial, and what each took; notes the CPU time."""
-        system, began, found = self._system(trial), clock(), []
+        system, began, states = self._system(trial), clock(), []
         for equilibrium in trial.make(trial, system, steps, lambda text: _check(deadline)):
-            found.append(equilibrium)
+            states.append(equilibrium)
             _check(deadline)
         trial.cpu_s = clock() - began
-        return [State(system, one.step, one.x) for one in found], [one.stats for one in found]
+        return [State(system, equilibria.step, equilibria.x) for equilibria in states], [
+            equilibria.stats for equilibria in states
+        ]
 
 
 def _check(deadline):

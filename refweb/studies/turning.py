@@ -97,11 +97,11 @@ class Gyroscopic:
     def stiffness(self):
         """K of the unknowns with mass, the others in equilibrium with them, a dense matrix."""
         K, pencil = csc_array(self.pencil.K), self.pencil
-        own = K[pencil.massive][:, pencil.massive].toarray()
+        massive_stiffness = K[pencil.massive][:, pencil.massive].toarray()
         if len(pencil.massless):
             across = K[pencil.massless][:, pencil.massive].toarray()
-            own -= across.T @ pencil.follow(across)
-        return 0.5 * (own + own.T)
+            massive_stiffness -= across.T @ pencil.follow(across)
+        return 0.5 * (massive_stiffness + massive_stiffness.T)
 
     def whole(self, parts):
         """Vectors of all unknowns, shape (unknowns, modes)."""
@@ -139,7 +139,7 @@ class Gyroscopic:
         return negative_pivots(both, self.pencil.system.library) // 2
 
 
-def turning_pairs(pencil, G, number, least):
+def turning_pairs(pencil, G, number, lower):
     """The lowest `Pairs` of a net in a frame that turns, those that grow first.
 
     Parameters
@@ -150,7 +150,7 @@ def turning_pairs(pencil, G, number, least):
         That of `coriolis`.
     number : int
         Pairs wanted; there are as many as unknowns with mass.
-    least : callable
+    lower : callable
         Of vectors: what rounding and the error of the equilibrium make of φ*Kφ [1/s²].
 
     Raises
@@ -160,23 +160,23 @@ def turning_pairs(pencil, G, number, least):
     """
     gyroscopic = Gyroscopic(pencil, G)
     if pencil.below(0.0, -1.0) == 0:
-        return _definite(gyroscopic, min(number, len(pencil.massive)), least)
+        return _definite(gyroscopic, min(number, len(pencil.massive)), lower)
     if len(pencil.massive) > MOST:
         raise SolverError(
             f"no modes at step {pencil.t:g}: nothing but Coriolis forces holds some directions of a net of "
             f"{len(pencil.massive)} unknowns with mass, which is more than {MOST}, and none could be said to be "
             "missed: support nodes, or divide lines less"
         )
-    return _general(gyroscopic, number, least)
+    return _general(gyroscopic, number, lower)
 
 
-def _definite(gyroscopic, number, least):
+def _definite(gyroscopic, number, lower):
     pencil = gyroscopic.pencil
     size, solve = len(pencil.massive), pencil.bend(0.0)
     for attempt in range(4):
         wanted = min(number + 1 + 20 * attempt, size)
-        whole = size <= DENSE or 3 * wanted >= size
-        inverse, parts = (_all if whole else _some)(gyroscopic, wanted, solve, attempt)
+        dense = size <= DENSE or 3 * wanted >= size
+        inverse, parts = (_all if dense else _some)(gyroscopic, wanted, solve, attempt)
         vectors = gyroscopic.whole(parts)
         stiff, turned = gyroscopic.forms(vectors)
         split = np.sqrt(turned**2 + 4.0 * stiff)
@@ -193,7 +193,7 @@ def _definite(gyroscopic, number, least):
     soft = np.column_stack([solve(r.real) + 1j * solve(r.imag) for r in rest.T])
     left = np.sqrt(np.maximum((rest.conj() * soft).sum(axis=0).real, 0.0))
     share = left / np.sqrt(stiff + omega**2)  # error of 1/ω, over 1/ω
-    off = omega * share / np.maximum(1.0 - share, 0.5) + least(vectors) / split
+    off = omega * share / np.maximum(1.0 - share, 0.5) + lower(vectors) / split
     return Pairs(omega**2, 2.0 * omega * off + off**2, gyroscopic.weighed(rest), vectors, 0, 0)
 
 
@@ -217,13 +217,13 @@ def _some(gyroscopic, wanted, solve, attempt):
 
     def heavy(u):
         u = u.ravel()
-        whole = np.zeros(pencil.system.pattern.size, dtype=complex)
-        whole[pencil.massive] = u[:size]
-        pull = pencil.K @ whole
+        vector = np.zeros(pencil.system.pattern.size, dtype=complex)
+        vector[pencil.massive] = u[:size]
+        pull = pencil.K @ vector
         if len(pencil.massless):
             rest = pull[pencil.massless]
-            whole[pencil.massless] = -pencil.follow(rest.real) - 1j * pencil.follow(rest.imag)
-            pull = pencil.K @ whole
+            vector[pencil.massless] = -pencil.follow(rest.real) - 1j * pencil.follow(rest.imag)
+            pull = pencil.K @ vector
         return np.concatenate([pull[pencil.massive], M @ u[size:]])
 
     def light(u):
@@ -238,13 +238,13 @@ def _some(gyroscopic, wanted, solve, attempt):
     )
     start = np.random.default_rng(pencil.seed + attempt).standard_normal(2 * size).astype(complex)
     try:
-        found, vectors = eigsh(B, wanted, A, which="LA", v0=start, Minv=inverse)
+        values, vectors = eigsh(B, wanted, A, which="LA", v0=start, Minv=inverse)
     except ArpackError as error:
         raise SolverError(f"no modes at step {pencil.t:g}: {error}") from None
-    return found, vectors[:size]
+    return values, vectors[:size]
 
 
-def _general(gyroscopic, number, least):
+def _general(gyroscopic, number, lower):
     """All pairs of the first order system; what grows less than `SMALL` of the fastest rate does not grow."""
     gyroscopic.pencil.bend(gyroscopic.pencil.beside(gyroscopic.pencil.below(0.0, -1.0), 1.0))
     root = scipy.linalg.cholesky(gyroscopic.M.toarray(), lower=True)
@@ -255,16 +255,16 @@ def _general(gyroscopic, number, least):
 
     K, G = scaled(gyroscopic.stiffness()), scaled(gyroscopic.own.toarray())
     size = len(K)
-    found, parts = np.linalg.eig(np.block([[np.zeros_like(K), np.eye(size)], [-K, -G]]))
+    eigenvalues, parts = np.linalg.eig(np.block([[np.zeros_like(K), np.eye(size)], [-K, -G]]))
     none = SMALL * np.sqrt(abs(K).sum(axis=0).max())
-    least_growth, growth, turn = np.maximum(none, 1e-6 * abs(found)), np.real(found), np.imag(found)
+    least_growth, growth, turn = np.maximum(none, 1e-6 * abs(eigenvalues)), np.real(eigenvalues), np.imag(eigenvalues)
     grows = (growth > least_growth) & (turn > -none)
     turns = (abs(growth) <= least_growth) & (turn > none)
     if not (grows.any() or turns.any()):
         raise SolverError(f"no mode at step {gyroscopic.pencil.t:g}: nothing that has mass has stiffness or is turned")
     kept = np.flatnonzero(grows | turns)
     kept = kept[np.argsort(np.where(grows, -growth, turn)[kept])][:number]
-    rates, grown = found[kept], grows[kept]
+    rates, grown = eigenvalues[kept], grows[kept]
     vectors = gyroscopic.whole(scipy.linalg.solve_triangular(root.T, parts[:size, kept]))
     stiff, turned = gyroscopic.forms(vectors)
     split = np.sqrt(abs(turned**2 + 4.0 * stiff))
@@ -274,7 +274,7 @@ def _general(gyroscopic, number, least):
     rates = np.where(grown, rates, 1j * omega)
     rest = gyroscopic.weighed(gyroscopic.rest(rates, vectors))
     rounding = 8.0 * np.finfo(float).eps * (abs(stiff) + abs(rates * turned) + abs(rates) ** 2)
-    off = rest + rounding + least(vectors)
+    off = rest + rounding + lower(vectors)
     off = 2.0 * off / (split + np.sqrt(split**2 + 4.0 * off))
     value = np.where(grown, np.real(rates), omega)
     squared = np.where(grown, -1.0, 1.0) * value**2

@@ -73,23 +73,23 @@ def cost(
         announce(scene, system)
     runner = (trials.Dynamics if scene.solve.kind == "dynamic" else trials.Statics)(scene, system, observable)
     ladders = trials.trials_of(scene)
-    found = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
+    result = Cost(scene, observable, [trial for ladder in ladders.values() for trial in ladder], web_of(system))
     try:
-        with recorded(found, clock), followed(progress) as tell:
+        with recorded(result, clock), followed(progress) as tell:
             compile_all(ladders, runner)
             deadline = max(began + 0.9 * budget, trials.clock() + 0.5 * budget)  # the rest is for the diagram
             climb(ladders, runner, deadline, budget, tell)
-            if not any(t.status == "solved" for t in found.trials):
-                found.status = "failed"
+            if not any(t.status == "solved" for t in result.trials):
+                result.status = "failed"
     finally:
-        compare(found)
-        if found.status == "failed" and not found.message:
-            found.message = next((f"{t.method}: {t.message}" for t in found.trials if t.message), found.sentence)
+        compare(result)
+        if result.status == "failed" and not result.message:
+            result.message = next((f"{t.method}: {t.message}" for t in result.trials if t.message), result.sentence)
         if out is not None:
-            found.save(out, force)
-    if found.status == "failed":
-        raise SolverError(f"no method solves the scene within {budget:g} s; {found.message}")
-    return found
+            result.save(out, force)
+    if result.status == "failed":
+        raise SolverError(f"no method solves the scene within {budget:g} s; {result.message}")
+    return result
 
 
 def _observable(scene, name):

@@ -113,31 +113,31 @@ def _run(job):
     with contextlib.ExitStack() as stack:
         given, folder = job.given, job.folder and pathlib.Path(job.folder)
         if job.files:
-            place = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-")))
-            given = _brought(job, place)
+            directory = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-")))
+            given = _brought(job, directory)
         scene = Scene.from_dict(given, folder, job.file)
         if job.keep != "all":
             return run(scene, progress=False).summary(), None
-        place = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-"))) / "run"
-        return run(scene, out=place, progress=False).summary(), packed(place)
+        directory = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-"))) / "run"
+        return run(scene, out=directory, progress=False).summary(), packed(directory)
 
 
-def _brought(job, place):
+def _brought(job, directory):
     """The scene of a job whose files are on this machine, in a folder where they are not there already."""
     moved = {}
     for number, (path, content) in enumerate(job.files.items()):
-        there = pathlib.Path(path)
-        same = there.is_file() and hashlib.sha256(there.read_bytes()).digest() == hashlib.sha256(content).digest()
+        source = pathlib.Path(path)
+        same = source.is_file() and hashlib.sha256(source.read_bytes()).digest() == hashlib.sha256(content).digest()
         if not same:
-            own = (
-                place / str(number)
-                if there.name not in ("run.json", "scene.toml", "checkpoint.npz")
-                else place / "start"
+            tables = (
+                directory / str(number)
+                if source.name not in ("run.json", "scene.toml", "checkpoint.npz")
+                else directory / "start"
             )
-            own.mkdir(exist_ok=True)
-            (own / there.name).write_bytes(content)
-            moved[path] = str(own / there.name)
-            moved[str(there.parent)] = str(own)
+            tables.mkdir(exist_ok=True)
+            (tables / source.name).write_bytes(content)
+            moved[path] = str(tables / source.name)
+            moved[str(source.parent)] = str(tables)
     base = pathlib.Path(job.folder or "")
 
     def brought(path):
@@ -177,18 +177,18 @@ def cells_of(summary):
         cells[f"{name} [{result['unit']}]"] = result["value"]
         cells[f"{name} ±"] = result["error"]
         if result.get("interval") is not None:
-            least, most = result["interval"]
-            cells[f"{name} least"] = -float("inf") if least is None else least
-            cells[f"{name} most"] = float("inf") if most is None else most
+            lower, upper = result["interval"]
+            cells[f"{name} least"] = -float("inf") if lower is None else lower
+            cells[f"{name} most"] = float("inf") if upper is None else upper
         if name in statistical and name in ensemble:
             cells[f"{name} mean"], cells[f"{name} deviation"] = ensemble[name]["mean"], ensemble[name]["deviation"]
-    of_throw = {n: one for n, one in summary.get("throw", {}).items() if n not in summary["results"]}
-    for name, one in of_throw.items():
-        value, error = one["value"], one.get("error")
-        if "drawn" in one:
-            value, error = float(one["drawn"]), 0.0 if value == one["drawn"] else None
-        cells[f"{name} [{one.get('unit', '1')}]"], cells[f"{name} ±"] = value, error
-        if one.get("at_least"):
+    of_throw = {n: throw_entry for n, throw_entry in summary.get("throw", {}).items() if n not in summary["results"]}
+    for name, throw_entry in of_throw.items():
+        value, error = throw_entry["value"], throw_entry.get("error")
+        if "drawn" in throw_entry:
+            value, error = float(throw_entry["drawn"]), 0.0 if value == throw_entry["drawn"] else None
+        cells[f"{name} [{throw_entry.get('unit', '1')}]"], cells[f"{name} ±"] = value, error
+        if throw_entry.get("at_least"):
             cells[f"{name} least"], cells[f"{name} most"] = value, float("inf")
         elif error is None:
             statistical = [*statistical, name]
@@ -206,15 +206,15 @@ def keep_outcome(folder, outcome):
     """Put what came of a case into the folder of a study, whole."""
     from ..results.files import write_text
 
-    as_json, whole = kept_files(folder, outcome.key)
+    as_json, archive = kept_files(folder, outcome.key)
     if outcome.summary is not None or outcome.archive is not None:
         as_json.parent.mkdir(exist_ok=True)
     if outcome.summary is not None:
         write_text(as_json, json.dumps(outcome.summary, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     if outcome.archive is not None:
-        beside = whole.with_name(f".refweb-{outcome.key}")
-        for path in (beside, whole):
+        beside = archive.with_name(f".refweb-{outcome.key}")
+        for path in (beside, archive):
             if path.exists():
                 shutil.rmtree(path)
         unpacked(outcome.archive, beside)
-        os.replace(beside, whole)
+        os.replace(beside, archive)

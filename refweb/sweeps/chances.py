@@ -54,9 +54,9 @@ def chances(study, rows, columns, names):
         None with the reason.
     """
     results, sampled = results_among(columns), study.sample in SAMPLES
-    known = [*study.parameters, *(one.name for one in results)]
+    known = [*study.parameters, *(result_item.name for result_item in results)]
     conditions = {name: Expression(text, known) for name, text in study.conditions.items()} if results else {}
-    found = []
+    entries = []
     for number, of in enumerate(names):
         mine = [(case, row) for case, row in rows if case.group == number]
         plain = [(case, row) for case, row in mine if case.part in ("", "A", "B")]
@@ -65,15 +65,15 @@ def chances(study, rows, columns, names):
         for _, row in mine:
             count[row["status"]] = count.get(row["status"], 0) + 1
         entry = {"of": of, "cases": count, "results": {}, "conditions": {}}
-        for one in results:
-            if spread := _spread(study, one, solved, sampled):
-                entry["results"][one.name] = spread
+        for result_item in results:
+            if spread := _spread(study, result_item, solved, sampled):
+                entry["results"][result_item.name] = spread
         for name, condition in conditions.items():
             entry["conditions"][name] = _share(study, condition, results, plain, sampled)
         if study.indices:
-            entry["indices"] = {one.name: _indices(study, one, mine) for one in results}
-        found.append(entry)
-    return found
+            entry["indices"] = {result_item.name: _indices(study, result_item, mine) for result_item in results}
+        entries.append(entry)
+    return entries
 
 
 def column_of(row, result):
@@ -99,16 +99,18 @@ def _spread(study, result, rows, sampled):
     values, means, n = np.array(values), np.array(means), len(values)
     unknown = sum(error is None for error in errors)
     wide = np.array([error or 0.0 for error in errors])
-    found = {"unit": result.unit, "count": n, "least": float(values.min()), "largest": float(values.max())}
-    found |= {"without_error": unknown, "error": None if unknown else float(wide.max())}
+    statistics_found = {"unit": result.unit, "count": n, "least": float(values.min()), "largest": float(values.max())}
+    statistics_found |= {"without_error": unknown, "error": None if unknown else float(wide.max())}
     if not sampled:
-        return found
+        return statistics_found
     between = float(np.var(means, ddof=1)) if n > 1 else 0.0
     deviation = math.sqrt(between + float(np.mean(np.square(within))))
-    found |= {"mean": float(means.mean()), "mean_error": None if unknown else float(wide.mean())}
-    found |= {"deviation": deviation, "standard_error": math.sqrt(between / n) if n > 1 else None}
-    found["quantiles"] = [_quantile(values, None if unknown else wide, q, study.confidence) for q in study.quantiles]
-    return found
+    statistics_found |= {"mean": float(means.mean()), "mean_error": None if unknown else float(wide.mean())}
+    statistics_found |= {"deviation": deviation, "standard_error": math.sqrt(between / n) if n > 1 else None}
+    statistics_found["quantiles"] = [
+        _quantile(values, None if unknown else wide, q, study.confidence) for q in study.quantiles
+    ]
+    return statistics_found
 
 
 def _quantile(values, errors, q, level):
@@ -139,7 +141,7 @@ def bounds(row, results, values, sampled):
 
     Where cases are not ``sampled``, those of draws with an ensemble are `LIKELY` standard deviations about its mean.
     """
-    told = dict(values)
+    values_found = dict(values)
     for result in results:
         value, error, statistical = column_of(row, result)
         if value is None:
@@ -147,9 +149,11 @@ def bounds(row, results, values, sampled):
         wide = 0.0 if statistical or error is None else error
         if not sampled and (spread := row.get(f"{result.name} deviation")) is not None:
             value, wide = row[f"{result.name} mean"], LIKELY * spread
-        least, most = row.get(f"{result.name} least"), row.get(f"{result.name} most")
-        told[result.name] = Interval(value - wide if least is None else least, value + wide if most is None else most)
-    return told
+        lower, upper = row.get(f"{result.name} least"), row.get(f"{result.name} most")
+        values_found[result.name] = Interval(
+            value - wide if lower is None else lower, value + wide if upper is None else upper
+        )
+    return values_found
 
 
 def _share(study, condition, results, cases, sampled):
@@ -159,33 +163,33 @@ def _share(study, condition, results, cases, sampled):
     an ensemble leaves open, and ``failed`` those without a result; ``unproven`` of the decided have a result without ±,
     and ``statistical`` have one that is a draw.
     """
-    used = [one for one in results if one.name in condition.used]
+    used = [item for item in results if item.name in condition.used]
     count: dict[str, int] = dict.fromkeys(
         ("true", "false", "undecided", "failed", "unproven", "statistical", "by_value"), 0
     )
     for case, row in cases:
         if row["status"] in UNDONE:
             continue
-        told = bounds(row, results, case.values, sampled)
-        if row["status"] != "solved" or any(one.name not in told for one in used):
+        bounds_found = bounds(row, results, case.values, sampled)
+        if row["status"] != "solved" or any(item.name not in bounds_found for item in used):
             count["failed"] += 1
             continue
-        verdict = condition(told)
+        verdict = condition(bounds_found)
         count[{True: "true", False: "false", None: "undecided"}[verdict]] += 1
-        found = [column_of(row, one) for one in used]
-        count["statistical"] += any(statistical for *_, statistical in found)
-        count["unproven"] += any(error is None and not statistical for _, error, statistical in found)
-        values = {name: value for name, value in told.items()} | {
-            one.name: Interval(value, value) for one, (value, *_) in zip(used, found, strict=True)
+        columns = [column_of(row, item) for item in used]
+        count["statistical"] += any(statistical for *_, statistical in columns)
+        count["unproven"] += any(error is None and not statistical for _, error, statistical in columns)
+        values = {name: value for name, value in bounds_found.items()} | {
+            item.name: Interval(value, value) for item, (value, *_) in zip(used, columns, strict=True)
         }
         count["by_value"] += condition(values) is True
     decided = count["true"] + count["false"] + count["undecided"]
     n = decided + count["failed"]
     share = {"condition": condition.text, **count, "share": count["by_value"] / decided if decided else None}
     if sampled and n:
-        least, _ = clopper_pearson(count["true"], n, study.confidence)
-        _, most = clopper_pearson(n - count["false"], n, study.confidence)
-        share["interval"] = [least, most]
+        lower, _ = clopper_pearson(count["true"], n, study.confidence)
+        _, upper = clopper_pearson(n - count["false"], n, study.confidence)
+        share["interval"] = [lower, upper]
         share["by_samples"] = list(clopper_pearson(count["by_value"], decided, study.confidence)) if decided else None
     return share
 
@@ -224,8 +228,8 @@ def _indices(study, result, cases):
     def of(rows):
         func = {"f_A": table["A"][None, rows], "f_B": table["B"][None, rows]}
         func["f_AB"] = np.array([table[path][rows] for path in drawn])[:, None]
-        found = sobol_indices(func=func, n=n)
-        return np.array([np.ravel(found.first_order), np.ravel(found.total_order)])
+        indices = sobol_indices(func=func, n=n)
+        return np.array([np.ravel(indices.first_order), np.ravel(indices.total_order)])
 
     generator = np.random.default_rng(study.seed)
     best = of(np.arange(n))
@@ -235,8 +239,8 @@ def _indices(study, result, cases):
     low, high = np.nanquantile(again, [tails, 1.0 - tails], axis=0)
     kinds = ("first", "total")
     pairs = itertools.product(enumerate(kinds), enumerate(drawn))
-    told: dict = {path: {} for path in drawn}
+    by_result: dict = {path: {} for path in drawn}
     for (k, kind), (p, path) in pairs:
-        told[path][kind] = {"value": float(best[k, p]), "interval": [float(low[k, p]), float(high[k, p])]}
+        by_result[path][kind] = {"value": float(best[k, p]), "interval": [float(low[k, p]), float(high[k, p])]}
     known = [error for error in errors if error is not None]
-    return {"of": told, "error": max(known) / spread if len(known) == len(errors) else None}
+    return {"of": by_result, "error": max(known) / spread if len(known) == len(errors) else None}

@@ -61,11 +61,11 @@ class Base(NamedTuple):
     def scene(self, case_values):
         """(What a file would say, scene) of some values by path."""
         given, name = self.given, self.file
-        told = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case_values.items())
-        with in_file(f"{name} with {told}" if told else name):
+        text = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case_values.items())
+        with in_file(f"{name} with {text}" if text else name):
             for path, value in case_values.items():
                 given = with_value(given, path, value)
-            return given, Scene.from_dict(given, self.folder, f"{name} with {told}" if told else name)
+            return given, Scene.from_dict(given, self.folder, f"{name} with {text}" if text else name)
 
 
 def points(study):
@@ -81,9 +81,9 @@ def points(study):
     combinations = combinations or list(itertools.product(*lists.values()))
     cases = []
     for group, combination in enumerate(combinations):
-        own = dict(zip(lists, combination, strict=True))
+        chosen = dict(zip(lists, combination, strict=True))
         for draw, part, drawn in samples or [(-1, "", {})]:
-            values = own | drawn
+            values = chosen | drawn
             cases.append(Case({path: values[path] for path in study.parameters}, group if samples else 0, draw, part))
     return cases
 
@@ -93,7 +93,7 @@ def groups(study):
     if not study.drawn:
         return [{}]
     varied = {path: values for path, values in study.listed.items() if len(values) > 1}
-    return [dict(zip(varied, one, strict=True)) for one in itertools.product(*varied.values())]
+    return [dict(zip(varied, combination, strict=True)) for combination in itertools.product(*varied.values())]
 
 
 def _samples(study):
@@ -128,12 +128,12 @@ def _uniform(study, width):
 def _placed(drawn, shares):
     """Values by path, a dict for each sample, at shares of their distributions, shape (samples, paths)."""
     columns = []
-    for one, column in zip(drawn.values(), shares.T, strict=True):
-        if isinstance(one, Distribution):
-            values = one.frozen.ppf(column)
-            columns.append((values.astype(int) if one.discrete else values).tolist())
+    for distribution, column in zip(drawn.values(), shares.T, strict=True):
+        if isinstance(distribution, Distribution):
+            values = distribution.frozen.ppf(column)
+            columns.append((values.astype(int) if distribution.discrete else values).tolist())
         else:
-            columns.append([one.at(share) for share in column.tolist()])
+            columns.append([distribution.at(share) for share in column.tolist()])
     return [dict(zip(drawn, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
@@ -149,21 +149,21 @@ def cases_of(study, base):
     if study.skip is not None:
         with in_file("skip:"):
             skips = Expression(study.skip, list(study.parameters))
-    known, found = {}, []
+    known, cases = {}, []
     for case in points(study):
         if skips is not None:
             with in_file("skip:"):
                 skipped = skips(case.values)
             if skipped:
-                found.append(case)
+                cases.append(case)
                 continue
         try:
             given, scene = base.scene(case.values)
         except InputError as error:
             hint = '; skip leaves out cases by a condition, such as skip = "mass <= 0"'
-            raise InputError(f"{error}{hint if len(found) or skips else ''}") from None
-        found.append(case._replace(key=key_of(scene, known), given=given))
-    return found
+            raise InputError(f"{error}{hint if len(cases) or skips else ''}") from None
+        cases.append(case._replace(key=key_of(scene, known), given=given))
+    return cases
 
 
 def key_of(scene, known=None):
@@ -179,21 +179,21 @@ def key_of(scene, known=None):
     known : dict, optional
         Digests of files that have been read, by path; filled.
     """
-    told = scene.to_dict()
-    del told["title"]
-    files = {str(path): _digest(path, {} if known is None else known) for path in files_of(told)}
-    told = with_files(told, lambda path: "")
-    told["solve"].pop("start", None) if files and scene.start_folder else None
-    text = json.dumps([__version__, told, list(files.values())], sort_keys=False, allow_nan=False)
+    tables = scene.to_dict()
+    del tables["title"]
+    files = {str(path): _digest(path, {} if known is None else known) for path in files_of(tables)}
+    tables = with_files(tables, lambda path: "")
+    tables["solve"].pop("start", None) if files and scene.start_folder else None
+    text = json.dumps([__version__, tables, list(files.values())], sort_keys=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:KEY]
 
 
 def files_of(given):
     """Files that the scene of a dict with absolute paths reads."""
-    found, start = paths_of(given), given["solve"].get("start", "web")
+    files, start = paths_of(given), given["solve"].get("start", "web")
     if pathlib.Path(start).is_absolute():
-        found += [str(pathlib.Path(start) / name) for name in ("run.json", "scene.toml", "checkpoint.npz")]
-    return found
+        files += [str(pathlib.Path(start) / name) for name in ("run.json", "scene.toml", "checkpoint.npz")]
+    return files
 
 
 def _digest(path, known):

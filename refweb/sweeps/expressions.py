@@ -48,39 +48,39 @@ def _hull(*values):
     return ANY if any(map(math.isnan, values)) else Interval(min(values), max(values))
 
 
-def _multiplied(one, other):
-    return _hull(*(a * b if a and b else 0.0 for a in one for b in other))
+def _multiplied(factor_a, factor_b):
+    return _hull(*(a * b if a and b else 0.0 for a in factor_a for b in factor_b))
 
 
-def _divided(one, other):
-    if other.low <= 0.0 <= other.high:
+def _divided(dividend, divisor):
+    if divisor.low <= 0.0 <= divisor.high:
         return ANY
-    return _hull(*(a / b for a in one for b in other))
+    return _hull(*(a / b for a in dividend for b in divisor))
 
 
-def _power(one, other):
-    if other.low != other.high:
+def _power(base, b):
+    if b.low != b.high:
         raise InputError("an exponent must be a number without ±")
-    p = other.low
-    if one.low < 0.0 and p != int(p):
+    p = b.low
+    if base.low < 0.0 and p != int(p):
         return ANY
     if p < 0.0:
-        return _divided(exact(1.0), _power(one, exact(-p)))
+        return _divided(exact(1.0), _power(base, exact(-p)))
     try:
-        ends = [a**p for a in one]
+        ends = [a**p for a in base]
     except OverflowError:
         return ANY
-    inside = [0.0] if one.low < 0.0 < one.high and p % 2 == 0 else []
+    inside = [0.0] if base.low < 0.0 < base.high and p % 2 == 0 else []
     return _hull(*ends, *inside)
 
 
-def _absolute(one):
-    ends = [abs(end) for end in one]
-    return Interval(0.0 if one.low < 0.0 < one.high else min(ends), max(ends))
+def _absolute(a):
+    ends = [abs(end) for end in a]
+    return Interval(0.0 if a.low < 0.0 < a.high else min(ends), max(ends))
 
 
-def _root(one):
-    return ANY if one.low < 0.0 else Interval(math.sqrt(one.low), math.sqrt(one.high))
+def _root(a):
+    return ANY if a.low < 0.0 else Interval(math.sqrt(a.low), math.sqrt(a.high))
 
 
 FUNCTIONS = {
@@ -167,9 +167,9 @@ class Expression:
         if not fine or depth > DEEPEST:
             words = f"arithmetic, comparisons, and, or, not, {', '.join(FUNCTIONS)}, numbers, texts and names"
             raise InputError(f"{shown(self.text)}: a condition holds {words} alone")
-        for one in ast.iter_child_nodes(node):
-            if isinstance(one, ast.expr) and not (isinstance(node, ast.Call) and one is node.func):
-                self._check(one, depth + 1)
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.expr) and not (isinstance(node, ast.Call) and child is node.func):
+                self._check(child, depth + 1)
 
     def __call__(self, values):
         """Evaluate with values by name: true, false, or None where intervals leave that undecided.
@@ -186,14 +186,14 @@ class Expression:
 
     def _truth(self, node, values):
         if isinstance(node, ast.BoolOp):
-            parts = [self._truth(one, values) for one in node.values]
+            parts = [self._truth(operand, values) for operand in node.values]
             decisive = isinstance(node.op, ast.Or)
             return decisive if decisive in parts else None if None in parts else not decisive
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             inner = self._truth(node.operand, values)
             return None if inner is None else not inner
         if isinstance(node, ast.Compare):
-            sides = [self._value(one, values) for one in (node.left, *node.comparators)]
+            sides = [self._value(operand, values) for operand in (node.left, *node.comparators)]
             parts = [_compared(op, a, b) for op, a, b in zip(node.ops, sides, sides[1:], strict=False)]
             return False if False in parts else None if None in parts else True
         value = self._value(node, values)
@@ -212,10 +212,10 @@ class Expression:
                 raise TypeError
             return _read(entries[ast.literal_eval(node.slice)])
         if isinstance(node, ast.BinOp):
-            left, right = (_number(self._value(one, values)) for one in (node.left, node.right))
+            left, right = (_number(self._value(operand, values)) for operand in (node.left, node.right))
             return _SUMS[type(node.op)](left, right)
         if isinstance(node, ast.Call):
-            return FUNCTIONS[ast.unparse(node.func)](*(_number(self._value(one, values)) for one in node.args))
+            return FUNCTIONS[ast.unparse(node.func)](*(_number(self._value(operand, values)) for operand in node.args))
         if isinstance(node, ast.UnaryOp) and not isinstance(node.op, ast.Not):
             inner = _number(self._value(node.operand, values))
             return inner if isinstance(node.op, ast.UAdd) else Interval(-inner.high, -inner.low)

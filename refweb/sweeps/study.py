@@ -75,7 +75,7 @@ def _flat(given, above=""):
     """(path, value): dotted keys without quotes are tables in tables to TOML."""
     for key, value in given.items():
         path = f"{above}.{key}" if above else str(key)
-        if isinstance(value, dict) and value and all(isinstance(one, dict | list) for one in value.values()):
+        if isinstance(value, dict) and value and all(isinstance(item, dict | list) for item in value.values()):
             yield from _flat(value, path)
         else:
             yield path, value
@@ -89,8 +89,8 @@ def _parameter(name, value):
     if isinstance(value, list | tuple):
         if not value:
             raise InputError(f"{name} = [] must hold at least one case")
-        seen = [shown(one) for one in value]
-        if twice := next((one for one in seen if seen.count(one) > 1 and len(one) < 60), None):
+        texts = [shown(item) for item in value]
+        if twice := next((item for item in texts if texts.count(item) > 1 and len(item) < 60), None):
             raise InputError(f"{name}: {twice} stands there twice: each case is run once")
         return tuple(value)
     if not isinstance(value, dict):
@@ -130,7 +130,7 @@ def _distribution(value):
     if name not in known:
         raise InputError(f"distribution = {shown(name)} is none of scipy.stats, {nearest(name, known)}")
     kind = getattr(stats, name)
-    shapes = [one.strip() for one in (kind.shapes or "").split(",") if one.strip()]
+    shapes = [shape.strip() for shape in (kind.shapes or "").split(",") if shape.strip()]
     keys = [*shapes, "loc", *(["scale"] if isinstance(kind, stats.rv_continuous) else [])]
     for key in value:
         if key not in keys and key != "distribution":
@@ -138,10 +138,10 @@ def _distribution(value):
     for key in shapes:
         if key not in value:
             raise InputError(f"{key} is missing: {name} needs {key} = ...")
-    found = Distribution(name, tuple((key, checked(key, value[key], real())) for key in keys if key in value))
-    if not all(math.isfinite(x) for x in (found.frozen.ppf(0.3), found.frozen.ppf(0.7))):
-        raise InputError(f"{name} does not exist with {', '.join(f'{k} = {v:g}' for k, v in found.keys)}")
-    return found
+    distribution = Distribution(name, tuple((key, checked(key, value[key], real())) for key in keys if key in value))
+    if not all(math.isfinite(x) for x in (distribution.frozen.ppf(0.3), distribution.frozen.ppf(0.7))):
+        raise InputError(f"{name} does not exist with {', '.join(f'{k} = {v:g}' for k, v in distribution.keys)}")
+    return distribution
 
 
 def parameters():
@@ -163,9 +163,9 @@ def texts_by_name():
     def read(name, value):
         if not isinstance(value, dict):
             raise InputError(f'{name} = {shown(value)} must be a table of texts, safe = "max_stress < 2e8"')
-        for key, one in value.items():
-            if not isinstance(one, str) or not one.strip():
-                raise InputError(f'{name}: {short(key)} = {shown(one)} must be a text, such as "max_stress < 2e8"')
+        for key, entry in value.items():
+            if not isinstance(entry, str) or not entry.strip():
+                raise InputError(f'{name}: {short(key)} = {shown(entry)} must be a text, such as "max_stress < 2e8"')
         return dict(value)
 
     return field(read, default_factory=dict)
@@ -226,7 +226,7 @@ class Study(Table):
 
     scene: str = text()
     parameters: dict = parameters()
-    title: str = text(default="study", most=200)
+    title: str = text(default="study", limit=200)
     sample: str = choice(*DESIGNS, *SAMPLES, default="grid")
     count: int | None = integer(default=None, at_least=1, at_most=MOST_CASES)
     seed: int = integer(default=0, at_least=0, at_most=2**63 - 1)
@@ -241,13 +241,15 @@ class Study(Table):
     @property
     def listed(self):
         """Parameters that are lists, and in designs ranges, with all their values."""
-        return {path: _values(one) for path, one in self.parameters.items() if path not in self.drawn}
+        return {path: _values(values) for path, values in self.parameters.items() if path not in self.drawn}
 
     @property
     def drawn(self):
         """Parameters of which samples are taken."""
         sampled = self.sample in SAMPLES
-        return {p: one for p, one in self.parameters.items() if sampled and isinstance(one, Range | Distribution)}
+        return {
+            p: values for p, values in self.parameters.items() if sampled and isinstance(values, Range | Distribution)
+        }
 
     def check(self):
         """Refuse what does not fit together."""
@@ -264,11 +266,11 @@ class Study(Table):
             raise InputError(f'sample = "{self.sample}" needs a range or a distribution among the parameters')
         if self.count is None:
             raise InputError(f'count is missing: sample = "{self.sample}" needs the number of samples, count = 64')
-        for path, one in self.drawn.items():
-            if isinstance(one, Range) and one.count is not None:
+        for path, parameter in self.drawn.items():
+            if isinstance(parameter, Range) and parameter.count is not None:
                 raise InputError(
-                    f"parameters: {path}: count = {one.count} has no meaning with sample = {shown(self.sample)}, whose "
-                    "count is that of all samples: leave it out"
+                    f"parameters: {path}: count = {parameter.count} has no meaning with sample = {shown(self.sample)}, "
+                    "whose count is that of all samples: leave it out"
                 )
         if self.indices and self.sample != "sobol":
             raise InputError(f'indices = true needs sample = "sobol", not {shown(self.sample)}')
@@ -276,44 +278,43 @@ class Study(Table):
             raise InputError(f"count = {self.count} must be a power of 2 for indices, such as 64")
 
     def _check_design(self):
-        for path, one in self.parameters.items():
-            if isinstance(one, Distribution):
+        for path, parameter in self.parameters.items():
+            if isinstance(parameter, Distribution):
                 known = ", ".join(f'"{name}"' for name in SAMPLES)
                 raise InputError(f"parameters: {path}: a distribution needs sample = one of {known}, and a count")
-            if isinstance(one, Range) and one.count is None:
+            if isinstance(parameter, Range) and parameter.count is None:
                 raise InputError(f"parameters: {path}: count is missing: give the number of values, count = 5")
         for key, given in (("count", self.count), ("indices", self.indices)):
             if given:
                 raise InputError(f'{key} = {shown(given)} has no meaning with sample = "{self.sample}": leave it out')
         lengths = {path: len(values) for path, values in self.listed.items()}
         if self.sample == "zip" and len(set(lengths.values())) > 1:
-            told = ", ".join(f"{path} has {number}" for path, number in lengths.items())
-            raise InputError(f'sample = "zip" needs as many values of each parameter: {told}')
+            text = ", ".join(f"{path} has {number}" for path, number in lengths.items())
+            raise InputError(f'sample = "zip" needs as many values of each parameter: {text}')
 
     def to_dict(self):
         """The study as plain TOML values."""
         given = {key: value for key, value in super().to_dict().items() if key not in ("folder", "parameters")}
         return {key: value for key, value in given.items() if value != {}} | {
-            "parameters": {path: _plain(one) for path, one in self.parameters.items()}
+            "parameters": {path: _plain(parameter) for path, parameter in self.parameters.items()}
         }
 
 
-def _values(one: Any):
+def _values(parameter: Any):
     """All values of a list or a range."""
-    if not isinstance(one, Range):
-        return list(one)
-    count = one.count or 1
-    return [one.at(n / max(count - 1, 1)) for n in range(count)]
+    if not isinstance(parameter, Range):
+        return list(parameter)
+    count = parameter.count or 1
+    return [parameter.at(n / max(count - 1, 1)) for n in range(count)]
 
 
-def _plain(one):
-    if isinstance(one, Range):
-        return {"from": one.low, "to": one.high} | ({"count": one.count} if one.count else {}) | (
-            {"spacing": "log"} if one.log else {}
-        )  # fmt: skip
-    if isinstance(one, Distribution):
-        return {"distribution": one.name, **dict(one.keys)}
-    return [list(x) if isinstance(x, tuple) else x for x in one]
+def _plain(parameter):
+    if isinstance(parameter, Range):
+        count = {"count": parameter.count} if parameter.count else {}
+        return {"from": parameter.low, "to": parameter.high} | count | ({"spacing": "log"} if parameter.log else {})
+    if isinstance(parameter, Distribution):
+        return {"distribution": parameter.name, **dict(parameter.keys)}
+    return [list(x) if isinstance(x, tuple) else x for x in parameter]
 
 
 def shipped():

@@ -62,10 +62,10 @@ class Sweep:
     @property
     def count(self):
         """Number of rows of each status, a dict."""
-        found = dict.fromkeys(("solved", "failed", "refused", "lost", "skipped", "waiting"), 0)
+        counts = dict.fromkeys(("solved", "failed", "refused", "lost", "skipped", "waiting"), 0)
         for row in self.rows:
-            found[row["status"]] += 1
-        return {status: number for status, number in found.items() if number}
+            counts[row["status"]] += 1
+        return {status: number for status, number in counts.items() if number}
 
     def gather(self, known):
         """Let ``rows`` be those of all cases, of what is known by their keys, and find what they say together."""
@@ -91,7 +91,7 @@ class Sweep:
         from ..errors import InputError
         from ..messages import nearest, shown
 
-        known = {one.name: f"{one.name} [{one.unit}]" for one in results_among(self.columns)}
+        known = {item.name: f"{item.name} [{item.unit}]" for item in results_among(self.columns)}
         known |= {path: path for path in self.study.parameters}
         if name not in known:
             raise InputError(f"{shown(name)} is neither a result nor a parameter, {nearest(name, known)}")
@@ -119,8 +119,8 @@ class Sweep:
         }
 
     def __repr__(self):
-        told = ", ".join(f"{number} {status}" for status, number in self.count.items())
-        return f'<Sweep of "{self.title}": {len(self.cases)} cases, {told or "none run"}>'
+        text = ", ".join(f"{number} {status}" for status, number in self.count.items())
+        return f'<Sweep of "{self.title}": {len(self.cases)} cases, {text or "none run"}>'
 
 
 def row_of(study, case, known):
@@ -128,8 +128,8 @@ def row_of(study, case, known):
     values = {path: case.values[path] for path in study.parameters}
     if case.given is None:
         return {"case": "", "status": "skipped", **values, "message": f"skip: {study.skip}"}
-    found = known.get(case.key, {"status": "waiting"})
-    return {"case": case.key, **values, **{k: v for k, v in found.items() if k != "case" and k not in values}}
+    known_row = known.get(case.key, {"status": "waiting"})
+    return {"case": case.key, **values, **{k: v for k, v in known_row.items() if k != "case" and k not in values}}
 
 
 def columns_of(study, rows):

@@ -83,26 +83,26 @@ def sweep(
         raise InputError(f"workers = {shown(workers)} must be a whole number ≥ 1")
     study, base = _asked(scene, parameters, options)
     cases = cases_of(study, base)
-    found = Sweep(study, cases, str(base.given.get("title", study.scene)))
-    found.reasons = _reasons(study, cases)
+    study_run = Sweep(study, cases, str(base.given.get("title", study.scene)))
+    study_run.reasons = _reasons(study, cases)
     _check(study, base, cases)
-    kept = Kept(out, found) if out is not None else Kept(None, found)
-    found.path = kept.path
-    found.gather(kept.rows)
+    kept = Kept(out, study_run) if out is not None else Kept(None, study_run)
+    study_run.path = kept.path
+    study_run.gather(kept.rows)
     if announce is not None:
-        announce(found)
+        announce(study_run)
     crew = Processes(workers) if executor is None else executor
     crew = crew if isinstance(crew, Given | Processes) else Given(crew)
     kept.begin(scene if isinstance(scene, Scene) else None)
     try:
-        with recorded(found, clock, lambda: _done(found, kept)), followed(progress, "starting workers") as tell:
+        with recorded(study_run, clock, lambda: _done(study_run, kept)), followed(progress, "starting workers") as tell:
             try:
-                _run(found, base, kept, crew, tell)
+                _run(study_run, base, kept, crew, tell)
             finally:
                 kept.end()
     finally:
         kept.summary()
-    return found
+    return study_run
 
 
 def _asked(scene, parameters, options):
@@ -152,18 +152,18 @@ def _check(study, base, cases):
     of_throw = [] if scene.throw is None else scene.throw.numbers
     for name, text in study.conditions.items():
         with in_file(f"conditions: {short(name)}:"):
-            Expression(text, [*study.parameters, *(one.name for one in scene.observables), *of_throw])
+            Expression(text, [*study.parameters, *(item.name for item in scene.observables), *of_throw])
 
 
-def _run(found, base, kept, workers, tell):
+def _run(study_run, base, kept, workers, tell):
     """Run what is missing."""
-    missing = {case.key: case for case in found.cases if case.given is not None and not kept.has(case)}
-    again = Counter(case.key for case in found.cases if case.given is not None)
+    missing = {case.key: case for case in study_run.cases if case.given is not None and not kept.has(case)}
+    again = Counter(case.key for case in study_run.cases if case.given is not None)
     by_key = {}
-    for case in found.cases:
+    for case in study_run.cases:
         by_key.setdefault(case.key, []).append(case)
     total, left, began = sum(again.values()), sum(again[key] for key in missing), None
-    jobs = (_job(found.study, base, case, workers) for case in missing.values())
+    jobs = (_job(study_run.study, base, case, workers) for case in missing.values())
     tell(f"{total - left} of {total} cases", (total - left) / total)
     start = left
     with contextlib.closing(through(jobs, workers)) as outcomes:
@@ -187,8 +187,8 @@ def _job(study, base, case, workers):
         for path in files_of(scene.to_dict()):
             with contextlib.suppress(OSError):
                 files[path] = pathlib.Path(path).read_bytes()
-    told = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case.values.items())
-    return Job(case.key, case.given, folder, f"{base.file} with {told}", study.keep, here(), files)
+    text = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case.values.items())
+    return Job(case.key, case.given, folder, f"{base.file} with {text}", study.keep, here(), files)
 
 
 def _span(seconds):
@@ -198,9 +198,9 @@ def _span(seconds):
     return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _done(found, kept):
-    ran = sum(case.given is not None for case in found.cases)
-    return f"{sum(case.key in kept.rows for case in found.cases if case.given is not None)} of {ran} cases"
+def _done(study_run, kept):
+    ran = sum(case.given is not None for case in study_run.cases)
+    return f"{sum(case.key in kept.rows for case in study_run.cases if case.given is not None)} of {ran} cases"
 
 
 class Kept:
@@ -219,22 +219,22 @@ class Kept:
         Cells by the key of their case.
     """
 
-    def __init__(self, folder, found):
+    def __init__(self, folder, study_run):
         self.path = None if folder is None else pathlib.Path(folder).absolute()
-        self.found, self.rows, self._aside, self._table = found, {}, [], None
+        self.found, self.rows, self._aside, self._table = study_run, {}, [], None
         if self.path is None:
             return
         full = _check_folder(folder)
-        asked = {case.key for case in found.cases}
+        asked = {case.key for case in study_run.cases}
         stored = [*case_rows.read(self.path / case_rows.ASIDE), *case_rows.read(self.path / case_rows.NAME)]
         for row in stored if full else ():
             if row["case"] in asked and row["status"] != "lost":
                 self.rows[row["case"]] = case_rows.own(row)
         unasked = {row["case"]: row for row in stored if row["case"] and row["case"] not in asked}
         self._aside = list(unasked.values())
-        before = (read_summary(self.path) or {}).get("versions", {}) if full and self.rows else found.versions
-        if changed := [f"{k} {v} after {before.get(k)}" for k, v in found.versions.items() if before.get(k) != v]:
-            found.warnings.append(
+        before = (read_summary(self.path) or {}).get("versions", {}) if full and self.rows else study_run.versions
+        if changed := [f"{k} {v} after {before.get(k)}" for k, v in study_run.versions.items() if before.get(k) != v]:
+            study_run.warnings.append(
                 f"some rows are of other versions, {', '.join(changed)}: their last digits may differ"
             )
 
@@ -245,8 +245,8 @@ class Kept:
             return False
         if self.path is None or self.found.study.keep == "none" or row["status"] != "solved":
             return True
-        as_json, whole = kept_files(self.path, case.key)
-        return as_json.is_file() if self.found.study.keep == "json" else (whole / "run.json").is_file()
+        as_json, archive = kept_files(self.path, case.key)
+        return as_json.is_file() if self.found.study.keep == "json" else (archive / "run.json").is_file()
 
     def begin(self, scene=None):
         """Write what stands at the beginning; ``scene`` is one that is in no file."""
@@ -280,8 +280,8 @@ class Kept:
         """Put rows into their order, and say what they say together."""
         self.found.gather(self.rows)
         if self._table is not None:
-            whole = [row for row in self.found.rows if row["status"] != "waiting"]
-            self._table.order(whole)
+            rows_done = [row for row in self.found.rows if row["status"] != "waiting"]
+            self._table.order(rows_done)
             self._table.close()
 
     def summary(self):

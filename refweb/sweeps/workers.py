@@ -57,12 +57,12 @@ class _Process(multiprocessing.context.SpawnProcess):
 
     @staticmethod
     def _Popen(process_obj):
-        own = sys.modules["__main__"]
+        main_module = sys.modules["__main__"]
         sys.modules["__main__"] = types.ModuleType("__main__")
         try:
             return multiprocessing.context.SpawnProcess._Popen(process_obj)
         finally:
-            sys.modules["__main__"] = own
+            sys.modules["__main__"] = main_module
 
 
 class _Context(multiprocessing.context.SpawnContext):

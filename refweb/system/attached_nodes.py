@@ -109,7 +109,7 @@ class Carried:
 
     def _state(self, x, v):
         """Arm of each node, and ω, W, u and δθ by the quaternion of its body, (3, 4) from that behind on."""
-        found = []
+        states = []
         for c, (_, n) in enumerate(self.turns.carried):
             _, spin, turn = self.turns.rows[n]
             R = np.array(matrix_at(x, spin, turn))
@@ -118,8 +118,8 @@ class Carried:
             angle[:, :3], angle[:, 3] = q[0] * np.eye(3) + _cross(q[1:]), -q[1:]
             angle *= 2.0 / (q @ q)
             W = R @ self.turns.mobility[n] @ R.T
-            found.append((R @ self.turns.arms[c], np.array(angular_velocity(n, x, v, self.turns)), W, v[spin], angle))
-        return found
+            states.append((R @ self.turns.arms[c], np.array(angular_velocity(n, x, v, self.turns)), W, v[spin], angle))
+        return states
 
     def _matrices(self, cell, state):
         """(T, T by velocities, T of velocities by places, L) of a cell."""
@@ -149,16 +149,16 @@ class Carried:
                 family.damping(t, x, v, damped[i], family.cells, data, False)
         for cell, entries in zip(self._cells, self._entries, strict=True):
             T, _, turned, L = self._matrices(cell, state)
-            whole = _beside(L @ blocks[cell.family][cell.at] @ T, blocks, cell)
+            expanded = _beside(L @ blocks[cell.family][cell.at] @ T, blocks, cell)
             if cell.family in damped:
-                whole += L @ damped[cell.family][cell.at] @ turned
-            _add(values, entries, whole)
+                expanded += L @ damped[cell.family][cell.at] @ turned
+            _add(values, entries, expanded)
         force = system.force(t, x, v)
         for c, (node, n) in enumerate(self.turns.carried):
             (arm, *_, angle), f = state[c], force[node]
-            whole = np.zeros((6, 6))
-            whole[:3] = ((f @ arm) * np.eye(3) - np.outer(arm, f)) @ angle
-            _add(values, self._spun[n], whole)
+            expanded = np.zeros((6, 6))
+            expanded[:3] = ((f @ arm) * np.eye(3) - np.outer(arm, f)) @ angle
+            _add(values, self._spun[n], expanded)
 
     def add_damping(self, values, system, x, v, blocks):
         """Add to the values of C what these nodes have of it, of the blocks of −∂f/∂v."""
@@ -189,19 +189,19 @@ def _entries(rows, size, number, keys):
     row, column = (side.ravel() for side in np.meshgrid(inside, inside, indexing="ij"))
     wanted = of[column] * np.int64(size) + of[row]
     at = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    there = keys[at] == wanted
-    return row[there], column[there], at[there]
+    present = keys[at] == wanted
+    return row[present], column[present], at[present]
 
 
-def _beside(whole, blocks, cell):
+def _beside(expanded, blocks, cell):
     """A new block of a cell without what of it is in the pattern already."""
     T, L = cell.unmoved()
-    return whole - L @ blocks[cell.family][cell.at] @ T
+    return expanded - L @ blocks[cell.family][cell.at] @ T
 
 
-def _add(values, entries, whole):
+def _add(values, entries, expanded):
     row, column, at = entries
-    values[at] += whole[row, column]
+    values[at] += expanded[row, column]
 
 
 def _cross(a):

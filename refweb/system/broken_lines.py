@@ -36,7 +36,7 @@ class Breaks(NamedTuple):
 
     def and_then(self, *more):
         """These and more, which are given as the fields are."""
-        return Breaks(*(np.concatenate([one, other]) for one, other in zip(self, more, strict=True)))
+        return Breaks(*(np.concatenate([before, after]) for before, after in zip(self, more, strict=True)))
 
 
 def torn(system, elements, energies):
@@ -61,15 +61,15 @@ def torn(system, elements, energies):
     numbers = net.line_data.copy()
     numbers[elements, AXIAL_STIFFNESS] = 0.0
     numbers[elements, net.column("rupture_energy")] = energies
-    other = copy.copy(system)
-    other.net = replace(net, line_data=numbers)
+    changed = copy.copy(system)
+    changed.net = replace(net, line_data=numbers)
     broken = np.zeros(len(net.cells), dtype=bool)
     broken[elements] = True
-    other.families = [_severed(family, broken, numbers) for family in system.families]
+    changed.families = [_severed(family, broken, numbers) for family in system.families]
     for kept in ("unsupported_parts", "carriers"):
-        other.__dict__.pop(kept, None)
-    other.arrange()
-    return other
+        changed.__dict__.pop(kept, None)
+    changed.arrange()
+    return changed
 
 
 def _breakable(system):
@@ -79,12 +79,12 @@ def _breakable(system):
     from ..effects.base import BreakLimits
     from ..effects.broken import HELD, held
 
-    other = copy.copy(system)
-    other.net = net = system.net.with_column(HELD, 0.0)
-    other.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
-    other.families.append(held(net))
-    other.weakness = BreakLimits(np.full(len(net.cells), np.inf))
-    return other
+    changed = copy.copy(system)
+    changed.net = net = system.net.with_column(HELD, 0.0)
+    changed.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
+    changed.families.append(held(net))
+    changed.weakness = BreakLimits(np.full(len(net.cells), np.inf))
+    return changed
 
 
 def with_broken_lines(system):
@@ -111,9 +111,9 @@ def _without(family, data, ends):
     ends = ends if ends.ndim == 1 else ends.any(axis=1)
     if not ends.any():
         return data
-    data, own = data.copy(), data[ends]
-    family.disable_cells(own)
-    data[ends] = own
+    data, end_data = data.copy(), data[ends]
+    family.disable_cells(end_data)
+    data[ends] = end_data
     return data
 
 
@@ -123,11 +123,15 @@ def tear(system, t, x, v, elements):
     What ends is the energy of the system less that of the torn one; of several that break together each has its share
     of that by what it held itself.
     """
-    own = sum(system.energy_of(f, t, x)[elements] for f in system.families if f.lines and f.energy is not None)
+    energy = sum(system.energy_of(f, t, x)[elements] for f in system.families if f.lines and f.energy is not None)
     stored = [f for f in system.families if f.book not in ("work", "dissipated_energy")]
     before = sum(system.energy_of(family, t, x).sum() for family in stored)
-    whole = torn(system, elements, np.zeros(len(elements)))
-    left = [f for f in whole.families if f.book not in ("work", "dissipated_energy")]
-    lost = before - sum(whole.energy_of(family, t, x).sum() for family in left)
-    share = np.abs(own) / np.abs(own).sum() if np.abs(own).sum() > 0.0 else np.full(len(elements), 1.0 / len(elements))
+    changed = torn(system, elements, np.zeros(len(elements)))
+    left = [f for f in changed.families if f.book not in ("work", "dissipated_energy")]
+    lost = before - sum(changed.energy_of(family, t, x).sum() for family in left)
+    share = (
+        np.abs(energy) / np.abs(energy).sum()
+        if np.abs(energy).sum() > 0.0
+        else np.full(len(elements), 1.0 / len(elements))
+    )
     return torn(system, elements, lost * share), lost * share

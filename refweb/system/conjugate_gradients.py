@@ -27,7 +27,7 @@ class Found(NamedTuple):
     iterations: int
 
 
-def solve(times, precondition, b, tolerance, most):
+def solve(times, precondition, b, tolerance, limit):
     """Solutions of A y = b, several side by side, as far as they come.
 
     Parameters
@@ -38,7 +38,7 @@ def solve(times, precondition, b, tolerance, most):
         Right-hand sides.
     tolerance : float
         What may be left.
-    most : int
+    limit : int
         Largest number of iterations. It ends before where those so far show that they will not do.
 
     Returns
@@ -51,7 +51,7 @@ def solve(times, precondition, b, tolerance, most):
     if not (np.isfinite(first).all() and (first >= 0.0).all()):
         return Found(y, np.inf, False, 0)
     p, k = z.copy(), 0
-    while k < most and left > tolerance:
+    while k < limit and left > tolerance:
         q = times(p)
         stiffness = _dot(p, q)
         if not (stiffness[size > 0.0] > 0.0).all():  # or not a number
@@ -62,17 +62,17 @@ def solve(times, precondition, b, tolerance, most):
         z = precondition(r)
         last, size = size, _dot(r, z)
         left = float(np.sqrt(np.abs(_over(size, first)).max(initial=0.0)))
-        if not (size >= 0.0).all() or (k > 1 and left ** (most / k) > tolerance):
+        if not (size >= 0.0).all() or (k > 1 and left ** (limit / k) > tolerance):
             break
         p = z + _over(size, last) * p
     return Found(y, left, left <= tolerance, k)
 
 
-def _dot(one, other):
+def _dot(a, b):
     """Products of columns."""
-    return (one * other).sum(axis=0)
+    return (a * b).sum(axis=0)
 
 
-def _over(one, other):
+def _over(a, b):
     """Ratio, 0 of what is 0 already."""
-    return np.where(other > 0.0, one / np.where(other > 0.0, other, 1.0), 0.0)
+    return np.where(b > 0.0, a / np.where(b > 0.0, b, 1.0), 0.0)

@@ -43,9 +43,9 @@ class ContactForces:
         self._cells, self._pairs = [family.cells for family in system.families], {}
         for i, family in enumerate(system.families):
             if family.felt:
-                body, other = (*family.felt, -1)[:2]
+                body, partner = (*family.felt, -1)[:2]
                 lines = elements if family.contact and family.energy is not None else 0
-                known.append((i, body, other, lines, pairs if family.pairs else -1, -1))
+                known.append((i, body, partner, lines, pairs if family.pairs else -1, -1))
                 pairs += len(family.pairs)
         self.families = np.array(known, dtype=np.int64).reshape(len(known), 6)
         for n, pair in enumerate(pairs_of(system)):
@@ -63,15 +63,15 @@ class ContactForces:
     def lines_on(self, body):
         """(number of the family, slice of its cells) of the push of lines on a body; cells are in order of elements."""
         for known in self.families:
-            own = np.flatnonzero(self._cells[known[FAMILY]][:, known[BODY]] == body.row)
-            if known[ELEMENTS] and len(own):
-                return int(known[FAMILY]), slice(int(own[0]), int(own[-1]) + 1)
+            indices = np.flatnonzero(self._cells[known[FAMILY]][:, known[BODY]] == body.row)
+            if known[ELEMENTS] and len(indices):
+                return int(known[FAMILY]), slice(int(indices[0]), int(indices[-1]) + 1)
         raise ValueError(f'nothing touches body "{body.name}"')
 
-    def pair_rows(self, one, others):
+    def pair_rows(self, body, others):
         """Numbers of the rows of the pairs that a body makes with some others, a list."""
-        found = [self._pairs.get(frozenset((one.row, other.row))) for other in others]
-        return [row for row in found if row is not None]
+        rows = [self._pairs.get(frozenset((body.row, partner.row))) for partner in others]
+        return [row for row in rows if row is not None]
 
     def of(self, per_cell):
         """Contact of bodies where families write ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
@@ -97,19 +97,19 @@ def forget(felt):
 def add_felt(first, known, cells, chosen, out, felt):
     """Add what bodies feel of the cells of a family; of those that are ``chosen`` where any are, shape (cells, 1)."""
     for c in range(cells.shape[0]):
-        x, y, z, own = out[c, FELT], out[c, FELT + 1], out[c, FELT + 2], out[c, OWN]
-        if own == 0.0 and x == 0.0 and y == 0.0 and z == 0.0:
+        x, y, z, cell_depth = out[c, FELT], out[c, FELT + 1], out[c, FELT + 2], out[c, OWN]
+        if cell_depth == 0.0 and x == 0.0 and y == 0.0 and z == 0.0:
             continue
         body, cell = cells[c, known[BODY]] - first, chosen[c, 0] if chosen.shape[0] else c
         felt[body, FORCE] += x
         felt[body, FORCE + 1] += y
         felt[body, FORCE + 2] += z
         if known[OTHER] >= 0:
-            other = cells[c, known[OTHER]] - first
-            felt[other, FORCE] -= x
-            felt[other, FORCE + 1] -= y
-            felt[other, FORCE + 2] -= z
-        if known[ELEMENTS] > 0 and own > felt[body, DEPTH]:
-            felt[body, DEPTH], felt[body, ELEMENT] = own, float(cell % known[ELEMENTS])
+            partner_row = cells[c, known[OTHER]] - first
+            felt[partner_row, FORCE] -= x
+            felt[partner_row, FORCE + 1] -= y
+            felt[partner_row, FORCE + 2] -= z
+        if known[ELEMENTS] > 0 and cell_depth > felt[body, DEPTH]:
+            felt[body, DEPTH], felt[body, ELEMENT] = cell_depth, float(cell % known[ELEMENTS])
         if known[PAIRS] >= 0:
-            felt[known[PAIRS] + cell, DEPTH] = own
+            felt[known[PAIRS] + cell, DEPTH] = cell_depth

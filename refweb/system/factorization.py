@@ -201,8 +201,8 @@ class _Rslab:
     def negative_pivots(self):
         """Number of pivots that are not positive, None where those that it counts are not all."""
         positive, negative, zero = self._factor.inertia
-        whole = positive + negative + zero == self.pattern.size and not self._factor.n_perturbed
-        return negative + zero if whole else None
+        complete = positive + negative + zero == self.pattern.size and not self._factor.n_perturbed
+        return negative + zero if complete else None
 
 
 LIBRARIES = {"qdldl": _Qdldl, "superlu": _Superlu, "rslab": _Rslab}
@@ -229,12 +229,12 @@ class Factor:
     def solutions(self):
         return self._by.solutions
 
-    def update(self, values, held=None):
+    def update(self, values, fixed=None):
         """Factorize the symmetric matrix of these values, and keep what is said of it."""
         self._values = values
         if not self.pattern.size:
             return
-        self.held = held
+        self.held = fixed
         try:
             self._take(self.pattern.library.name)
         except RuntimeError:  # singular, of which qdldl leaves what can be used
@@ -329,7 +329,7 @@ class Lu:
         self.pattern = pattern
         self._solver: Any = None
 
-    def update(self, values, held=None):
+    def update(self, values, fixed=None):
         """Factorize the matrix of these values."""
         from scipy.sparse.linalg import splu
 

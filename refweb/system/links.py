@@ -36,9 +36,9 @@ class Links:
 
     def __init__(self, system):
         given = system.constraints
-        cells, data = (np.vstack([getattr(one, name) for one in given]) for name in ("cells", "data"))
+        cells, data = (np.vstack([getattr(link, name) for link in given]) for name in ("cells", "data"))
         self.pairs = Constraint(cells=cells, data=data)
-        table = np.repeat(np.arange(len(given)), [len(one.cells) for one in given]) + 1
+        table = np.repeat(np.arange(len(given)), [len(link.cells) for link in given]) + 1
         self._names = [f"[[link]] {i} of nodes {a} and {b}" for i, (a, b) in zip(table, cells, strict=True)]
         self._refuse(system)
         self._M, self._at = system.mass.matrix, system.mass.heavy
@@ -48,9 +48,9 @@ class Links:
         moving = unknown >= 0
         self._link, end, self._axis = np.nonzero(moving)
         self._unknown, self._sign = unknown[moving], 2.0 * end - 1.0
-        other = np.full(unknown.shape, -1)
-        other[moving] = np.arange(len(self._link))
-        self._other = other[:, ::-1][moving]
+        opposite = np.full(unknown.shape, -1)
+        opposite[moving] = np.arange(len(self._link))
+        self._other = opposite[:, ::-1][moving]
         self._both = np.flatnonzero(self._other >= 0)
         self._refuse_redundant(np.zeros((system.rows, 3)))
         self._arrange()
@@ -118,8 +118,8 @@ class Links:
         """
         x, v, force = position[self._unknown], velocity[self._unknown], first + self._link
         rate, both = force + len(self), self._both
-        own, across = (v, x), (v[both], x[self._other[both]])
-        return [(v, force), own, across, (x, rate), (force, x), (rate, v), (rate, x)]
+        values, across = (v, x), (v[both], x[self._other[both]])
+        return [(v, force), values, across, (x, rate), (force, x), (rate, v), (rate, x)]
 
     def values(self, x, v, multipliers):
         """Values at those places."""
@@ -136,16 +136,16 @@ class Links:
         data = np.bincount(self._place, np.concatenate([self._M.data, G, G]))
         matrix, lu = csc_array((data, *self._pattern), shape=(size, size)), self._lu
         rest = wanted = np.concatenate([f, b])
-        found = np.zeros_like(wanted)
+        solution = np.zeros_like(wanted)
         for i in range(5):
             if lu is None or i == 4:
                 self._lu = lu = _factorized(matrix)
-                rest, found = wanted, np.zeros_like(wanted)
-            found = found + lu.solve(rest)
-            rest = wanted - matrix @ found
+                rest, solution = wanted, np.zeros_like(wanted)
+            solution = solution + lu.solve(rest)
+            rest = wanted - matrix @ solution
             if np.abs(rest).max() <= 1e-10 * np.abs(wanted).max():
                 break
-        return found[: len(f)], found[len(f) :]
+        return solution[: len(f)], solution[len(f) :]
 
     def start(self, x, v, force):
         """Accelerations of what has mass [m/s²], and λ [N], for the forces of all else [N]."""

@@ -221,11 +221,11 @@ class System:
 
     def with_line_data(self, numbers):
         """The same system with other numbers of its lines, of the shape of `Net.line_data`."""
-        other = copy.copy(self)
-        other.net = replace(self.net, line_data=numbers)
-        other.families = [replace(f, data=numbers) if f.lines else f for f in self.families]
-        other._at_time = None
-        return other
+        changed = copy.copy(self)
+        changed.net = replace(self.net, line_data=numbers)
+        changed.families = [replace(f, data=numbers) if f.lines else f for f in self.families]
+        changed._at_time = None
+        return changed
 
     def _data(self, family, t):
         return self.line_data(t) if family.lines else family.data
@@ -319,11 +319,11 @@ class System:
         `blocks` to write to, which a loop keeps.
         """
         v, blocks = self._zero if v is None else v, self.blocks() if blocks is None else blocks
-        for family, own in zip(self._in_tangent, blocks, strict=True):
+        for family, block in zip(self._in_tangent, blocks, strict=True):
             if family.stiffness is None or not (only is None or family in only):
-                own[:] = 0.0
+                block[:] = 0.0
             else:
-                family.stiffness(t, x, v, own, family.cells, self._data(family, t), definite)
+                family.stiffness(t, x, v, block, family.cells, self._data(family, t), definite)
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_stiffness(values, self, t, x, v, blocks)
@@ -386,10 +386,10 @@ class System:
         if not any(f.damping is not None for f in self.families):
             return None
         blocks = self.blocks() if blocks is None else blocks
-        for family, own in zip(self._in_tangent, blocks, strict=True):
-            own[:] = 0.0
+        for family, block in zip(self._in_tangent, blocks, strict=True):
+            block[:] = 0.0
             if family.damping is not None:
-                family.damping(t, x, v, own, family.cells, self._data(family, t), False)
+                family.damping(t, x, v, block, family.cells, self._data(family, t), False)
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_damping(values, self, x, v, blocks)

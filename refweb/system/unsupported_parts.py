@@ -25,7 +25,7 @@ def found(system, touching=True):
     pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
     count, part = connected_components(graph, directed=False)
-    held = np.zeros((count, 3), dtype=bool)
-    np.logical_or.at(held, part, system.supported)
-    free_along = [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~held), strict=True)]
+    fixed = np.zeros((count, 3), dtype=bool)
+    np.logical_or.at(fixed, part, system.supported)
+    free_along = [(np.flatnonzero(part == p), axis) for p, axis in zip(*np.nonzero(~fixed), strict=True)]
     return [Part(rows, axis, np.searchsorted(system.free, 3 * rows + axis)) for rows, axis in free_along]

@@ -162,7 +162,7 @@ def test_no_equilibrium():
     with pytest.raises(NotFound, match="in 2 factorizations"):
         held = on_spokes(4)
         system = system_of(web, cable(), [refweb.Pressure(lines="all", normal=UP, value=500.0)], held)
-        Newton(system).solve(1.0, np.zeros((4, 3)), most=2)
+        Newton(system).solve(1.0, np.zeros((4, 3)), limit=2)
 
 
 # Work

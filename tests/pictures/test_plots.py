@@ -431,12 +431,14 @@ def test_what_a_run_that_failed_has(runs, tmp_path):
     (folder / "history.csv").write_text("\n".join([*lines[:20], lines[20][:30]]))
     shutil.rmtree(folder / "frames")
     (folder / "web.pvd").unlink()
-    figure = plots.draw(of_folder(folder, seen=False))
+    figure = plots.draw(of_folder(folder, with_frames=False))
     assert "run failed" in texts(figure) and "it broke" in texts(figure)
-    assert "half: run failed: it broke" in texts(plots.draw([of_folder(folder, seen=False), of_folder(runs / "again")]))
+    assert "half: run failed: it broke" in texts(
+        plots.draw([of_folder(folder, with_frames=False), of_folder(runs / "again")])
+    )
     alive = json.dumps({**run, "status": "running", "results": {}})
     (folder / "run.json").write_text(alive)
-    words = texts(plots.draw(of_folder(folder, seen=False)))
+    words = texts(plots.draw(of_folder(folder, with_frames=False)))
     assert "run not ended" in words and "of the largest energy" not in words
     assert len(of(figure, "deflection").get_lines()[0].get_xdata()) == 19
     (folder / "history.csv").write_text("\n")

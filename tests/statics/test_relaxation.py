@@ -121,5 +121,5 @@ def test_no_equilibrium():
         refweb.run(scene(supports=refweb.Supports(nodes=[])))
     system, told = scene().build(), []
     with pytest.raises(NotFound, match='4000 steps of relaxation: residual .*use method = "newton"') as error:
-        list(relaxation.solve(system, [1.0], progress=told.append, most=4000))
+        list(relaxation.solve(system, [1.0], progress=told.append, limit=4000))
     assert error.value.stats == {"nsteps": 4000} and len(told) == 2 and told[0].startswith("step 1, residual")

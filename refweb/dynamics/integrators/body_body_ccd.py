@@ -33,8 +33,8 @@ class FollowedPairs(Followed):
         """Time in which no body comes much nearer to another from displacement x and velocity v [s]."""
         time = np.inf
         for pair in (pair for family in self._families for pair in family.pairs):
-            one, other = pair
-            speed = np.linalg.norm(v[one.row] - v[other.row]) + sum(
+            body_a, body_b = pair
+            speed = np.linalg.norm(v[body_a.row] - v[body_b.row]) + sum(
                 body.extent * np.linalg.norm(body.turning(x, v)) for body in pair if body.turn is not None
             )
             if speed > 0.0:
@@ -49,32 +49,32 @@ class FollowedPairs(Followed):
     def _room(self, bend):
         return bend
 
-    def _met(self, looked_at, x, way, room):
+    def _met(self, looked_at, x, path, margin):
         family, still = looked_at, np.zeros_like(x)
         deep = np.zeros((len(family.cells), family.observed))
         family.force(0.0, x, still, np.zeros_like(x), family.cells, family.data, deep)
         for pair, (depth, *_) in zip(family.pairs, deep, strict=True):
-            nearer = self._nearer(pair, way) + self._nearer(pair, room)
+            nearer = self._nearer(pair, path) + self._nearer(pair, margin)
             if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):
-                one, other = pair
-                return np.array([one.row, other.row, -1, -1])
+                body_a, body_b = pair
+                return np.array([body_a.row, body_b.row, -1, -1])
         return None
 
-    def _nearer(self, pair, way):
+    def _nearer(self, pair, path):
         """Largest decrease of the distance of two bodies along a path [m]."""
-        one, other = pair
+        body_a, body_b = pair
         turned = sum(
-            2.0 * body.extent * np.hypot(np.linalg.norm(way[body.spin]), way[body.turn, 0])
+            2.0 * body.extent * np.hypot(np.linalg.norm(path[body.spin]), path[body.turn, 0])
             for body in pair
             if body.turn is not None
         )
-        return float(np.linalg.norm(way[one.row] - way[other.row]) + turned)
+        return float(np.linalg.norm(path[body_a.row] - path[body_b.row]) + turned)
 
     def _apart(self, pair, x):
         """Distance of the balls around two bodies [m], below 0 where they overlap."""
-        one, other = pair
+        body_a, body_b = pair
         places = [self._net.points[body.row] + x[body.row] for body in pair]
-        return float(np.linalg.norm(places[0] - places[1])) - one.extent - other.extent
+        return float(np.linalg.norm(places[0] - places[1])) - body_a.extent - body_b.extent
 
 
 def _thickness(pair):

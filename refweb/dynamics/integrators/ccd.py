@@ -104,18 +104,18 @@ class Ccd(Record):
     @classmethod
     def of(cls, system):
         """Make the record of a system."""
-        found = [i for i, family in enumerate(system.families) if family.crossing is not None]
-        own, near = [system.families[i].crossing for i in found], near_of(system)
+        numbers = [i for i, family in enumerate(system.families) if family.crossing is not None]
+        crossings, near = [system.families[i].crossing for i in numbers], near_of(system)
         return cls(
-            families=np.array(found, dtype=np.int64),
-            places=np.array([near.index(i) for i in found], dtype=np.int64),
-            meets=Functions(MEETS, [one.meets for one in own]),
-            watches=Functions(CCD_NEIGHBOURS, [one.watch for one in own]),
-            rows=Arrays(INDICES, [one.rows for one in own]),
-            data=Arrays(MATRIX, [one.data for one in own]),
-            due=Arrays(VECTOR, [np.zeros(len(one.rows) + 3) for one in own]),
-            chosen=Arrays(INTEGERS, [np.zeros(len(one.rows) + 1, dtype=np.int64) for one in own]),
-            touch=max((one.touch for one in own), default=0.0),
+            families=np.array(numbers, dtype=np.int64),
+            places=np.array([near.index(i) for i in numbers], dtype=np.int64),
+            meets=Functions(MEETS, [crossing.meets for crossing in crossings]),
+            watches=Functions(CCD_NEIGHBOURS, [crossing.watch for crossing in crossings]),
+            rows=Arrays(INDICES, [crossing.rows for crossing in crossings]),
+            data=Arrays(MATRIX, [crossing.data for crossing in crossings]),
+            due=Arrays(VECTOR, [np.zeros(len(crossing.rows) + 3) for crossing in crossings]),
+            chosen=Arrays(INTEGERS, [np.zeros(len(crossing.rows) + 1, dtype=np.int64) for crossing in crossings]),
+            touch=max((crossing.touch for crossing in crossings), default=0.0),
             met=np.zeros(4, dtype=np.int64),
             left=np.zeros(2),
         )
@@ -151,20 +151,20 @@ class BodyCcd(Record):
     @classmethod
     def of(cls, system):
         """Those of a system."""
-        found = [i for i, family in enumerate(system.families) if family.passing is not None]
-        own, near, limits = [system.families[i] for i in found], near_of(system), np.zeros((0, 2))
-        if found:
+        numbers = [i for i, family in enumerate(system.families) if family.passing is not None]
+        passing, near, limits = [system.families[i] for i in numbers], near_of(system), np.zeros((0, 2))
+        if numbers:
             from ...effects.contact.line_body_ccd import limits_of
 
-            limits = np.array([limits_of(family, system.net.bodies) for family in own])
+            limits = np.array([limits_of(family, system.net.bodies) for family in passing])
         return cls(
-            families=np.array(found, dtype=np.int64),
-            places=np.array([near.index(i) for i in found], dtype=np.int64),
-            meets=Functions(MEETS, [family.passing for family in own]),
+            families=np.array(numbers, dtype=np.int64),
+            places=np.array([near.index(i) for i in numbers], dtype=np.int64),
+            meets=Functions(MEETS, [family.passing for family in passing]),
             most=np.ascontiguousarray(limits[:, 0]),
             shown=np.ascontiguousarray(limits[:, 1]),
             met=np.ones(4, dtype=np.int64),
-            left=np.zeros(1 if found else 0),
+            left=np.zeros(1 if numbers else 0),
         )
 
 
@@ -177,14 +177,14 @@ def _larger(a, b):
 def largest_of(kick, v, f, inverse, share):
     """Largest component of velocities, by a ``share`` of 0 or 1, with what a kick adds to them: four maxima at once."""
     a = b = c = d = 0.0
-    whole = v.size // 4 * 4
-    for q in range(0, whole, 4):
+    blocks = v.size // 4 * 4
+    for q in range(0, blocks, 4):
         m, n, o, p = np.uint64(q), np.uint64(q + 1), np.uint64(q + 2), np.uint64(q + 3)
         a = _larger(a, abs(share * v[m] + kick * inverse[m] * f[m]))
         b = _larger(b, abs(share * v[n] + kick * inverse[n] * f[n]))
         c = _larger(c, abs(share * v[o] + kick * inverse[o] * f[o]))
         d = _larger(d, abs(share * v[p] + kick * inverse[p] * f[p]))
-    for q in range(whole, v.size):
+    for q in range(blocks, v.size):
         a = _larger(a, abs(share * v[np.uint64(q)] + kick * inverse[np.uint64(q)] * f[np.uint64(q)]))
     return _larger(_larger(a, b), _larger(c, d))
 
@@ -212,32 +212,32 @@ def open_ahead(kick: float, drift: float, model: Model, running: Running) -> boo
     left, skin, size = model.guard.left, model.nearby.skin[0], 3 * model.inertia.linear
     v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
     skin.fastest = largest_of(kick, v, f, inverse, 1.0)
-    way = WAY * abs(drift) * skin.fastest
-    if FEW * way > left[0]:
-        way = min(way, way_among(drift, kick, v, f, inverse))
-    if not way < left[0]:
+    path = WAY * abs(drift) * skin.fastest
+    if FEW * path > left[0]:
+        path = min(path, way_among(drift, kick, v, f, inverse))
+    if not path < left[0]:
         return False
-    left[0] -= way
-    left[1] += way
+    left[0] -= path
+    left[1] += path
     return True
 
 
 @kernel(forceinline=True)
-def near_cells(way, i, place, model):
+def near_cells(path, i, index, model):
     """(Cells, data) of a family that may touch on a way [m]: those that are looked at, or all."""
     skin, families = model.nearby.skin[0], model.families
-    if way > skin.depth - skin.used:
-        whole = len(families.data) - model.nearby.families.size + place  # see `refweb.dynamics.integrators.records`
-        return families.cells[whole], families.data[whole]
+    if path > skin.depth - skin.used:
+        source = len(families.data) - model.nearby.families.size + index  # see `refweb.dynamics.integrators.records`
+        return families.cells[source], families.data[source]
     return families.cells[i], families.data[i]
 
 
 @kernel(leaf=True, forceinline=True)
-def deepest_of(shown):
+def deepest_of(depths):
     """Largest of what a family shows, 0 where that is nothing."""
     deep = 0.0
-    for c in range(shown.shape[0]):
-        deep = max(deep, shown[c, 0])
+    for c in range(depths.shape[0]):
+        deep = max(deep, depths[c, 0])
     return deep
 
 
@@ -301,30 +301,32 @@ def comes_through(time: float, kick: float, drift: float, then: int, model: Mode
     """
     touch, size, left = model.guard.touch, 3 * model.inertia.linear, model.guard.left
     v, f, inverse = running.v.reshape(-1)[:size], running.f.reshape(-1)[:size], model.inertia.inverse.reshape(-1)[:size]
-    way = WAY * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
-    if touch > 0.0 and FEW * way > touch:
-        way = min(way, way_among(drift, kick, v, f, inverse))
-    if not way < math.inf:
+    path = WAY * abs(drift) * largest_of(kick, v, f, inverse, 1.0)
+    if touch > 0.0 and FEW * path > touch:
+        path = min(path, way_among(drift, kick, v, f, inverse))
+    if not path < math.inf:
         return False
-    came = passes_lines(time, way, kick, drift, then, model, running) if touch > 0.0 else False
+    came = passes_lines(time, path, kick, drift, then, model, running) if touch > 0.0 else False
     if model.walls.families.size:
-        came = passes_bodies(time, way, kick, drift, then, model, running) or came
+        came = passes_bodies(time, path, kick, drift, then, model, running) or came
     if came:
         running.clock[0].held, left[0] = 1, 0.0
     return came
 
 
 @kernel(apart=("guard",))
-def passes_lines(time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running) -> bool:
+def passes_lines(
+    time: float, path: float, kick: float, drift: float, then: int, model: Model, running: Running
+) -> bool:
     """Tell if lines that push each other would meet; where the drift is taken, find the free distance behind it."""
     guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
     inverse, left = model.inertia.inverse, math.inf
     for m in range(guard.families.size):
         i, due = guard.families[m], guard.due[m]
-        room = guard.touch - deepest_of(families.outs[i]) - way
-        if not room > 0.0:
-            cells, data = near_cells(way - guard.touch, i, guard.places[m], model)
-            if guard.meets[m](0.0, way, kick, drift, x, v, f, inverse, cells, data, guard.met):
+        margin = guard.touch - deepest_of(families.outs[i]) - path
+        if not margin > 0.0:
+            cells, data = near_cells(path - guard.touch, i, guard.places[m], model)
+            if guard.meets[m](0.0, path, kick, drift, x, v, f, inverse, cells, data, guard.met):
                 came = then != TOLD
                 if then == TOLD:
                     note_met(APART, time, guard.met, running.crossings)
@@ -332,34 +334,34 @@ def passes_lines(time: float, way: float, kick: float, drift: float, then: int, 
         if came or then == FORESEEN:
             continue
         if guard.watches[m](
-            0.0, way, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], due, guard.chosen[m], guard.met
+            0.0, path, kick, drift, x, v, f, inverse, guard.rows[m], guard.data[m], due, guard.chosen[m], guard.met
         ):  # fmt: skip
             note_met(BESIDE, time, guard.met, running.crossings)
-        left = min(left, room, due[DUE] - due[PAST])
+        left = min(left, margin, due[DUE] - due[PAST])
     guard.left[0], guard.left[1] = 0.0 if then == FORESEEN else left, 0.0
     return came
 
 
 @kernel(apart=("walls",))
 def passes_bodies(
-    time: float, way: float, kick: float, drift: float, then: int, model: Model, running: Running
+    time: float, path: float, kick: float, drift: float, then: int, model: Model, running: Running
 ) -> bool:
     """Tell if lines would come as deep in a body as its middle."""
     walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
-    inverse, room = model.inertia.inverse, 0.0
+    inverse, margin = model.inertia.inverse, 0.0
     if model.inertia.turns.moment.size:
-        room = beside_places(kick, drift, x, v, f, inverse, model.inertia.turns)
+        margin = beside_places(kick, drift, x, v, f, inverse, model.inertia.turns)
     walls.met[3] = 1
     for m in range(walls.families.size):
         i = walls.families[m]
         deep = deepest_of(families.outs[i])
-        left = walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0) - way - room
+        left = walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0) - path - margin
         if model.guard.families.size:
             model.guard.left[0] = 0.0 if model.inertia.turns.moment.size else min(model.guard.left[0], left)
         if left > 0.0:
             continue
-        cells, data = near_cells(way + room, i, walls.places[m], model)
-        if walls.meets[m](room, way, kick, drift, x, v, f, inverse, cells, data, walls.met):
+        cells, data = near_cells(path + margin, i, walls.places[m], model)
+        if walls.meets[m](margin, path, kick, drift, x, v, f, inverse, cells, data, walls.met):
             if then != TOLD and walls.met[3] == 0:
                 came = True
                 break

@@ -145,7 +145,7 @@ class CentralDifference(Integrator):
         What the first step is looked at inside with is not counted.
         """
         looks = self._observed.followed, self._observed.sums, self._observed.windows.slots
-        follows = any(len(one) for one in looks)  # and evaluates forces where it looks
+        follows = any(len(rows) for rows in looks)  # and evaluates forces where it looks
         per_step = len(self.drifts) + (LOOKS - 1 if follows and len(self.drifts) > 1 else 0)
         return dict(nfev=per_step * course.nsteps + 1, njev=0, nlu=0)
 
@@ -172,7 +172,7 @@ class CentralDifference(Integrator):
         extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         averages = begin_averages(self._observed.windows, extremes)
         extremes.recent[:, 2] = extremes.values
-        own = np.delete(total[:-2], np.flatnonzero(system.working > 0))
+        per_family = np.delete(total[:-2], np.flatnonzero(system.working > 0))
         ledger = MomentumBalance.empty()
         open_balance(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
         return ExplicitState(
@@ -184,8 +184,8 @@ class CentralDifference(Integrator):
             work=work,
             ledger=ledger,
             averages=averages,
-            energy=own.sum(),
-            largest=max(np.abs(own).sum(), self._least),
+            energy=per_family.sum(),
+            largest=max(np.abs(per_family).sum(), self._least),
             force=force,
             power=np.zeros(len(system.families)),
         )
@@ -225,8 +225,8 @@ class CentralDifference(Integrator):
 
     @property
     def _scheme(self):
-        least, step = 1.0 if self.step_size else 0.5 / self.safety, self.step_size or 0.0
-        numbers = (self.safety * self.stretch, least, step, self.finer)
+        least_steps, step = 1.0 if self.step_size else 0.5 / self.safety, self.step_size or 0.0
+        numbers = (self.safety * self.stretch, least_steps, step, self.finer)
         return Scheme(self.kicks, self.drifts, *map(float, numbers))
 
     def _running(self, course):
@@ -296,8 +296,8 @@ class CentralDifference(Integrator):
     def _way_out(self, x, step):
         """Remedy for too short a step [s]: velocities ask for it where at rest it would be over twice as long."""
         if self.bound(x) * self.safety * self.stretch > 2.0 * step:
-            told = "nothing may pass through a body in one, at the speeds there are"
-            return f"{told}; use a thicker body, slower ones or less damping"
+            reason = "nothing may pass through a body in one, at the speeds there are"
+            return f"{reason}; use a thicker body, slower ones or less damping"
         return "ask for shorter rows, or lower the stiffness, damping or friction that asks for the step"
 
     def _again(self, course, before, running):
@@ -311,8 +311,8 @@ class CentralDifference(Integrator):
         def after(state, begun, count):
             state, running.clock["begun"] = state.copy(), begun
             copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
-            changing, room = self._model.reels.lengths.size > 0, Workspace.of(model, copy)
-            run_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, room)
+            changing, workspace = self._model.reels.lengths.size > 0, Workspace.of(model, copy)
+            run_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, workspace)
             return state
 
         return after
@@ -343,14 +343,14 @@ class CentralDifference(Integrator):
         if self._model.walls.met[3] == 0:
             from ...effects.contact.penetration import would_pass
 
-            told = would_pass(self.system, self._model.walls.met)
+            reason = would_pass(self.system, self._model.walls.met)
         else:
             from ...effects.self_contact.penetration import would_pass
 
-            told = would_pass(self.system, course.v, self._model.guard.met)
+            reason = would_pass(self.system, course.v, self._model.guard.met)
         at = now["time"] + now["begun"] * now["step"]
         raise SolverError(
-            f"at t = {at:.6g} s, in a step of {now['cut']:.3g} s where {now['stable']:.3g} is stable, {told}"
+            f"at t = {at:.6g} s, in a step of {now['cut']:.3g} s where {now['stable']:.3g} is stable, {reason}"
         )
 
     def _name_drift(self, course, before, running):

@@ -193,27 +193,27 @@ def state_within(
 
     The step is of a higher order, and its motion ``smooth``, or a kick, a drift and a kick.
     """
-    here, inverse, share = inside.state, model.inertia.inverse, 1.0 - (now - t) / h
+    state, inverse, share = inside.state, model.inertia.inverse, 1.0 - (now - t) / h
     if smooth:
-        interpolate(share, h, inside.before, x, v, inverse, f, here[0], here[1])
+        interpolate(share, h, inside.before, x, v, inverse, f, state[0], state[1])
     else:
-        interpolate_kicks(share, h, inside.before, x, v, inverse, f, here[0], here[1])
+        interpolate_kicks(share, h, inside.before, x, v, inverse, f, state[0], state[1])
     if model.inertia.turns.moment.size:
-        turns_within(share, h, inside.before, x, v, model.inertia.turns, here[0], here[1])
-    forces_at(t, here[0], here[1], here[2], inside.lines, model)
+        turns_within(share, h, inside.before, x, v, model.inertia.turns, state[0], state[1])
+    forces_at(t, state[0], state[1], state[2], inside.lines, model)
 
 
 @kernel(apart=("looks", "rubbing"))
-def exchange_losses(keep: bool, inside: Inside, model: Model) -> None:
+def exchange_losses(keeps: bool, inside: Inside, model: Model) -> None:
     """Keep what families show whose kicks are solved for, which forces at other states write over, or show it again."""
     for m in range(model.implicit_contacts.families.size):
-        shown, kept = model.families.outs[model.implicit_contacts.families[m]], inside.losses[m]
-        for c in range(shown.shape[0]):
-            for k in range(shown.shape[1]):
-                if keep:
-                    kept[c, k] = shown[c, k]
+        values, kept = model.families.outs[model.implicit_contacts.families[m]], inside.losses[m]
+        for c in range(values.shape[0]):
+            for k in range(values.shape[1]):
+                if keeps:
+                    kept[c, k] = values[c, k]
                 else:
-                    shown[c, k] = kept[c, k]
+                    values[c, k] = kept[c, k]
 
 
 @kernel(apart=("looks",))
@@ -258,12 +258,12 @@ def take_peak(
             update_extreme(i, value, t, x, v, f, lines, observed, where, extremes)
             extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
     if observed.sums.shape[0]:
-        first, here = len(observed.probes), inside.total  # events are to see that of the step
+        first, energies = len(observed.probes), inside.total  # events are to see that of the step
         for i in range(total.size):
-            here[i] = total[i]
-        book_within(t, now, x, v, smooth, here, model, running)
+            energies[i] = total[i]
+        book_within(t, now, x, v, smooth, energies, model, running)
         for i in range(first, signs.size):
-            value = inner(observed.sums[i - first], here)
+            value = inner(observed.sums[i - first], energies)
             if signs[i] * value > signs[i] * extremes.values[i]:
                 extremes.values[i], extremes.times[i] = value, t
                 extremes.corrections[i] = correction(extremes, i, signs[i], t, value, smooth)
@@ -337,14 +337,14 @@ def look_inside(
     Of a ``fresh`` step it looks at an `EDGE` from its start as well, and from its end where the step is looked at
     ``alone``: where no other is, its inside is no look ahead of the next one.
     """
-    own, x, v = running.extremes, inside.state[0], inside.state[1]
-    extremes = inside.alone if alone else own
+    known_extremes, x, v = running.extremes, inside.state[0], inside.state[1]
+    extremes = inside.alone if alone else known_extremes
     if model.implicit_contacts.families.size:
         exchange_losses(True, inside, model)
     if alone:
-        copy_rows(own.recent, extremes.recent)
+        copy_rows(known_extremes.recent, extremes.recent)
         for k in range(3):
-            extremes.looked[k] = own.looked[k]
+            extremes.looked[k] = known_extremes.looked[k]
     for n in range(0 if fresh else 1, LOOKS + 1 if alone else LOOKS):
         t = now - h + h * (EDGE if n == 0 else n / LOOKS if n < LOOKS else 1.0 - EDGE)
         state_within(t, now, h, running.x, running.v, running.f, not alone, inside, model)
@@ -360,9 +360,9 @@ def look_inside(
 
 
 @kernel(apart=("driven",))
-def look_behind(model: Model, observed: Observed, running: Running, room: Workspace) -> None:
+def look_behind(model: Model, observed: Observed, running: Running, workspace: Workspace) -> None:
     """Look for extremes behind a corner of motion, where velocities have jumped."""
-    now, lines, where, total = running.clock[0].time, model.families.outs[0], room.where, room.total
+    now, lines, where, total = running.clock[0].time, model.families.outs[0], workspace.where, workspace.total
     x, v, f, extremes = running.x, running.v, running.f, running.extremes
     begin_anew(extremes)
     if observed.followed.size + observed.windows.slots.size:

@@ -28,18 +28,18 @@ def source_of(system, places):
     families = [f for f in system.families if f.energy is not None and f.book != "work"]
     cells = sum(len(family.cells) for family in families)
     steps = list(zip(places, places[1:], strict=False))[-max(int(MOST / max(cells, 1)), 1) :]
-    most, source = -1.0, (system.families[0], 0)
+    largest, source = -1.0, (system.families[0], 0)
     for family in families:
         left = np.zeros(len(family.cells))
         for (t0, x0), (t1, x1) in steps:
-            way = SHARE * (x1 - x0)
+            path = SHARE * (x1 - x0)
             left += system.energy_of(family, t1, x1) - system.energy_of(family, t0, x0)
             for t, x in ((t0, x0), (t1, x1)):
-                rise = system.energy_of(family, t, x + way) - system.energy_of(family, t, x - way)
+                rise = system.energy_of(family, t, x + path) - system.energy_of(family, t, x - path)
                 left -= 0.25 / SHARE * rise
-        if len(left) and np.abs(left).max() > most:
+        if len(left) and np.abs(left).max() > largest:
             cell = int(np.abs(left).argmax())
-            most, source = abs(left[cell]), (family, cell)
+            largest, source = abs(left[cell]), (family, cell)
     return source
 
 

@@ -79,7 +79,7 @@ def inner_stages(
     """
     if reject_step(now - h, h, model, running):
         return False
-    families, inverse, held = model.families, model.inertia.inverse, model.inertia.held
+    families, inverse, fixed = model.families, model.inertia.inverse, model.inertia.held
     turns = model.inertia.turns
     x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
@@ -96,7 +96,7 @@ def inner_stages(
         book_potential(-1.0, kicked, x, families, running.work)
         add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
         add_forces_to_bodies(x, f, turns)
-        set_reaction(held, f.reshape(-1), reaction)
+        set_reaction(fixed, f.reshape(-1), reaction)
         if model.outside.pushing.size:
             set_push(drifted, x, v, model.outside, families, extra, push)
     book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
@@ -142,7 +142,7 @@ def run_steps(
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
     where, known, push, before, total = space.where, space.known, space.push, space.before, space.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
-    mass, inverse, held, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
+    mass, inverse, fixed, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
     viscous, powers, extra, half = families.viscous, families.powers, space.extra, space.half
@@ -193,7 +193,7 @@ def run_steps(
         if powers.shape[0] and not stages:
             book_powers(now, h, x, v, extra, power, work, families)
         book_motion(driven, mass, x, v, f, before, work)
-        give_reaction(kick, last, held, flat_f, reaction, impulse)
+        give_reaction(kick, last, fixed, flat_f, reaction, impulse)
         if pushing:
             push_on(now, kick, last, x, v, model.outside, families, extra, push, running.ledger.pushed)
         if looks:

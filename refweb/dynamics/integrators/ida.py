@@ -115,11 +115,11 @@ class Ida(Sundials):
         v[self._heavy] = self._parts(y)[1]
         return v
 
-    def _of_all(self, own):
+    def _of_all(self, values):
         """Expand values of the unknowns with mass to all unknown displacements, with 0 elsewhere."""
-        found = np.zeros(self.unknowns)
-        found[self._heavy] = own
-        return found
+        expanded = np.zeros(self.unknowns)
+        expanded[self._heavy] = values
+        return expanded
 
     def _rows(self, t, y, yp):
         """Displacement and velocity of all rows at a state of the unknowns."""
@@ -129,7 +129,7 @@ class Ida(Sundials):
         n, heavy, bare = self.unknowns, self._heavy, self._bare
         x, v = self._rows(t, y, yp)
         force = self.force_at(t, x, v)
-        rate, (_, own, multipliers, corrections) = self._parts(yp)[0], self._parts(y)
+        rate, (_, stored, multipliers, corrections) = self._parts(yp)[0], self._parts(y)
         if self._links:
             pairs = self._links.pairs
             force = force - pairs.pull(x, multipliers).ravel()[self.system.free]
@@ -138,9 +138,9 @@ class Ida(Sundials):
         slope = np.zeros(n)
         slope[heavy] = self._parts(yp)[1]
         balance = self._M @ slope - force
-        moved = own
+        moved = stored
         if self.rotations:
-            moved = self._of_all(own)
+            moved = self._of_all(stored)
             self.rotations.set_rates(x, v, moved)
             moved = moved[heavy]
         r[heavy], r[bare], r[n : n + len(heavy)] = rate[heavy] - moved, balance[bare], balance[heavy]
@@ -296,13 +296,13 @@ class Ida(Sundials):
 
     def _one_step(self, stop, end):
         try:
-            found = self._found(end, "onestep", float(stop) if np.isfinite(stop) else None)
+            reached = self._found(end, "onestep", float(stop) if np.isfinite(stop) else None)
         except Stopped:
             self._refuse_adrift()
             raise
         if self._massless or self._links:
-            self._inspect(found.t, found.y, found.yp)
-        return float(found.t)
+            self._inspect(reached.t, reached.y, reached.yp)
+        return float(reached.t)
 
     def _inspect(self, t, y, yp):
         """Look at the end of a step: whether nodes without mass have a position, and how far links are off."""
@@ -338,5 +338,5 @@ class Ida(Sundials):
 
     def interpolated(self, t):
         """Unknown displacements and velocities at a time within the last step."""
-        found = self._found(t)
-        return self._parts(found.y)[0], self._velocity(found.y, found.yp)
+        values = self._found(t)
+        return self._parts(values.y)[0], self._velocity(values.y, values.yp)

@@ -64,21 +64,25 @@ class ImplicitContacts(Record):
         """Those of a system."""
         families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
         rubbing = [system.families[i] for i in families]
-        own = [family.rubbing for family in rubbing]
-        last = [i for i, one in enumerate(own) if i + 1 == len(own) or own[i + 1].sweep is not one.sweep]
+        kernels_of = [family.rubbing for family in rubbing]
+        last = [
+            i
+            for i, kernels_ in enumerate(kernels_of)
+            if i + 1 == len(kernels_of) or kernels_of[i + 1].sweep is not kernels_.sweep
+        ]
         depths = [depths_of(system, family) for family in rubbing]
         return cls(
             families=np.array(families, dtype=np.int64),
-            meets=Functions(k.DETECT, [one.meet for one in own]),
-            recalls=Functions(k.WARM_START, [one.recall for one in own]),
-            sweeps=Functions(k.GAUSS_SEIDEL, [one.sweep for one in own]),
-            gives=Functions(k.COMMIT, [one.give for one in own]),
+            meets=Functions(k.DETECT, [kernels_.meet for kernels_ in kernels_of]),
+            recalls=Functions(k.WARM_START, [kernels_.recall for kernels_ in kernels_of]),
+            sweeps=Functions(k.GAUSS_SEIDEL, [kernels_.sweep for kernels_ in kernels_of]),
+            gives=Functions(k.COMMIT, [kernels_.give for kernels_ in kernels_of]),
             last=np.array(last, dtype=np.int64),
             memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
-            shown=np.array([shown for shown, _ in depths], dtype=np.int64),
-            told=Arrays(INTEGERS, [told for _, told in depths]),
+            shown=np.array([number for number, _ in depths], dtype=np.int64),
+            told=Arrays(INTEGERS, [order_of for _, order_of in depths]),
             pieces=system.net.subdivide,
-            width=max((one.width for one in own), default=0),
+            width=max((kernels_.width for kernels_ in kernels_of), default=0),
         )
 
 
@@ -88,22 +92,24 @@ def depths_of(system, family):
     for i in near if family.contact else ():
         push = system.families[i]
         if push.contact:
-            own, its = (one.elements * system.rows + one.cells[:, system.net.along.size] for one in (family, push))
+            keys, its = (
+                losses.elements * system.rows + losses.cells[:, system.net.along.size] for losses in (family, push)
+            )
             order = np.argsort(its)
-            place = order[np.minimum(np.searchsorted(its, own, sorter=order), len(its) - 1)]
-            if (its[place] == own).all():
-                return len(system.families) + near.index(i), place
+            matches = order[np.minimum(np.searchsorted(its, keys, sorter=order), len(its) - 1)]
+            if (its[matches] == keys).all():
+                return len(system.families) + near.index(i), matches
     return -1, np.zeros(0, dtype=np.int64)
 
 
 @kernel()
-def lines_in_touch(shown, told, pieces):
+def lines_in_touch(depths, order, pieces):
     """Numbers of the cells of lines that show a depth."""
-    chosen, count = np.empty(told.size, dtype=np.int64), 0
-    for first in range(0, told.size, pieces):
+    chosen, count = np.empty(order.size, dtype=np.int64), 0
+    for first in range(0, order.size, pieces):
         apart = True
         for c in range(first, first + pieces):
-            apart = apart and shown[told[c], 0] <= 0.0
+            apart = apart and depths[order[c], 0] <= 0.0
         if not apart:  # what is not a number touches
             for c in range(first, first + pieces):
                 chosen[count] = c

@@ -34,9 +34,9 @@ class FollowedBodies(FollowedLines):
         for family in self._families:
             self._note(course, piece, at, THROUGH, (family.passing, family.cells, family.data))
 
-    def _turned(self, way):
+    def _turned(self, path):
         """Largest movement of points of bodies as these turn [m]."""
         if not len(self._rows):
             return 0.0
         spin, turn = self._rows.T
-        return float((2.0 * self._extent * np.hypot(np.linalg.norm(way[spin], axis=1), way[turn, 0])).max())
+        return float((2.0 * self._extent * np.hypot(np.linalg.norm(path[spin], axis=1), path[turn, 0])).max())

@@ -34,7 +34,7 @@ class Followed:
         """Free distance that a bend of the middle leaves."""
         raise NotImplementedError
 
-    def _met(self, looked_at, x, way, room) -> np.ndarray | None:
+    def _met(self, looked_at, x, path, margin) -> np.ndarray | None:
         """Rows of what may have met on a way from displacement x, None where nothing can have."""
         raise NotImplementedError
 
@@ -46,23 +46,23 @@ class Followed:
             return
         begin = Place(course.time, course.x)
         middle, end = (Place(sample.time, sample.x) for sample in (piece.middle, piece.end))
-        found = self._first(looked_at, begin, middle, end, at, HALVINGS)
-        if found is not None:
-            note_met(which, *found, course.crossings)
+        meeting = self._first(looked_at, begin, middle, end, at, HALVINGS)
+        if meeting is not None:
+            note_met(which, *meeting, course.crossings)
 
     def _first(self, looked_at, begin, middle, end, at, halvings):
         """(Time from which on two may have met [s], their rows), None where none have."""
-        room = self._room(middle.x - 0.5 * (begin.x + end.x))
+        margin = self._room(middle.x - 0.5 * (begin.x + end.x))
         for first, last in ((begin, middle), (middle, end)):
-            met = self._met(looked_at, first.x, last.x - first.x, room)
+            met = self._met(looked_at, first.x, last.x - first.x, margin)
             if met is None:
                 continue
             if not halvings:
                 return first.time, met
             halfway = 0.5 * (first.time + last.time)
-            found = self._first(looked_at, first, Place(halfway, at(halfway)), last, at, halvings - 1)
-            if found is not None:
-                return found
+            meeting = self._first(looked_at, first, Place(halfway, at(halfway)), last, at, halvings - 1)
+            if meeting is not None:
+                return meeting
         return None
 
 
@@ -87,23 +87,23 @@ class FollowedLines(Followed):
     def look(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
         for family in self._families:
-            own, beside = family.crossing, (family.crossing.rows, family.crossing.data)
+            crossing, beside = family.crossing, (family.crossing.rows, family.crossing.data)
             for which, cells in ((APART, (family.cells, family.data)), (BESIDE, beside)):
-                self._note(course, piece, at, which, (own.meets, *cells))
+                self._note(course, piece, at, which, (crossing.meets, *cells))
 
     def _room(self, bend):
         return self._spread(bend) + self._turned(bend)
 
-    def _met(self, looked_at, x, way, room):
+    def _met(self, looked_at, x, path, margin):
         meets, cells, data = looked_at
-        open_, most = room + self._turned(way), 2.0 * self._spread(way)
-        came = meets(open_, most, 0.0, 1.0, x, way, self._still, self._still, cells, data, self._rows_met)
+        open_, largest = margin + self._turned(path), 2.0 * self._spread(path)
+        came = meets(open_, largest, 0.0, 1.0, x, path, self._still, self._still, cells, data, self._rows_met)
         return self._rows_met if came else None
 
-    def _spread(self, way):
+    def _spread(self, path):
         """Largest distance of positions from the first [m]."""
-        return float(np.linalg.norm(way[: self._places] - way[:1], axis=1).max(initial=0.0))
+        return float(np.linalg.norm(path[: self._places] - path[:1], axis=1).max(initial=0.0))
 
-    def _turned(self, way):
+    def _turned(self, path):
         """Largest movement of points of turning bodies beside that [m]."""
         return 0.0

@@ -95,11 +95,11 @@ class Massless:
             step, y = self._solve(K, force), x.copy()
             for _ in range(30):
                 y.ravel()[at] = x.ravel()[at] + step
-                found = self._force(0.0, y, v)
-                if np.linalg.norm(found) < np.linalg.norm(force) or np.abs(step).max() < 1e-9 * near:
+                forces = self._force(0.0, y, v)
+                if np.linalg.norm(forces) < np.linalg.norm(force) or np.abs(step).max() < 1e-9 * near:
                     break
                 step *= 0.5
-            x[:], force = y, found
+            x[:], force = y, forces
             if np.abs(step).max() < 1e-7 * near:
                 return
         node = self.system.row_name(at[np.abs(force).argmax()] // 3)

@@ -60,8 +60,8 @@ class Measurements:
             for p in probes
         ]
         self.shown = sorted({probe.family for probe in probes} - {-1})
-        self._weights = np.array([one.weights for one in sums], dtype=float).reshape(len(sums), families + 3)
-        self._signs = np.array([float(one.sign) for one in (*probes, *sums)])
+        self._weights = np.array([quantity.weights for quantity in sums], dtype=float).reshape(len(sums), families + 3)
+        self._signs = np.array([float(quantity.sign) for quantity in (*probes, *sums)])
         self._windows = Windows.of(probes)
         self._signs[self._windows.slots] = 0.0
         self._followed = np.flatnonzero(self._signs[: self.probed])
@@ -162,15 +162,15 @@ class Measurements:
     def _search_top(self, extremes, i, look_at):
         """Look for a peak between the last three looks, by parabolas through the highest value and its neighbours."""
         sign, times, heights = self._signs[i], extremes.looked.tolist(), (self._signs[i] * extremes.recent[i]).tolist()
-        least, best = EDGE * (times[2] - times[0]), None
+        shortest, best = EDGE * (times[2] - times[0]), None
         for _ in range(ROUNDS):
             highest = int(np.argmax(heights))
             n = min(max(highest, 1), len(times) - 2)
             top = top_of(times[n - 1 : n + 2], heights[n - 1 : n + 2])
-            if top is None or not times[0] - 0.25 / EDGE * least < top.time < times[-1] + 0.25 / EDGE * least:
+            if top is None or not times[0] - 0.25 / EDGE * shortest < top.time < times[-1] + 0.25 / EDGE * shortest:
                 break
-            t = min(max(top.time, times[0] + least), times[-1] - least)
-            if min(abs(t - other) for other in times) < 0.5 * least:
+            t = min(max(top.time, times[0] + shortest), times[-1] - shortest)
+            if min(abs(t - time) for time in times) < 0.5 * shortest:
                 break
             sample, value = look_at(t)
             at = bisect.bisect(times, t)

@@ -222,23 +222,27 @@ def turning(x: Matrix, p: Matrix, outside: Outside, turned: Vector) -> tuple[flo
     """
     places, mass, axes = outside.places, outside.mass, outside.axes
     total, size, far = 0.0, 0.0, 0.0
-    centre, whole, way, own = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    centre, momentum, momentum_path, velocity_sum = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     for r in range(mass.size):
         total += mass[r]
         for k in range(3):
             centre[k] += mass[r] * (places[r, k] + x[r, k])
-            whole[k] += p[r, k]
+            momentum[k] += p[r, k]
     turned[:] = 0.0
     for r in range(p.shape[0]):
         if r < mass.size:
             for k in range(3):
-                way[k] = places[r, k] + x[r, k] - centre[k] / total
-                own[k] = p[r, k] - mass[r] / total * whole[k]
-            a0, a1, a2 = way[1] * own[2] - way[2] * own[1], way[2] * own[0] - way[0] * own[2], 0.0
-            a2 = way[0] * own[1] - way[1] * own[0]
-            reach = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+                momentum_path[k] = places[r, k] + x[r, k] - centre[k] / total
+                velocity_sum[k] = p[r, k] - mass[r] / total * momentum[k]
+            a0, a1, a2 = (
+                momentum_path[1] * velocity_sum[2] - momentum_path[2] * velocity_sum[1],
+                momentum_path[2] * velocity_sum[0] - momentum_path[0] * velocity_sum[2],
+                0.0,
+            )
+            a2 = momentum_path[0] * velocity_sum[1] - momentum_path[1] * velocity_sum[0]
+            reach = math.sqrt(momentum_path[0] ** 2 + momentum_path[1] ** 2 + momentum_path[2] ** 2)
             far = max(far, reach)
-            size += reach * math.sqrt(own[0] ** 2 + own[1] ** 2 + own[2] ** 2)
+            size += reach * math.sqrt(velocity_sum[0] ** 2 + velocity_sum[1] ** 2 + velocity_sum[2] ** 2)
         else:
             a0, a1, a2 = p[r, 0], p[r, 1], p[r, 2]
             size += math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
@@ -266,14 +270,14 @@ def note_momentum(
     support: Vector,
     outside: Outside,
     ledger: MomentumBalance,
-    least: float,
+    floor: float,
     row: Vector,
 ) -> None:
     """Hold the momenta ``p`` of a row against the book, and write momentum and impulses to ``row (9,)``.
 
-    ``support`` is the impulse of the supports, ``least`` the momentum that a drift is held against at least.
+    ``support`` is the impulse of the supports, ``floor`` the momentum that a drift is held against at least.
     """
-    now, size = np.zeros(3), least + outside.rounding * t / CLOSURE
+    now, size = np.zeros(3), floor + outside.rounding * t / CLOSURE
     moving = size
     impulse_until(t, x, outside, row[6:])
     for r in range(outside.mass.size):
@@ -288,11 +292,11 @@ def note_momentum(
         left = max(left, abs(now[k] - ledger.first[0, k] - row[3 + k] - row[6 + k]))
     ledger.left[0], ledger.largest[0] = max(ledger.left[0], left), max(ledger.largest[0], moving)
     if outside.axes.shape[0]:
-        whole, far = turning(x, p, outside, now)
+        total, far = turning(x, p, outside, now)
         left = 0.0
         for n in range(outside.axes.shape[0]):
             left = max(left, abs(now[n] - ledger.first[1, n]))
-        ledger.left[1], ledger.largest[1] = max(ledger.left[1], left), max(ledger.largest[1], whole + far * size)
+        ledger.left[1], ledger.largest[1] = max(ledger.left[1], left), max(ledger.largest[1], total + far * size)
 
 
 def refuse_open_momentum(course, limit, remedy):

@@ -66,21 +66,21 @@ class Observed(Record):
         """Probes and sums of a system whose families write ``outs`` per cell, and bodies feel ``contacts``."""
         shared = {CONTACT: contacts.felt, **dict(enumerate(outs))}
         numbers = [shared.get(p.family, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
-        shown = [probe.family for probe in probes if probe.family >= 0]
+        families_seen = [probe.family for probe in probes if probe.family >= 0]
         if any(probe.family == CONTACT for probe in probes):
-            shown += contacts.families[:, FAMILY].tolist()
-        windows, signs = Windows.of(probes), np.array([float(one.sign) for one in (*probes, *sums)])
+            families_seen += contacts.families[:, FAMILY].tolist()
+        windows, signs = Windows.of(probes), np.array([float(item.sign) for item in (*probes, *sums)])
         signs[windows.slots] = 0.0
         plain = [plain_of(probe) for probe in probes]
         return cls(
             probes=Functions(PROBE, [probe.kernel for probe in probes]),
             rows=Arrays(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
             data=Arrays(MATRIX, numbers),
-            sums=np.array([one.weights for one in sums], dtype=float).reshape(len(sums), len(outs) + 3),
+            sums=np.array([item.weights for item in sums], dtype=float).reshape(len(sums), len(outs) + 3),
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
-            shown=np.unique(shown).astype(np.int64),
+            shown=np.unique(families_seen).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
         )

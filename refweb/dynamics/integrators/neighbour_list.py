@@ -173,21 +173,21 @@ def swap_of(near):
     @kernel(SWAP)
     def swap(i, m, depth, x, cells, data, outs, stored):
         more = len(cells) - len(data)
-        whole, numbers = len(data) - more + m, len(data) + m
-        all_cells, all_data, shown = cells[whole], data[whole], outs[whole]
+        source, numbers = len(data) - more + m, len(data) + m
+        all_cells, all_data, observed = cells[source], data[source], outs[source]
         if depth == math.inf:
-            cells[i], data[i], outs[i], stored[i] = all_cells, all_data, shown, stored[whole]
+            cells[i], data[i], outs[i], stored[i] = all_cells, all_data, observed, stored[source]
             cells[numbers] = np.empty((0, 1), dtype=np.int32)
             return
-        found = np.empty(all_cells.shape[0], dtype=np.int64)
-        count = near(depth, x, all_cells, all_data, found)
-        some, some_data = rows_of(found[:count], all_cells, all_data)
+        touching = np.empty(all_cells.shape[0], dtype=np.int64)
+        count = near(depth, x, all_cells, all_data, touching)
+        some, some_data = rows_of(touching[:count], all_cells, all_data)
         chosen = np.empty((count, 1), dtype=np.int32)
         for n in range(count):
-            chosen[n, 0] = found[n]
-        shown[:] = 0.0
+            chosen[n, 0] = touching[n]
+        observed[:] = 0.0
         cells[i], data[i], cells[numbers] = some, some_data, chosen
-        outs[i], stored[i] = np.zeros((count, shown.shape[1])), np.zeros(count)
+        outs[i], stored[i] = np.zeros((count, observed.shape[1])), np.zeros(count)
 
     return swap
 
@@ -199,16 +199,16 @@ def swap_pairs_of(pairs):
     @kernel(SWAP)
     def swap(i, m, depth, x, cells, data, outs, stored):
         more = len(cells) - len(data)
-        whole, numbers = len(data) - more + m, len(data) + m
-        shown = outs[whole]
+        source, numbers = len(data) - more + m, len(data) + m
+        observed = outs[source]
         if depth == math.inf:
-            cells[i], data[i], outs[i], stored[i] = cells[whole], data[whole], shown, stored[whole]
+            cells[i], data[i], outs[i], stored[i] = cells[source], data[source], observed, stored[source]
             cells[numbers] = np.empty((0, 1), dtype=np.int32)
             return
-        found, rows, values = pairs(depth, x, cells[whole], data[whole])
-        shown[:] = 0.0
-        cells[i], data[i], cells[numbers] = rows, values, found.astype(np.int32)
-        outs[i], stored[i] = np.zeros((rows.shape[0], shown.shape[1])), np.zeros(rows.shape[0])
+        touching, rows, values = pairs(depth, x, cells[source], data[source])
+        observed[:] = 0.0
+        cells[i], data[i], cells[numbers] = rows, values, touching.astype(np.int32)
+        outs[i], stored[i] = np.zeros((rows.shape[0], observed.shape[1])), np.zeros(rows.shape[0])
 
     return swap
 
@@ -230,26 +230,26 @@ def show_near(nearby: NeighbourList, families: Families) -> None:
     """
     if not nearby.skin[0].depth < math.inf:
         return
-    size, whole = nearby.families.size, len(families.data)
+    size, sources = nearby.families.size, len(families.data)
     for m in range(size):
-        own, shown = families.outs[nearby.families[m]], families.outs[whole - size + m]
-        chosen = families.cells[whole + m]
+        all_values, values = families.outs[nearby.families[m]], families.outs[sources - size + m]
+        chosen = families.cells[sources + m]
         if chosen.shape[1] == 1:
             for n in range(chosen.shape[0]):
-                for k in range(own.shape[1]):
-                    shown[chosen[n, 0], k] = own[n, k]
+                for k in range(all_values.shape[1]):
+                    values[chosen[n, 0], k] = all_values[n, k]
             continue
-        for e in range(shown.shape[0]):
-            for k in range(shown.shape[1]):
-                shown[e, k] = 0.0
+        for e in range(values.shape[0]):
+            for k in range(values.shape[1]):
+                values[e, k] = 0.0
         for n in range(chosen.shape[0]):
-            for k in range(shown.shape[1]):
-                value = own[n, k]
+            for k in range(values.shape[1]):
+                value = all_values[n, k]
                 if value == 0.0:
                     continue
                 for e in range(2):
-                    if abs(value) > abs(shown[chosen[n, e], k]):
-                        shown[chosen[n, e], k] = value
+                    if abs(value) > abs(values[chosen[n, e], k]):
+                        values[chosen[n, e], k] = value
 
 
 def forget(model, begun):
@@ -299,7 +299,7 @@ def reach_all(reach, x, nearby, families):
 
 
 @kernel(leaf=True, apart=("pairs",))
-def covered(way: float, x: Matrix, nearby: NeighbourList, families: Families) -> bool:
+def covered(path: float, x: Matrix, nearby: NeighbourList, families: Families) -> bool:
     """Tell if the listed pairs are all that can touch by coming nearer by a distance [m].
 
     They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
@@ -310,10 +310,10 @@ def covered(way: float, x: Matrix, nearby: NeighbourList, families: Families) ->
     skin = nearby.skin[0]
     if not skin.depth < math.inf:
         return False
-    if skin.used + way <= SHARE * skin.depth:
+    if skin.used + path <= SHARE * skin.depth:
         return True
     depth = max(skin.depth, 4.0 * (skin.last + skin.before + skin.earlier))
-    if not way <= KEPT_UP_TO * depth:
+    if not path <= KEPT_UP_TO * depth:
         return False
     skin.depth, skin.used = depth, 0.0
     take_pairs(x, nearby, families)
@@ -341,25 +341,25 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
     """
     if not bits.size:
         return
-    skin, most, driven, turns = model.nearby.skin[0], np.int64(0), model.inertia.driven, model.inertia.turns
+    skin, count, driven, turns = model.nearby.skin[0], np.int64(0), model.inertia.driven, model.inertia.turns
     if not goes_freely(model):
         for q in range(bits.size):
-            most = max(most, bits[q] & SIGN)
-        skin.top = most
-    way = abs(drift) * skin.fastest
+            count = max(count, bits[q] & SIGN)
+        skin.top = count
+    path = abs(drift) * skin.fastest
     for d in range(driven.size):
         for k in range(3):
-            way = max(way, abs(x[driven[d], k] - before[d, k]))
-    way *= WAY
-    if FEWEST * way > skin.widest and not driven.size:
-        way = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
+            path = max(path, abs(x[driven[d], k] - before[d, k]))
+    path *= WAY
+    if FEWEST * path > skin.widest and not driven.size:
+        path = abs(drift) * spread_of(bits.view(np.float64).reshape(-1, 3))
     if turns.moment.size:
-        way += 2.0 * abs(drift) * fastest_surface(x, v, turns)
-    skin.earlier, skin.before, skin.last = skin.before, skin.last, way
-    skin.longest = max(skin.longest, way)
-    skin.used += way
+        path += 2.0 * abs(drift) * fastest_surface(x, v, turns)
+    skin.earlier, skin.before, skin.last = skin.before, skin.last, path
+    skin.longest = max(skin.longest, path)
+    skin.used += path
     skin.steps += 1
-    if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + way <= SHARE * skin.depth):
+    if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + path <= SHARE * skin.depth):
         choose(drift, x, v, driven.size > 0, model.nearby, model.families)
 
 
@@ -367,15 +367,15 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
 def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourList, families: Families) -> None:
     """Choose anew what is near, behind a drift that led to x at velocities v, where motion is ``driven`` or is not."""
     skin = nearby.skin[0]
-    way, recent = skin.last, skin.last + skin.before + skin.earlier
+    path, recent = skin.last, skin.last + skin.before + skin.earlier
     if not nearby.at.shape[0]:
-        skin.depth, skin.used = max(LASTS * way, 4.0 * recent, min(skin.wished, LONGEST * way)), 0.0
+        skin.depth, skin.used = max(LASTS * path, 4.0 * recent, min(skin.wished, LONGEST * path)), 0.0
         take(x, nearby, families)
         return
     if skin.depth < math.inf:
         skin.used = spread_since(x, nearby.at) + recent
-        if skin.used + way <= KEPT_UP_TO * skin.depth:
+        if skin.used + path <= KEPT_UP_TO * skin.depth:
             return
-    near = way if driven else abs(drift) * spread_of(v[: nearby.at.shape[0]])
+    near = path if driven else abs(drift) * spread_of(v[: nearby.at.shape[0]])
     skin.depth, skin.used = max(min(skin.lasts * near, skin.widest), 4.0 * recent), 0.0
     take_pairs(x, nearby, families)

@@ -80,9 +80,9 @@ def aligned(values):
 
     Steps of nets that fit into the cache take 7 % longer where they do.
     """
-    room = np.empty(values.nbytes + LINE, dtype=np.uint8)
-    begin = -room.ctypes.data % LINE
-    copy = room[begin : begin + values.nbytes].view(values.dtype).reshape(values.shape)
+    space = np.empty(values.nbytes + LINE, dtype=np.uint8)
+    begin = -space.ctypes.data % LINE
+    copy = space[begin : begin + values.nbytes].view(values.dtype).reshape(values.shape)
     copy[...] = values
     return copy
 
@@ -146,13 +146,13 @@ class Inertia(Record):
         net, free = system.net, ~system.supported
         inverse = aligned(np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0))
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
-        moving, held = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
+        moving, fixed = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
         return cls(
             net.mass,
             inverse,
             np.empty((2, system.rows)),
             moving,
-            held,
+            fixed,
             driven,
             system.rows - net.spins,
             RigidRotations.of(net),

@@ -115,9 +115,9 @@ class Rotations:
 
     def pattern(self):
         """Rows and columns of the entries of X, and of V, numbers of unknowns."""
-        rows, other = np.broadcast_arrays(self.places[:, :, None], self.places[:, None, :])
+        rows, columns = np.broadcast_arrays(self.places[:, :, None], self.places[:, None, :])
         slow, fast = np.broadcast_arrays(self.places[:, :, None], self.spins[:, None, :])
-        return (rows.ravel(), other.ravel()), (slow.ravel(), fast.ravel())
+        return (rows.ravel(), columns.ravel()), (slow.ravel(), fast.ravel())
 
     def set_lengths(self, x):
         """Make the quaternions of a state of all rows of length 1."""

@@ -90,8 +90,8 @@ class Rupturing:
         course = self.inner.start(x, v)
         course.breaks = Breaks()
         over = np.flatnonzero(self._shares(course) >= 1.0)
-        held = self._holding(np.append(self._whole.net.broken, over))
-        now = [element for time, element in self._weakness.times if time <= 0.0 and held(element)]
+        holds = self._holding(np.append(self._whole.net.broken, over))
+        now = [element for time, element in self._weakness.times if time <= 0.0 and holds(element)]
         if len(over) or now:
             self._break(course, np.union1d(over, now).astype(np.int64))
         return course
@@ -134,9 +134,9 @@ class Rupturing:
 
     def _due(self, course, until):
         """The next (time, element) of those that break at a time, None where none does until then."""
-        held = self._holding(self.inner.system.net.broken)
+        holds = self._holding(self.inner.system.net.broken)
         for time, element in self._weakness.times:
-            if course.time <= time <= until and held(element):
+            if course.time <= time <= until and holds(element):
                 return time, element
         return None
 
@@ -153,8 +153,8 @@ class Rupturing:
 
     def _shares(self, course):
         """Tension of each element over its limit."""
-        shown = self.inner.system.forces(course.time, course.x, course.v).per_cell
-        return shown.tension / self._weakness.limits
+        per_cell = self.inner.system.forces(course.time, course.x, course.v).per_cell
+        return per_cell.tension / self._weakness.limits
 
     def _kept(self, course):
         """A course as arrays of its own."""
@@ -186,8 +186,8 @@ class Rupturing:
             start = self._kept(before)
 
             def over(t):
-                found = self._again(start, reached)
-                return float(self.inner.advance(found, [t]).probes[-1, slot]) - 1.0
+                located = self._again(start, reached)
+                return float(self.inner.advance(located, [t]).probes[-1, slot]) - 1.0
 
             below = float(first.probes[-1, slot]) - 1.0
             until = next((t for t in end + width * np.arange(3) if over(t) >= 0.0), None)
@@ -195,9 +195,9 @@ class Rupturing:
                 from scipy.optimize import brentq
 
                 moment = brentq(lambda t: over(t) if t > since else below, since, until, xtol=FINE * width)
-                found = self._again(start, reached)
-                last = self.inner.advance(found, np.append(targets[(targets >= since) & (targets < moment)], moment))
-                _take(course, found)
+                located = self._again(start, reached)
+                last = self.inner.advance(located, np.append(targets[(targets >= since) & (targets < moment)], moment))
+                _take(course, located)
                 rows, width = _joined([first[:-1], last]), 0.0
             else:  # its step is taken again, and it only grazes: it has passed, and when is known to a step
                 restored = self._again(self._kept(course), reached)
@@ -246,9 +246,9 @@ def unstrained(probe, broken):
     return probe._replace(data=data)
 
 
-def _take(course, found):
+def _take(course, breaks):
     """Let a course be another."""
-    course.__dict__.update(found.__dict__)
+    course.__dict__.update(breaks.__dict__)
 
 
 def _joined(parts):

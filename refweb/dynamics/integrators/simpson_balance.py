@@ -152,11 +152,11 @@ class SimpsonBalance:
         Numbers of the families of whose cells probes read what they show.
     """
 
-    def __init__(self, system, hold, fast, shown=()):
+    def __init__(self, system, hold, fast, observed=()):
         self.system, self._hold, self._least = system, hold, least_energy(system.net)
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
-        families, self._shown = system.families, shown
+        families, self._shown = system.families, observed
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
             Arrays(INDICES, [f.cells for f in families]),
@@ -260,8 +260,8 @@ class SimpsonBalance:
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
         open_balance(course.x, self._momenta(course.v), self._outside, course.ledger)
-        own = self._own(energies)
-        course.energy, course.largest = own.sum(), max(np.abs(own).sum(), self._least)
+        by_family = self._own(energies)
+        course.energy, course.largest = by_family.sum(), max(np.abs(by_family).sum(), self._least)
 
     def impulses(self, course):
         """Momentum, impulse of the supports and of all else from outside [N s], shape (9,), held against each other."""
@@ -275,9 +275,9 @@ class SimpsonBalance:
 
     def close(self, course, energies, before, remedy):
         """Compare the energies at a row with the work; raise `EnergyDriftError` where a large drift does not fall."""
-        own, work = self._own(energies), energies[-2]
+        by_family, work = self._own(energies), energies[-2]
         self.note_largest(course, energies)
-        drift = abs(own.sum() - work - course.energy)
+        drift = abs(by_family.sum() - work - course.energy)
         course.worst = max(course.worst, drift)
         share = drift / course.largest
         if not share <= max(DRIFT, CLOSING * course.share):

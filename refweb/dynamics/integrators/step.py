@@ -74,12 +74,12 @@ def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
 
 
 @kernel(leaf=True, forceinline=True)
-def set_reaction(held, f, reaction):
+def set_reaction(fixed, f, reaction):
     """Write the force of the supports on the net, which takes that on them away, to ``reaction``; f in a row."""
     for k in range(3):
         reaction[k] = 0.0
-    for n in range(held.size):
-        q = np.uint64(held[n])
+    for n in range(fixed.size):
+        q = np.uint64(fixed[n])
         reaction[q % np.uint64(3)] -= f[q]
 
 
@@ -91,10 +91,10 @@ def give_impulse(time, reaction, impulse):
 
 
 @kernel(leaf=True, forceinline=True)
-def give_reaction(before, behind, held, f, reaction, impulse):
+def give_reaction(before, behind, fixed, f, reaction, impulse):
     """Add the impulse of the supports in two kicks, a time ahead of a drift and one behind it; f in a row."""
     give_impulse(before, reaction, impulse)
-    set_reaction(held, f, reaction)
+    set_reaction(fixed, f, reaction)
     give_impulse(behind, reaction, impulse)
 
 
@@ -155,18 +155,18 @@ def contact_kick(
     inverse: Matrix,
     half: Matrix,
     extra: Matrix,
-    room: MatrixTable,
+    memories: MatrixTable,
     model: Model,
 ) -> None:
     """Kick as `viscous_kick` does, with losses of contact that are solved for: they need no bound.
 
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
-    the first begins without a memory of another. It writes the power of what rubs; ``room`` holds what touches.
+    the first begins without a memory of another. It writes the power of what rubs; ``memories`` holds what touches.
     """
     families, implicit_contacts, turns = model.families, model.implicit_contacts, model.inertia.turns
     forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
     ends = np.zeros(implicit_contacts.families.size, dtype=np.int64)
-    touches = room[0] = meet_all(h, x, v, inverse, families, implicit_contacts, room[0], ends)
+    touches = memories[0] = meet_all(h, x, v, inverse, families, implicit_contacts, memories[0], ends)
     count, begin = ends[-1], 0
     copy_rows(v, half)
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
@@ -294,13 +294,13 @@ def note_state(x: Matrix, v: Matrix, f: Matrix, inverse: Matrix, old: Cube) -> N
 
 
 @kernel(forceinline=True)
-def interpolate(s, h, old, x, v, inverse, f, here, speed):
+def interpolate(s, h, old, x, v, inverse, f, state, speed):
     """Write position and velocity at the share s of a step from ``old`` (position, velocity, acceleration).
 
     They lie on the polynomial of degree 5 through these at either end.
     """
     r = 1.0 - s
-    way, more = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * r * r
+    weight, more = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 30.0 * s * s * r * r
     b0, b1 = s * r**3 * (1.0 + 3.0 * s), -(s**3) * r * (4.0 - 3.0 * s)
     c0, c1 = 0.5 * s * s * r**3, 0.5 * s**3 * r * r
     db0, db1 = r * r * (1.0 - 3.0 * s) * (1.0 + 5.0 * s), -s * s * (2.0 - 3.0 * s) * (6.0 - 5.0 * s)
@@ -309,12 +309,12 @@ def interpolate(s, h, old, x, v, inverse, f, here, speed):
         for k in range(3):
             far, v0, v1 = x[q, k] - old[0, q, k], h * old[1, q, k], h * v[q, k]
             a0, a1 = h * h * old[2, q, k], h * h * inverse[q, k] * f[q, k]
-            here[q, k] = old[0, q, k] + way * far + b0 * v0 + b1 * v1 + c0 * a0 + c1 * a1
+            state[q, k] = old[0, q, k] + weight * far + b0 * v0 + b1 * v1 + c0 * a0 + c1 * a1
             speed[q, k] = (more * far + db0 * v0 + db1 * v1 + dc0 * a0 + dc1 * a1) / h
 
 
 @kernel(forceinline=True)
-def interpolate_kicks(s, h, old, x, v, inverse, f, here, speed):
+def interpolate_kicks(s, h, old, x, v, inverse, f, state, speed):
     """Interpolate a kick, a drift and a kick, see `interpolate`.
 
     Velocities at its ends are no rates of positions there, but of order 2 off. So positions lie on the cubic through
@@ -322,9 +322,9 @@ def interpolate_kicks(s, h, old, x, v, inverse, f, here, speed):
     """
     r = 1.0 - s
     bend0, bend1 = h * h * s * r * (1.0 + r) / 6.0, h * h * s * r * (1.0 + s) / 6.0
-    way, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
+    weight, rate0, rate1 = s * s * (3.0 - 2.0 * s), h * s * r * r, -h * s * s * r
     for q in range(x.shape[0]):
         for k in range(3):
             a0, a1 = old[2, q, k], inverse[q, k] * f[q, k]
-            here[q, k] = old[0, q, k] + s * (x[q, k] - old[0, q, k]) - bend0 * a0 - bend1 * a1
-            speed[q, k] = old[1, q, k] + way * (v[q, k] - old[1, q, k]) + rate0 * a0 + rate1 * a1
+            state[q, k] = old[0, q, k] + s * (x[q, k] - old[0, q, k]) - bend0 * a0 - bend1 * a1
+            speed[q, k] = old[1, q, k] + weight * (v[q, k] - old[1, q, k]) + rate0 * a0 + rate1 * a1

@@ -74,8 +74,8 @@ class StepLimits:
             )
             if self._rotations:
                 speed = max(speed, self._rotations.speed(x, v))
-            speed, way = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
-            stop = min(stop, t + way / speed) if speed > 0.0 else stop
+            speed, path = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
+            stop = min(stop, t + path / speed) if speed > 0.0 else stop
         for followed in (self.lines, self.pairs):
             if followed is not None:
                 stop = min(stop, t + followed.soon(x, v))
@@ -94,13 +94,13 @@ def speed_and_gap(points, x, v, nodes, rows, outreach):
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for n in range(nodes):
         for k in range(3):
-            place = points[n, k] + x[n, k]
-            low[k], high[k] = min(low[k], place), max(high[k], place)
+            coordinate = points[n, k] + x[n, k]
+            low[k], high[k] = min(low[k], coordinate), max(high[k], coordinate)
     gap = np.inf
     for b, row in enumerate(rows):
         apart = 0.0
         for k in range(3):
-            place = points[row, k] + x[row, k]
-            apart += max(low[k] - place, place - high[k], 0.0) ** 2
+            coordinate = points[row, k] + x[row, k]
+            apart += max(low[k] - coordinate, coordinate - high[k], 0.0) ** 2
         gap = min(gap, math.sqrt(apart) - outreach[b])
     return math.sqrt(fastest), gap

@@ -25,8 +25,8 @@ def spread_of(rows):
 @kernel()
 def spread_since(x, at):
     """The same of how far rows have come from where they were [m]."""
-    way = np.empty(at.shape)
+    difference = np.empty(at.shape)
     for r in range(at.shape[0]):
         for k in range(3):
-            way[r, k] = x[r, k] - at[r, k]
-    return spread_of(way)
+            difference[r, k] = x[r, k] - at[r, k]
+    return spread_of(difference)

@@ -128,8 +128,8 @@ def delassus(touches, n, i, j, inverse):
 def turn_tangents(touches, n, at, cosine, sine):
     """Make the vectors of two tangents, which stand behind each other, those of tangents turned in their plane."""
     for k in range(at, at + 3):
-        one, other = touches[n, k], touches[n, k + 3]
-        touches[n, k], touches[n, k + 3] = cosine * one + sine * other, cosine * other - sine * one
+        first, second = touches[n, k], touches[n, k + 3]
+        touches[n, k], touches[n, k + 3] = cosine * first + sine * second, cosine * second - sine * first
 
 
 @kernel()

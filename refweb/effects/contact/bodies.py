@@ -104,12 +104,12 @@ def _friction(net, depths, group):
 def _shared(net, group) -> dict:
     """Common arguments of the `Family` of some pairs."""
     cells, data = zip(*(_pair(net, *pair) for pair in group), strict=True)
-    room = np.zeros((len(data), max(len(row) for row in data)))
-    for row, own in zip(room, data, strict=True):
-        row[: len(own)] = own
-    room[:, 0] = room[:, 0].max()
+    rows = np.zeros((len(data), max(len(row) for row in data)))
+    for row, values in zip(rows, data, strict=True):
+        row[: len(values)] = values
+    rows[:, 0] = rows[:, 0].max()
     cells = np.array(cells, dtype=np.int32)
-    return dict(name="contact", internal=True, felt=(1, 0), cells=cells, data=room, observed=CONTACT_COLUMNS)
+    return dict(name="contact", internal=True, felt=(1, 0), cells=cells, data=rows, observed=CONTACT_COLUMNS)
 
 
 def _pair(net, first, second, law):
@@ -126,8 +126,8 @@ def _pair(net, first, second, law):
         sides.append(_side(body, len(spins), law, len(parts), begin, more))
         begin += parts.size
     convex = all(getattr(body.shape.depth(), "convex", True) for body in (first, second))
-    room = 1 + PER_PART * sum(len(parts) for parts in skeletons) + (0 if convex else MORE)
-    numbers = [[room], net.points[first.row] - net.points[second.row], *sides, *(parts.ravel() for parts in skeletons)]
+    size = 1 + PER_PART * sum(len(parts) for parts in skeletons) + (0 if convex else MORE)
+    numbers = [[size], net.points[first.row] - net.points[second.row], *sides, *(parts.ravel() for parts in skeletons)]
     return rows, np.concatenate(numbers)
 
 
@@ -135,11 +135,11 @@ def _side(body, spins, law, parts, begin, more):
     """Data of one body of a pair for `refweb.effects.contact.body_body_detection`; the other is ``more`` thick."""
     (radius, core, round_, *field), (stiffness, *losses) = body.shape.touched(more), law
     mobility = body.mobility[np.triu_indices(3)] if spins == 2 else (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-    own = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, _lever(body, spins), body.extent]
-    own += [not body.fixed, body.thickness, parts, begin]
+    numbers = [*body.axes.ravel(), *body.offset, spins, body.shape.planar, *mobility, _lever(body, spins), body.extent]
+    numbers += [not body.fixed, body.thickness, parts, begin]
     pair = [body.shape.extent, stiffness, *np.zeros(6), *losses, radius, *core, round_, False, False]
     pair += [*np.eye(3).ravel(), *field]
-    return np.array([*own, *pair], dtype=float)
+    return np.array([*numbers, *pair], dtype=float)
 
 
 def _lever(body, spins):

@@ -158,60 +158,65 @@ def arcs(depth):
     """
 
     @kernel()
-    def on_arc(place, start, end, centre, one, other, pair):
+    def on_arc(position, start, end, centre, frame_a, frame_b, pair):
         """(point, depth, G, slope and bend of the depth by the place)."""
         turn = end - start
-        angle = start + turn * place
+        angle = start + turn * position
         c, s = math.cos(angle), math.sin(angle)
-        e = one[0] * c + other[0] * s, one[1] * c + other[1] * s, one[2] * c + other[2] * s
+        e = frame_a[0] * c + frame_b[0] * s, frame_a[1] * c + frame_b[1] * s, frame_a[2] * c + frame_b[2] * s
         d = (
-            turn * (other[0] * c - one[0] * s),
-            turn * (other[1] * c - one[1] * s),
-            turn * (other[2] * c - one[2] * s),
+            turn * (frame_b[0] * c - frame_a[0] * s),
+            turn * (frame_b[1] * c - frame_a[1] * s),
+            turn * (frame_b[2] * c - frame_a[2] * s),
         )
         deep, g, h = depth(add(centre, e), pair.shape)
         return add(centre, e), deep, g, dot(g, d), dot(d, hessian_times(h, d)) - turn * turn * dot(g, e)
 
     @kernel()
-    def rising(power, place, deep, slope, curve):
+    def rising(power, position, deep, slope, curve):
         """Function that vanishes at the deepest position, positive before it, and its slope: as of straight lines."""
         if deep <= 0.0:
             return slope, curve
-        w = math.sin(math.pi * place) ** 2
-        w1, w2 = math.pi * math.sin(2.0 * math.pi * place), 2.0 * math.pi**2 * math.cos(2.0 * math.pi * place)
+        w = math.sin(math.pi * position) ** 2
+        w1, w2 = math.pi * math.sin(2.0 * math.pi * position), 2.0 * math.pi**2 * math.cos(2.0 * math.pi * position)
         return (
             w1 * deep + (power + 1.0) * w * slope,
             w2 * deep + (power + 2.0) * w1 * slope + (power + 1.0) * w * curve,
         )
 
     @kernel()
-    def touched(start, end, centre, one, other, pair):
-        power, most, best = pair.exponent, -math.inf, 0
-        radius, nearest = math.sqrt(dot(one, one)), -math.inf
+    def touched(start, end, centre, frame_a, frame_b, pair):
+        power, largest, best = pair.exponent, -math.inf, 0
+        radius, nearest = math.sqrt(dot(frame_a, frame_a)), -math.inf
         size, reach = (end - start) * radius, 2.0 * STEEPEST * radius * math.sin(0.25 * (end - start))
-        _, deep, _, _, _ = on_arc(0.5, start, end, centre, one, other, pair)
+        _, deep, _, _, _ = on_arc(0.5, start, end, centre, frame_a, frame_b, pair)
         if deep + reach <= 0.0:
             return 0.0, 0.0, centre, 0.0, centre
         for n in range(SAMPLES + 1):
-            _, deep, _, _, _ = on_arc(n / SAMPLES, start, end, centre, one, other, pair)
+            _, deep, _, _, _ = on_arc(n / SAMPLES, start, end, centre, frame_a, frame_b, pair)
             nearest = max(nearest, deep)
             felt = deep
             if deep > 0.0:
                 felt = deep * (math.sin(math.pi * n / SAMPLES) ** 2) ** (1.0 / (power + 1.0))
-            if felt > most:
-                most, best = felt, n
+            if felt > largest:
+                largest, best = felt, n
         if nearest + size / SAMPLES <= 0.0:  # gradients are shorter than 2
             return 0.0, 0.0, centre, 0.0, centre
-        low, high, place, moved = max(best - 1, 0) / SAMPLES, min(best + 1, SAMPLES) / SAMPLES, best / SAMPLES, math.inf
+        low, high, position, moved = (
+            max(best - 1, 0) / SAMPLES,
+            min(best + 1, SAMPLES) / SAMPLES,
+            best / SAMPLES,
+            math.inf,
+        )
         for _ in range(100):
-            _, deep, _, slope, curve = on_arc(place, start, end, centre, one, other, pair)
-            value, curve = rising(power, place, deep, slope, curve)
-            low, high, moved, place = climb(value, curve, low, high, moved, place)
+            _, deep, _, slope, curve = on_arc(position, start, end, centre, frame_a, frame_b, pair)
+            value, curve = rising(power, position, deep, slope, curve)
+            low, high, moved, position = climb(value, curve, low, high, moved, position)
             if moved <= 1e-15:
                 break
-        p, deep, g, _, _ = on_arc(place, start, end, centre, one, other, pair)
-        w = math.sin(math.pi * place) ** 2
-        return place, (w if deep > 0.0 else 0.0), p, deep, g
+        p, deep, g, _, _ = on_arc(position, start, end, centre, frame_a, frame_b, pair)
+        w = math.sin(math.pi * position) ** 2
+        return position, (w if deep > 0.0 else 0.0), p, deep, g
 
     return touched
 
@@ -227,12 +232,12 @@ def pressing(depth):
     arc = arcs(depth)
 
     @kernel()
-    def note(space, count, s, slot, way, y, g, found, thickness, touching):
+    def note(space, count, s, slot, path, y, g, contact_data, thickness, touching):
         """Write a contact; ``y`` and ``g`` are along the axes of the body that is touched."""
-        axes, offset, own, contacts = touching.axes, way[0], way[1], space.contacts
+        axes, offset, own_axes, contacts = touching.axes, path[0], path[1], space.contacts
         away = times_transposed(axes, add(y, offset))  # from the row of the body that is touched
-        g, near = times_transposed(axes, g), add(away, own)
-        deep, weight, share, inner = found
+        g, near = times_transposed(axes, g), add(away, own_axes)
+        deep, weight, share, inner = contact_data
         for k in range(3):
             contacts[count, FIRST + k] = near[k] if s == 0 else away[k]
             contacts[count, SECOND + k] = away[k] if s == 0 else near[k]
@@ -243,26 +248,31 @@ def pressing(depth):
 
     @kernel()
     def press(ahead, x, cells, data, c, s, space, count):
-        own, other, mine, its = frame_of(x, cells, data, c, s), frame_of(x, cells, data, c, 1 - s), side(s), side(1 - s)
+        frame_a, frame_b, mine, its = (
+            frame_of(x, cells, data, c, s),
+            frame_of(x, cells, data, c, 1 - s),
+            side(s),
+            side(1 - s),
+        )
         away = apart(x, cells, data, c)
         if s == 1:
             away = -away[0], -away[1], -away[2]
         centre, offset = vector_at(data, c, mine + OFFSET), vector_at(data, c, its + OFFSET)
-        way, row = (offset, (-away[0], -away[1], -away[2])), space.data
+        path, row = (offset, (-away[0], -away[1], -away[2])), space.data
         for k in range(PAIR_WIDTH):
             row[0, k] = data[c, its + PAIR + k]
-        growth, extent, most = row[0, AWAY + 6 + _GROWTH], row[0, 0], space.contacts.shape[0]
+        growth, extent, limit = row[0, AWAY + 6 + _GROWTH], row[0, 0], space.contacts.shape[0]
         before = int(data[c, its + PARTS]) if s == 1 else 0
         for n in range(int(data[c, mine + PARTS])):
             at = int(data[c, mine + BEGIN]) + COLUMNS * n
             kind, thickness, slot = data[c, at + KIND], data[c, at + THICKNESS], 3 * (before + n)
             row[0, AWAY + 6 + _GROWTH], row[0, 0] = growth + thickness + ahead, extent + thickness + ahead
-            p = add(times_transposed(own.axes, add(vector_at(data, c, at + FROM), centre)), away)
-            p = less(times(other.axes, p), offset)
+            p = add(times_transposed(frame_a.axes, add(vector_at(data, c, at + FROM), centre)), away)
+            p = less(times(frame_b.axes, p), offset)
             pair = pair_of(row, 0, 2)
             if kind == SEGMENT:
-                q = add(times_transposed(own.axes, add(vector_at(data, c, at + TO), centre)), away)
-                q = less(times(other.axes, q), offset)
+                q = add(times_transposed(frame_a.axes, add(vector_at(data, c, at + TO), centre)), away)
+                q = less(times(frame_b.axes, q), offset)
                 d, middle = less(q, p), (0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1]), 0.5 * (p[2] + q[2]))
                 if depth(middle, pair.shape)[0] + 0.5 * STEEPEST * math.sqrt(dot(d, d)) <= 0.0:
                     continue
@@ -271,23 +281,34 @@ def pressing(depth):
                 for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.found)):
                     touch = touch_of(space.x, space.cells, row, 2, LINE, space.found, m)
                     end = 1 if touch.place > 0.5 else 0
-                    if (touch.inner or data[c, at + OWNS + end] != 0.0) and count < most:
+                    if (touch.inner or data[c, at + OWNS + end] != 0.0) and count < limit:
                         w = window(False, touch.place, touch.inner)[0]
-                        found = touch.spot.depth, w * touch.weight, w * touch.share, 1.0 if touch.inner else 0.0
+                        contact_data = touch.spot.depth, w * touch.weight, w * touch.share, 1.0 if touch.inner else 0.0
                         which = slot + (2 if touch.inner else end)
-                        note(space, count, s, which, way, touch.spot.y, touch.spot.gradient, found, thickness, other)
+                        note(
+                            space,
+                            count,
+                            s,
+                            which,
+                            path,
+                            touch.spot.y,
+                            touch.spot.gradient,
+                            contact_data,
+                            thickness,
+                            frame_b,
+                        )
                         count += 1
             elif kind == ARC:
-                one = times(other.axes, times_transposed(own.axes, vector_at(data, c, at + TO)))
-                two = times(other.axes, times_transposed(own.axes, vector_at(data, c, at + THIRD)))
-                _, w, y, deep, g = arc(data[c, at + OWNS], data[c, at + OWNS + 1], p, one, two, pair)
-                if w > 0.0 and count < most:
-                    note(space, count, s, slot, way, y, g, (deep, w, w, 1.0), thickness, other)
+                relative = times(frame_b.axes, times_transposed(frame_a.axes, vector_at(data, c, at + TO)))
+                two = times(frame_b.axes, times_transposed(frame_a.axes, vector_at(data, c, at + THIRD)))
+                _, w, y, deep, g = arc(data[c, at + OWNS], data[c, at + OWNS + 1], p, relative, two, pair)
+                if w > 0.0 and count < limit:
+                    note(space, count, s, slot, path, y, g, (deep, w, w, 1.0), thickness, frame_b)
                     count += 1
             else:
                 deep, g, _ = depth(p, pair.shape)
-                if deep > 0.0 and count < most:
-                    note(space, count, s, slot, way, p, g, (deep, 1.0, 1.0, 0.0), thickness, other)
+                if deep > 0.0 and count < limit:
+                    note(space, count, s, slot, path, p, g, (deep, 1.0, 1.0, 0.0), thickness, frame_b)
                     count += 1
         return count
 
@@ -301,17 +322,17 @@ def meeting(first, second):
     ``space_of(data)`` is the `Space`, and ``meet(ahead, x, cells, data, c, space)`` the number of contacts of a pair
     that it holds.
     """
-    (press, shape), (press_back, other) = pressing(second), pressing(first)
-    rows, columns = max(shape[0], other[0]), max(shape[1], other[1])
+    (press, shape), (press_back, second_shape) = pressing(second), pressing(first)
+    rows, columns = max(shape[0], second_shape[0]), max(shape[1], second_shape[1])
 
     @kernel()
     def space_of(data):
         cells = np.empty((1, 3), dtype=np.int32)
         for k in range(3):
             cells[0, k] = k
-        most = int(data[0, ROOM]) if data.shape[0] else 0
+        largest = int(data[0, ROOM]) if data.shape[0] else 0
         return Space(
-            np.zeros((3, 3)), cells, np.empty((1, PAIR_WIDTH)), np.empty((rows, columns)), np.empty((most, WIDTH))
+            np.zeros((3, 3)), cells, np.empty((1, PAIR_WIDTH)), np.empty((rows, columns)), np.empty((largest, WIDTH))
         )
 
     @kernel()

@@ -72,44 +72,44 @@ def rows_of(touches, n):
 @kernel(forceinline=True)
 def along(touches, n, i, rows):
     """Component along direction i of u, of velocities ``rows (rows, 3)``."""
-    a, b, spin, other = rows_of(touches, n)
+    a, b, spin, row_b = rows_of(touches, n)
     at, lever, second, total = AXES + 3 * i, LEVERS + 3 * i, LEVERS_OF_SECOND + 3 * i, 0.0
     for k in range(3):
         total += touches[n, at + k] * (rows[a, k] - rows[b, k])
         if spin >= 0:
             total += touches[n, lever + k] * rows[spin, k]
-        if other >= 0:
-            total += touches[n, second + k] * rows[other, k]
+        if row_b >= 0:
+            total += touches[n, second + k] * rows[row_b, k]
     return total
 
 
 @kernel(forceinline=True)
 def moved(touches, n, i, f, inverse):
     """Component along direction i of the acceleration by forces f."""
-    a, b, spin, other = rows_of(touches, n)
+    a, b, spin, row_b = rows_of(touches, n)
     at, lever, second, total = AXES + 3 * i, LEVERS + 3 * i, LEVERS_OF_SECOND + 3 * i, 0.0
     for k in range(3):
         total += touches[n, at + k] * (inverse[a, k] * f[a, k] - inverse[b, k] * f[b, k])
         if spin >= 0:
             total += touches[n, lever + k] * inverse[spin, k] * f[spin, k]
-        if other >= 0:
-            total += touches[n, second + k] * inverse[other, k] * f[other, k]
+        if row_b >= 0:
+            total += touches[n, second + k] * inverse[row_b, k] * f[row_b, k]
     return total
 
 
 @kernel(forceinline=True)
 def apply_force(touches, n, p, q, s, f):
     """Add a force along the three directions to the rows of a contact."""
-    a, b, spin, other = rows_of(touches, n)
+    a, b, spin, row_b = rows_of(touches, n)
     for k in range(3):
         force = p * touches[n, AXES + k] + q * touches[n, AXES + 3 + k] + s * touches[n, AXES + 6 + k]
         f[a, k] += force
         f[b, k] -= force
         if spin >= 0:
             f[spin, k] += p * touches[n, ARMS + k] + q * touches[n, ARMS + 3 + k] + s * touches[n, ARMS + 6 + k]
-        if other >= 0:
+        if row_b >= 0:
             at = ARMS_OF_SECOND + k
-            f[other, k] += p * touches[n, at] + q * touches[n, at + 3] + s * touches[n, at + 6]
+            f[row_b, k] += p * touches[n, at] + q * touches[n, at + 3] + s * touches[n, at + 6]
 
 
 @kernel()
@@ -117,8 +117,8 @@ def place_of(contacts, n, s):
     """Contact point of two bodies, from the row of one of them [m]."""
     g = vector_at(contacts, n, NORMAL)
     size = math.sqrt(dot(g, g))
-    y, way = vector_at(contacts, n, FIRST if s == 0 else SECOND), contacts[n, DOWN] / size if size > 0.0 else 0.0
-    return y[0] + way * g[0], y[1] + way * g[1], y[2] + way * g[2]
+    y, path = vector_at(contacts, n, FIRST if s == 0 else SECOND), contacts[n, DOWN] / size if size > 0.0 else 0.0
+    return y[0] + path * g[0], y[1] + path * g[1], y[2] + path * g[2]
 
 
 @kernel()
@@ -135,26 +135,26 @@ def turned_velocity(v, data, cells, c, s, frame):
 @kernel(forceinline=True)
 def delassus(touches, n, i, j, inverse):
     """J M⁻¹ Jᵀ between two directions of a contact [1/kg]."""
-    a, b, spin, other = rows_of(touches, n)
+    a, b, spin, row_b = rows_of(touches, n)
     total = 0.0
     for k in range(3):
         total += touches[n, AXES + 3 * i + k] * touches[n, AXES + 3 * j + k] * (inverse[a, k] + inverse[b, k])
         if spin >= 0:
             total += touches[n, ARMS + 3 * i + k] * touches[n, LEVERS + 3 * j + k] * inverse[spin, k]
-        if other >= 0:
+        if row_b >= 0:
             at = touches[n, ARMS_OF_SECOND + 3 * i + k] * touches[n, LEVERS_OF_SECOND + 3 * j + k]
-            total += at * inverse[other, k]
+            total += at * inverse[row_b, k]
     return total
 
 
 @kernel(forceinline=True)
-def set_direction(touches, n, i, own, other):
+def set_direction(touches, n, i, own, row):
     """Write direction i of a contact, as either body has it."""
     for k in range(3):
         touches[n, AXES + 3 * i + k] = own.axis[k]
         touches[n, LEVERS + 3 * i + k], touches[n, ARMS + 3 * i + k] = -own.lever[k], -own.arm[k]
-        touches[n, LEVERS_OF_SECOND + 3 * i + k] = other.lever[k]
-        touches[n, ARMS_OF_SECOND + 3 * i + k] = other.arm[k]
+        touches[n, LEVERS_OF_SECOND + 3 * i + k] = row.lever[k]
+        touches[n, ARMS_OF_SECOND + 3 * i + k] = row.arm[k]
 
 
 @kernel()
@@ -163,7 +163,7 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
 
     The two tangents are those between which J M⁻¹ Jᵀ has no mixed term.
     """
-    law, one, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
+    law, frame_a, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
     spins = int(data[c, SIDES + SPINS]), int(data[c, SIDES + SIDE + SPINS])
     touches[n, CELL], touches[n, ROWS], touches[n, ROWS + 1] = c, cells[c, 0], cells[c, 1]
     touches[n, ROWS + 2] = cells[c, 2] if spins[0] else -1
@@ -175,10 +175,10 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
     size = math.sqrt(dot(e, e))
     e = e[0] / size, e[1] / size, e[2] / size
     h = cross(g, e)
-    set_direction(touches, n, 0, direction(g, y, one, spins[0]), direction(g, z, two, spins[1]))
-    own, its = direction(e, y, one, spins[0]), direction(e, z, two, spins[1])
-    own_too, its_too = direction(h, y, one, spins[0]), direction(h, z, two, spins[1])
-    set_direction(touches, n, 1, own, its)
+    set_direction(touches, n, 0, direction(g, y, frame_a, spins[0]), direction(g, z, two, spins[1]))
+    lever_a, its = direction(e, y, frame_a, spins[0]), direction(e, z, two, spins[1])
+    own_too, its_too = direction(h, y, frame_a, spins[0]), direction(h, z, two, spins[1])
+    set_direction(touches, n, 1, lever_a, its)
     set_direction(touches, n, 2, own_too, its_too)
     first, last, mixed = (
         delassus(touches, n, 1, 1, inverse), delassus(touches, n, 2, 2, inverse), delassus(touches, n, 1, 2, inverse)
@@ -186,8 +186,8 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
         c1, s1 = math.cos(angle), math.sin(angle)
-        set_direction(touches, n, 1, mixture(c1, own, s1, own_too), mixture(c1, its, s1, its_too))
-        set_direction(touches, n, 2, mixture(c1, own_too, -s1, own), mixture(c1, its_too, -s1, its))
+        set_direction(touches, n, 1, mixture(c1, lever_a, s1, own_too), mixture(c1, its, s1, its_too))
+        set_direction(touches, n, 2, mixture(c1, own_too, -s1, lever_a), mixture(c1, its_too, -s1, its))
     for i in range(3):
         touches[n, OWN + i] = delassus(touches, n, i, i, inverse)
         touches[n, START + i], touches[n, FORCES + i] = along(touches, n, i, v), 0.0
@@ -203,16 +203,16 @@ sweep, (recall, give) = sweeping(moved, apply_force), warm_start(along, apply_fo
 @functools.cache
 def kernels(first, second):
     """Force, stiffness, damping, and a function that makes the `ImplicitContactKernels` of numbers of parts."""
-    space_of, meet = meeting(first, second)
+    space_of, detect = meeting(first, second)
 
     @kernel()
     def add_forces(x, v, f, cells, data, c, space):
         """Add the forces of a pair; their power [W], and the force on the second body [N]."""
-        law, one, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
+        law, frame_a, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
         power, felt = 0.0, (0.0, 0.0, 0.0)
         a, b, contacts = cells[c, 0], cells[c, 1], space.contacts
-        w, o = turned_velocity(v, data, cells, c, 0, one), turned_velocity(v, data, cells, c, 1, two)
-        for n in range(meet(0.0, x, cells, data, c, space)):
+        w, o = turned_velocity(v, data, cells, c, 0, frame_a), turned_velocity(v, data, cells, c, 1, two)
+        for n in range(detect(0.0, x, cells, data, c, space)):
             y, z = place_of(contacts, n, 0), place_of(contacts, n, 1)
             p, q = cross(w, y), cross(o, z)
             u = (
@@ -220,17 +220,17 @@ def kernels(first, second):
                 v[a, 1] + p[1] - v[b, 1] - q[1],
                 v[a, 2] + p[2] - v[b, 2] - q[2],
             )
-            own = friction_force(law, push(law, contacts, n, SHARE), vector_at(contacts, n, NORMAL), u)
-            power += dot(own, u)
-            felt = felt[0] - own[0], felt[1] - own[1], felt[2] - own[2]
+            friction = friction_force(law, push(law, contacts, n, SHARE), vector_at(contacts, n, NORMAL), u)
+            power += dot(friction, u)
+            felt = felt[0] - friction[0], felt[1] - friction[1], felt[2] - friction[2]
             for s in range(2):
-                frame, arm, sign, spins = (one, y, 1.0, data[c, SIDES + SPINS])
+                frame, arm, sign, spins = (frame_a, y, 1.0, data[c, SIDES + SPINS])
                 if s == 1:
                     frame, arm, sign, spins = (two, z, -1.0, data[c, SIDES + SIDE + SPINS])
                 for k in range(3):
-                    f[cells[c, s], k] += sign * own[k]
+                    f[cells[c, s], k] += sign * friction[k]
                 if spins > 0.0:
-                    moment = turned_by(frame.planar, times(frame.axes, cross(arm, own)))
+                    moment = turned_by(frame.planar, times(frame.axes, cross(arm, friction)))
                     moment = times_transposed(frame.axes, moment)
                     for k in range(3):
                         f[cells[c, 2 + 2 * s], k] += sign * moment[k]
@@ -252,7 +252,7 @@ def kernels(first, second):
     def meeting_all(h, x, v, inverse, cells, data, touches, begin):
         space, count = space_of(data), begin
         for c in range(cells.shape[0]):
-            for m in range(meet(0.0, x, cells, data, c, space)):
+            for m in range(detect(0.0, x, cells, data, c, space)):
                 if count < touches.shape[0]:
                     set_touch(touches, count, space.contacts, m, x, v, inverse, cells, data, c)
                     z = h * touches[count, OWN] * touches[count, PUSH] * touches[count, DAMPING]

@@ -76,8 +76,8 @@ def force_of(space_of, add_forces):
     def force(t, x, v, f, cells, data, out):
         space = space_of(data)
         for c in range(cells.shape[0]):
-            own, (f0, f1, f2) = add_forces(x, v, f, cells, data, c, space)
-            out[c, OWN], out[c, FELT], out[c, FELT + 1], out[c, FELT + 2] = own, f0, f1, f2
+            rows, (f0, f1, f2) = add_forces(x, v, f, cells, data, c, space)
+            out[c, OWN], out[c, FELT], out[c, FELT + 1], out[c, FELT + 2] = rows, f0, f1, f2
 
     return force
 
@@ -97,9 +97,9 @@ def slopes_of(space_of, add_forces):
     @kernel()
     def slopes(x, v, blocks, cells, data, moving):
         space, x6, v6 = space_of(data), np.zeros((6, 3)), np.zeros((6, 3))
-        own, ahead, behind = np.empty((1, 6), dtype=np.int32), np.empty((6, 3)), np.empty((6, 3))
+        indices, ahead, behind = np.empty((1, 6), dtype=np.int32), np.empty((6, 3)), np.empty((6, 3))
         for k in range(6):
-            own[0, k] = k
+            indices[0, k] = k
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
             for r in range(6):
@@ -116,9 +116,9 @@ def slopes_of(space_of, add_forces):
                     was = varied[r, k]
                     ahead[:], behind[:] = 0.0, 0.0
                     varied[r, k] = was + step
-                    add_forces(x6, v6, ahead, own, numbers, 0, space)
+                    add_forces(x6, v6, ahead, indices, numbers, 0, space)
                     varied[r, k] = was - step
-                    add_forces(x6, v6, behind, own, numbers, 0, space)
+                    add_forces(x6, v6, behind, indices, numbers, 0, space)
                     varied[r, k] = was
                     for i in range(6):
                         for j in range(3):
@@ -148,9 +148,9 @@ def add_rates(rates, steep, speed, mass, cells, data, c):
     (p, q), (r, s) = share_of(data, c, 0, mass, cells), share_of(data, c, 1, mass, cells)
     total = p + q + r + s
     for side in range(2):
-        own, turned, b = p if side == 0 else r, q if side == 0 else s, cells[c, side]
-        if own > 0.0:
-            rates[b] = max(rates[b] + steep * total / own, (10.0 * speed / thick) ** 2 * mass[b])
+        lever, turned, b = p if side == 0 else r, q if side == 0 else s, cells[c, side]
+        if lever > 0.0:
+            rates[b] = max(rates[b] + steep * total / lever, (10.0 * speed / thick) ** 2 * mass[b])
         if turned > 0.0:
             rates[cells[c, 2 + 2 * side]] += steep * total * turned * math.sqrt(mass[cells[c, 2 + 2 * side]])
 
@@ -169,13 +169,13 @@ def near(skin, x, cells, data, chosen):
 @functools.cache
 def kernels(first, second):
     """Force, energy, stiffness and bound of pairs of bodies with two depths."""
-    space_of, meet = meeting(first, second)
+    space_of, detect = meeting(first, second)
 
     @kernel()
     def add_forces(x, v, f, cells, data, c, space):
         """Add the forces of a pair; how deep it is [m], and the force on the second body [N]."""
         deepest, felt, law = 0.0, (0.0, 0.0, 0.0), law_of(data, c)
-        count = meet(0.0, x, cells, data, c, space)
+        count = detect(0.0, x, cells, data, c, space)
         for n in range(count):
             size, g = push(law, space.contacts, n, WEIGHT), vector_at(space.contacts, n, NORMAL)
             deepest = max(deepest, space.contacts[n, DEPTH])
@@ -192,7 +192,7 @@ def kernels(first, second):
         space = space_of(data)
         for c in range(cells.shape[0]):
             law, out[c] = law_of(data, c), 0.0
-            for n in range(meet(0.0, x, cells, data, c, space)):
+            for n in range(detect(0.0, x, cells, data, c, space)):
                 out[c] += push(law, space.contacts, n, WEIGHT) * space.contacts[n, DEPTH] / (law.exponent + 1.0)
 
     @kernel(STIFFNESS)
@@ -204,7 +204,7 @@ def kernels(first, second):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):  # of places alone
             law = law_of(data, c)
-            for n in range(meet(0.0, x, cells, data, c, space)):
+            for n in range(detect(0.0, x, cells, data, c, space)):
                 g, weight = vector_at(space.contacts, n, NORMAL), max(space.contacts[n, WEIGHT], 0.0)
                 steep = law.stiffness * weight * slope_of_power(law.exponent, space.contacts[n, DEPTH])
                 for i in range(3):
@@ -221,9 +221,9 @@ def kernels(first, second):
         for c in range(cells.shape[0]):
             law, steep = law_of(data, c), 0.0
             thick = min(data[c, SIDES + THICK], data[c, SIDES + SIDE + THICK])
-            for n in range(meet(min(reach, FARTHEST), x, cells, data, c, space)):
-                own = law.stiffness * slope_of_power(law.exponent, min(space.contacts[n, DEPTH], thick))
-                steep += CURVED * own * (INWARD if space.contacts[n, INNER] != 0.0 else 1.0)
+            for n in range(detect(min(reach, FARTHEST), x, cells, data, c, space)):
+                steepness = law.stiffness * slope_of_power(law.exponent, min(space.contacts[n, DEPTH], thick))
+                steep += CURVED * steepness * (INWARD if space.contacts[n, INNER] != 0.0 else 1.0)
             steep *= 1.0 + law.friction + SHALLOW * law.damping * speed * (1.0 + law.friction)
             if steep > 0.0:
                 add_rates(rates, steep, speed, mass, cells, data, c)

@@ -85,15 +85,15 @@ def hessian_times(h, p):
 
 
 @kernel()
-def window(once, place, inner):
+def window(once, xi, inner):
     """(W, W', W'') of a contact; 1 at an end, and of a sphere."""
     if not inner or once:
         return 1.0, 0.0, 0.0
-    return 4.0 * place * (1.0 - place), 4.0 - 8.0 * place, -8.0
+    return 4.0 * xi * (1.0 - xi), 4.0 - 8.0 * xi, -8.0
 
 
 @kernel(forceinline=True)
-def rise(pair, place, spot):
+def rise(pair, xi, spot):
     """Function that vanishes at the deepest position of an element, positive before it, and its slope.
 
     W' δ + (p + 1) W δ', or where nothing is touched δ'; of a sphere the rate of −½ |y|², which is linear.
@@ -105,7 +105,7 @@ def rise(pair, place, spot):
         return away * slope, away * curve - slope * slope
     if deep <= 0.0:
         return slope, curve
-    power, (w, w1, w2) = pair.exponent, window(False, place, True)
+    power, (w, w1, w2) = pair.exponent, window(False, xi, True)
     return w1 * deep + (power + 1.0) * w * slope, w2 * deep + (power + 2.0) * w1 * slope + (power + 1.0) * w * curve
 
 
@@ -116,16 +116,16 @@ def place_moves(touch, moving, nodes, functions, z):
     The last row is of the body; all are zero unless ``moving``.
     """
     z[:] = 0.0
-    pair, place, spot = touch.pair, touch.place, touch.spot
-    curve = rise(pair, place, spot)[1]
+    pair, xi, spot = touch.pair, touch.place, touch.spot
+    curve = rise(pair, xi, spot)[1]
     if not moving or not touch.weight * curve < 0.0:
         return
-    (w, w1, _), g, turned = window(pair.once, place, True), spot.gradient, hessian_times(spot.hessian, spot.d)
-    own = pair.shape.radius - spot.depth if pair.once else (pair.exponent + 1.0) * w
+    (w, w1, _), g, turned = window(pair.once, xi, True), spot.gradient, hessian_times(spot.hessian, spot.d)
+    distance = pair.shape.radius - spot.depth if pair.once else (pair.exponent + 1.0) * w
     for a in range(nodes + 1):
-        value, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+        value, slope = share(a, nodes, functions, xi) if a < nodes else (-1.0, 0.0)
         for k in range(3):
-            z[a, k] = -(w1 * value * g[k] + own * (value * turned[k] + slope * g[k])) / curve
+            z[a, k] = -(w1 * value * g[k] + distance * (value * turned[k] + slope * g[k])) / curve
 
 
 class Places(NamedTuple):
@@ -139,19 +139,19 @@ class Places(NamedTuple):
 
 
 @kernel(forceinline=True)
-def climb(value, curve, low, high, moved, place):
+def climb(value, curve, low, high, moved, xi):
     """(low, high, how far it moved, place) of the next place on the way to where a ``value`` falls through zero.
 
     By Newton's method with the slope ``curve``, and by bisection where it leaves the bracket or comes no nearer.
     """
     if value > 0.0:
-        low = place
+        low = xi
     else:
-        high = place
-    step = place - value / curve if curve < 0.0 else -1.0
-    if not low <= step <= high or abs(step - place) > 0.5 * moved:
+        high = xi
+    step = xi - value / curve if curve < 0.0 else -1.0
+    if not low <= step <= high or abs(step - xi) > 0.5 * moved:
         step = 0.5 * (low + high)
-    return low, high, abs(step - place), step
+    return low, high, abs(step - xi), step
 
 
 @functools.cache
@@ -174,15 +174,15 @@ def places(depth, spins=0):
     paired, convex = pairing(spins), getattr(depth, "convex", True)
 
     @kernel()
-    def within(x, cells, data, c, nodes, functions, place):
+    def within(x, cells, data, c, nodes, functions, xi):
         pair = paired(x, cells, data, c, nodes)
-        p, d, e = point(x, cells, data, c, nodes, functions, place)
+        p, d, e = point(x, cells, data, c, nodes, functions, xi)
         p, d, e = times(pair.axes, p), times(pair.axes, d), times(pair.axes, e)
         deep, gradient, hessian = depth(from_shape(p, data, c, nodes) if spins == 2 else p, pair.shape)
         return ContactPoint(p, d, e, deep, gradient, hessian)
 
     @kernel()
-    def climbed(x, cells, data, c, nodes, functions, low, high, place):
+    def climbed(x, cells, data, c, nodes, functions, low, high, xi):
         moved, pair = math.inf, pair_of(data, c, nodes)
         if pair.once:
             for end in (low, high):
@@ -191,71 +191,71 @@ def places(depth, spins=0):
                 if (end == 0.0 and slope <= 0.0) or (end == 1.0 and slope >= 0.0):
                     return end, spot.depth
         for _ in range(100):
-            spot = within(x, cells, data, c, nodes, functions, place)
+            spot = within(x, cells, data, c, nodes, functions, xi)
             deep, slope = spot.depth, dot(spot.gradient, spot.d)
-            if nodes == 2 and deep + max(slope * (high - place), slope * (low - place)) <= 0.0:
-                return (NOWHERE if high - low == 1.0 else place), deep  # concave: nowhere deep enough
-            value, curve = rise(pair, place, spot)
-            low, high, moved, place = climb(value, curve, low, high, moved, place)
+            if nodes == 2 and deep + max(slope * (high - xi), slope * (low - xi)) <= 0.0:
+                return (NOWHERE if high - low == 1.0 else xi), deep  # concave: nowhere deep enough
+            value, curve = rise(pair, xi, spot)
+            low, high, moved, xi = climb(value, curve, low, high, moved, xi)
             if moved <= 1e-15:
                 break
-        return place, within(x, cells, data, c, nodes, functions, place).depth
+        return xi, within(x, cells, data, c, nodes, functions, xi).depth
 
     @kernel()
-    def felt(x, cells, data, c, nodes, functions, place):
-        deep, pair = within(x, cells, data, c, nodes, functions, place).depth, pair_of(data, c, nodes)
-        return window(pair.once, place, True)[0] ** (1.0 / (pair.exponent + 1.0)) * deep if deep > 0.0 else deep
+    def felt(x, cells, data, c, nodes, functions, xi):
+        deep, pair = within(x, cells, data, c, nodes, functions, xi).depth, pair_of(data, c, nodes)
+        return window(pair.once, xi, True)[0] ** (1.0 / (pair.exponent + 1.0)) * deep if deep > 0.0 else deep
 
     @kernel()
     def deepest(x, cells, data, c, nodes, functions):
         if nodes > 2:  # from the places where samples are largest, of which there may be several
-            most, where, depth_there = -math.inf, 0.0, 0.0
-            before, here = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
+            largest, where, depth_there = -math.inf, 0.0, 0.0
+            before, state = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
             for n in range(SAMPLES + 1):
                 at, after = n / SAMPLES, -math.inf
                 if n < SAMPLES:
                     after = felt(x, cells, data, c, nodes, functions, at + 1.0 / SAMPLES)
-                if here >= before and here > after:
+                if state >= before and state > after:
                     low, high = max(at - 1.0 / SAMPLES, 0.0), min(at + 1.0 / SAMPLES, 1.0)
-                    place, deep = climbed(x, cells, data, c, nodes, functions, low, high, at)
-                    value = felt(x, cells, data, c, nodes, functions, place)
-                    if value > most:
-                        most, where, depth_there = value, place, deep
-                before, here = here, after
+                    xi, deep = climbed(x, cells, data, c, nodes, functions, low, high, at)
+                    value = felt(x, cells, data, c, nodes, functions, xi)
+                    if value > largest:
+                        largest, where, depth_there = value, xi, deep
+                before, state = state, after
             return where, depth_there
         return climbed(x, cells, data, c, nodes, functions, 0.0, 1.0, 0.5)
 
     @kernel(forceinline=True)
-    def contacts(x, cells, data, first, pieces, nodes, functions, found):
-        """Write (cell, place, whether the place moves) of each contact of a line to ``found``; return their number."""
+    def contacts(x, cells, data, first, pieces, nodes, functions, buffer):
+        """Write (cell, place, whether the place moves) of each contact of a line to ``buffer``; return their number."""
         count, best = 0, 0.0
         for c in range(first, first + pieces):
             if far(x, cells, data, c, nodes):
                 continue
-            place, deep = deepest(x, cells, data, c, nodes, functions)
-            if place == NOWHERE:
+            xi, deep = deepest(x, cells, data, c, nodes, functions)
+            if xi == NOWHERE:
                 continue
-            inner = 0.0 < place < 1.0
+            inner = 0.0 < xi < 1.0
             if pair_of(data, c, nodes).once:
                 if deep > best:
                     best, count = deep, 1
-                    found[0, 0], found[0, 1], found[0, 2] = c, place, inner
+                    buffer[0, 0], buffer[0, 1], buffer[0, 2] = c, xi, inner
                 continue
             if deep > 0.0 and inner:
-                found[count, 0], found[count, 1], found[count, 2] = c, place, 1.0
+                buffer[count, 0], buffer[count, 1], buffer[count, 2] = c, xi, 1.0
                 count += 1
             for end in range(2):
                 if within(x, cells, data, c, nodes, functions, float(end)).depth > 0.0:
-                    found[count, 0], found[count, 1], found[count, 2] = c, end, 0.0
+                    buffer[count, 0], buffer[count, 1], buffer[count, 2] = c, end, 0.0
                     count += 1
         return count
 
     @kernel(forceinline=True)
-    def touch_of(x, cells, data, nodes, functions, found, n):
-        c, place = int(found[n, 0]), found[n, 1]
-        spot = within(x, cells, data, c, nodes, functions, place)
-        weight, share = (1.0, 1.0) if convex else (found[n, 3], found[n, 4])
-        return PointContact(c, place, found[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
+    def touch_of(x, cells, data, nodes, functions, buffer, n):
+        c, xi = int(buffer[n, 0]), buffer[n, 1]
+        spot = within(x, cells, data, c, nodes, functions, xi)
+        weight, share = (1.0, 1.0) if convex else (buffer[n, 3], buffer[n, 4])
+        return PointContact(c, xi, buffer[n, 2] > 0.0, paired(x, cells, data, c, nodes), spot, weight, share)
 
     if convex:
         return Places(within, deepest, contacts, touch_of, (3, 3))

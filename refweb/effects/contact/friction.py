@@ -77,14 +77,14 @@ def angular(pair, spins, u):
 
 
 @kernel()
-def slip_of(v, cells, c, nodes, spins, functions, pair, place, y):
+def slip_of(v, cells, c, nodes, spins, functions, pair, xi, y):
     """The `Slip` at a place of cell c."""
     b, w = cells[c, nodes], (0.0, 0.0, 0.0)
     u0, u1, u2 = -v[b, 0], -v[b, 1], -v[b, 2]
     s0 = s1 = s2 = 0.0
     for a in range(nodes):
         i = cells[c, a]
-        value, slope = share(a, nodes, functions, place)
+        value, slope = share(a, nodes, functions, xi)
         u0, u1, u2 = u0 + value * v[i, 0], u1 + value * v[i, 1], u2 + value * v[i, 2]
         s0, s1, s2 = s0 + slope * v[i, 0], s1 + slope * v[i, 1], s2 + slope * v[i, 2]
     u, s = times(pair.axes, (u0, u1, u2)), times(pair.axes, (s0, s1, s2))
@@ -164,16 +164,16 @@ def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_
 
     ``z`` is what `place_moves` writes; ``by_y`` and ``by_u (3, 3)`` are space to work in.
     """
-    c, place, pair, (y, d, _, deep, g, bend) = touch.c, touch.place, touch.pair, touch.spot
-    w, w1, _ = window(pair.once, place, touch.inner)
+    c, xi, pair, (y, d, _, deep, g, bend) = touch.c, touch.place, touch.pair, touch.spot
+    w, w1, _ = window(pair.once, xi, touch.inner)
     push = rubbed_by(touch)
     steep = touch.share * pair.stiffness * w * slope_of_power(pair.exponent, deep)
-    u, s, turns = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
-    own = friction_force(pair, push, g, u)
+    u, s, turns = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
+    force_ = friction_force(pair, push, g, u)
     by_velocity(pair, push, g, u, by_u)
     by_place(pair, push, steep, g, bend, u, by_y)
     for b in range(nodes + 1):
-        part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
+        part = share(b, nodes, functions, xi)[0] if b < nodes else -1.0
         for j in range(3):
             step = z[b, j]
             dy = (
@@ -185,19 +185,19 @@ def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_
             du = step * s[0] - wy[0], step * s[1] - wy[1], step * s[2] - wy[2]
             fading = step * w1 / w
             change = (
-                dot(by_y[0], dy) + dot(by_u[0], du) + fading * own[0],
-                dot(by_y[1], dy) + dot(by_u[1], du) + fading * own[1],
-                dot(by_y[2], dy) + dot(by_u[2], du) + fading * own[2],
+                dot(by_y[0], dy) + dot(by_u[0], du) + fading * force_[0],
+                dot(by_y[1], dy) + dot(by_u[1], du) + fading * force_[1],
+                dot(by_y[2], dy) + dot(by_u[2], du) + fading * force_[2],
             )
             for a in range(nodes):
-                value, slope = share(a, nodes, functions, place)
+                value, slope = share(a, nodes, functions, xi)
                 for i in range(3):
-                    blocks[c, 3 * a + i, 3 * b + j] -= value * change[i] + slope * step * own[i]
+                    blocks[c, 3 * a + i, 3 * b + j] -= value * change[i] + slope * step * force_[i]
             for i in range(3):
                 blocks[c, 3 * nodes + i, 3 * b + j] += change[i]
             if spins:
-                one, two = cross(dy, own), cross(y, change)
-                moment = turned_by(pair.planar, (one[0] + two[0], one[1] + two[1], one[2] + two[2]))
+                turned, two = cross(dy, force_), cross(y, change)
+                moment = turned_by(pair.planar, (turned[0] + two[0], turned[1] + two[1], turned[2] + two[2]))
                 for i in range(3):
                     blocks[c, 3 * nodes + 3 + i, 3 * b + j] += moment[i]
 
@@ -205,11 +205,11 @@ def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_
 @kernel(forceinline=True)
 def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
     """Add what a contact has of −∂f/∂v, along the axes of the body; ``by_u (3, 3)`` is space to work in."""
-    c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
-    u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
+    c, xi, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
+    u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
     by_velocity(pair, rubbed_by(touch), touch.spot.gradient, u, by_u)
     for b in range(nodes + 2 if spins else nodes + 1):
-        part = share(b, nodes, functions, place)[0] if b < nodes else -1.0
+        part = share(b, nodes, functions, xi)[0] if b < nodes else -1.0
         for j in range(3):
             unit = (1.0 if j == 0 else 0.0, 1.0 if j == 1 else 0.0, 1.0 if j == 2 else 0.0)
             du = part * unit[0], part * unit[1], part * unit[2]
@@ -218,7 +218,7 @@ def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
             change = dot(by_u[0], du), dot(by_u[1], du), dot(by_u[2], du)
             for i in range(3):
                 for a in range(nodes):
-                    value = share(a, nodes, functions, place)[0]
+                    value = share(a, nodes, functions, xi)[0]
                     blocks[c, 3 * a + i, 3 * b + j] -= value * change[i]
                 blocks[c, 3 * nodes + i, 3 * b + j] += change[i]
             if spins:
@@ -228,8 +228,8 @@ def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
 
 
 @kernel()
-def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
-    """Add the row sums of the contacts of an element, with ∂F/∂y of at most ``most`` each.
+def add_row_sums(rates, limit, mass, cells, data, c, nodes, spins):
+    """Add the row sums of the contacts of an element, with ∂F/∂y of at most ``limit`` each.
 
     Unknowns of the body are scaled as in `refweb.effects.contact.nearest_point.lightness`, and its rotation likewise.
     """
@@ -237,7 +237,7 @@ def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
     delta, thick, b = lightness(mass, cells, c, nodes), thickness(pair.shape), cells[c, nodes]
     if spins == 2:
         thick = lever_of(data, c, nodes)
-    most *= 1.0 if nodes == 2 else float(nodes * nodes)
+    limit *= 1.0 if nodes == 2 else float(nodes * nodes)
     near, all_of = 1.6, 3.0  # 1 + max W N of a node; both ends and one between
     if pair.once:
         near = all_of = 1.0
@@ -245,11 +245,11 @@ def add_row_sums(rates, most, mass, cells, data, c, nodes, spins):
     if spins:
         r = cells[c, nodes + 1]
         spun = min(delta * thick * math.sqrt(mass[b] / mass[r]), 1.0)
-        rates[r] += all_of * most * thick * thick * (1.0 + (1.0 + delta) / spun)
+        rates[r] += all_of * limit * thick * thick * (1.0 + (1.0 + delta) / spun)
     for a in range(nodes):
-        rates[cells[c, a]] += near * most * (1.0 + delta + spun)
+        rates[cells[c, a]] += near * limit * (1.0 + delta + spun)
     if delta > 0.0:
-        rates[b] += all_of * most * (1.0 + (1.0 + spun) / delta)
+        rates[b] += all_of * limit * (1.0 + (1.0 + spun) / delta)
 
 
 @functools.cache
@@ -264,34 +264,34 @@ def kernels(depth, pieces, nodes, functions, spins):
         Number of rows behind the body in a cell that are its rotation: 1 or 2, see `refweb.net.rotation`, or 0.
     """
     rows, paired = nodes + (2 if spins else 1), pairing(spins)
-    _, _, contacts, touch_of, (most, columns) = places(depth, spins)
+    _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
     reject_step = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        found = np.empty((most * pieces, columns))
+        buffer = np.empty((limit * pieces, columns))
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                touch = touch_of(x, cells, data, nodes, functions, found, n)
-                c, place, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
-                u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, place, y)
-                own = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
-                out[c, 0] += dot(own, u)
-                turned = times_transposed(pair.axes, own)
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
+                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
+                c, xi, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
+                u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
+                friction = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
+                out[c, 0] += dot(friction, u)
+                turned = times_transposed(pair.axes, friction)
                 for k in range(3):
                     for a in range(nodes):
-                        f[cells[c, a], k] += share(a, nodes, functions, place)[0] * turned[k]
+                        f[cells[c, a], k] += share(a, nodes, functions, xi)[0] * turned[k]
                     f[cells[c, nodes], k] -= turned[k]
                     out[c, FELT + k] -= turned[k]
                 if spins:
-                    moment = times_transposed(pair.axes, turned_by(pair.planar, cross(y, own)))
+                    moment = times_transposed(pair.axes, turned_by(pair.planar, cross(y, friction)))
                     for k in range(3):
                         f[cells[c, nodes + 1], k] -= moment[k]
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        found, z, q = np.empty((most * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        buffer, z, q = np.empty((limit * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
         by_y, by_u, pushes, arms = (
             np.empty((3, 3)),
             np.empty((3, 3)),
@@ -303,15 +303,15 @@ def kernels(depth, pieces, nodes, functions, spins):
         blocks[:] = 0.0
         for first in range(0, cells.shape[0] if not definite else 0, pieces):
             pushes[:] = 0.0
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                touch = touch_of(x, cells, data, nodes, functions, found, n)
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
+                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 place_moves(touch, touch.inner, nodes, functions, z)
                 add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_u)
                 if spins == 2:
-                    pair, place, y = touch.pair, touch.place, touch.spot.y
-                    u, _, _ = slip_of(v, cells, touch.c, nodes, spins, functions, pair, place, y)
-                    own = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
-                    add_push(pushes[touch.c - first], 1.0, own, place, nodes, functions)
+                    pair, xi, y = touch.pair, touch.place, touch.spot.y
+                    u, _, _ = slip_of(v, cells, touch.c, nodes, spins, functions, pair, xi, y)
+                    friction = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
+                    add_push(pushes[touch.c - first], 1.0, friction, xi, nodes, functions)
                     add_damping(damped, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
                 axes = paired(x, cells, data, c, nodes).axes
@@ -325,11 +325,11 @@ def kernels(depth, pieces, nodes, functions, spins):
 
     @kernel(STIFFNESS)
     def damping(t, x, v, blocks, cells, data, definite):
-        found, q, by_u = np.empty((most * pieces, columns)), np.empty((3, 3)), np.empty((3, 3))
+        buffer, q, by_u = np.empty((limit * pieces, columns)), np.empty((3, 3)), np.empty((3, 3))
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                touch = touch_of(x, cells, data, nodes, functions, found, n)
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
+                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u)
             for c in range(first, first + pieces):
                 turn_block(blocks, c, rows, paired(x, cells, data, c, nodes).axes, q)
@@ -340,8 +340,8 @@ def kernels(depth, pieces, nodes, functions, spins):
             deep = reject_step(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
             if deep > 0.0:
                 pair = pair_of(data, c, nodes)
-                most = SHALLOW * pair.damping * speed * (1.0 + pair.friction) + pair.friction
-                most = most * pair.stiffness * slope_of_power(pair.exponent, deep)
-                add_row_sums(rates, most, mass, cells, data, c, nodes, spins)
+                limit = SHALLOW * pair.damping * speed * (1.0 + pair.friction) + pair.friction
+                limit = limit * pair.stiffness * slope_of_power(pair.exponent, deep)
+                add_row_sums(rates, limit, mass, cells, data, c, nodes, spins)
 
     return force, stiffness, bound, damping

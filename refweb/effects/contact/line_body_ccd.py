@@ -37,22 +37,24 @@ def limits_of(family, bodies):
 
     The second is infinite where that is not known. They are those of a family and the bodies that its cells touch.
     """
-    own = [body for body in bodies if body.row in family.cells[:, 2]]
-    shown = [1.0 if b.shape.once else SHOWN if getattr(b.shape.depth(), "convex", True) else math.inf for b in own]
-    return MIDDLE * min(body.thickness for body in own), max(shown)
+    own_bodies = [body for body in bodies if body.row in family.cells[:, 2]]
+    observed = [
+        1.0 if b.shape.once else SHOWN if getattr(b.shape.depth(), "convex", True) else math.inf for b in own_bodies
+    ]
+    return MIDDLE * min(body.thickness for body in own_bodies), max(observed)
 
 
 @kernel(forceinline=True)
 def nearing(cells, c, nodes, kick, drift, v, f, inverse):
     """Largest way of a node of cell c less that of its body in a drift behind a kick [m]."""
-    most, b = 0.0, cells[c, nodes]
+    fastest, b = 0.0, cells[c, nodes]
     for a in range(nodes):
         i, square = cells[c, a], 0.0
         for k in range(3):
-            own = v[i, k] + kick * inverse[i, k] * f[i, k]
-            square += (own - v[b, k] - kick * inverse[b, k] * f[b, k]) ** 2
-        most = max(most, square)
-    return abs(drift) * math.sqrt(most)
+            velocity = v[i, k] + kick * inverse[i, k] * f[i, k]
+            square += (velocity - v[b, k] - kick * inverse[b, k] * f[b, k]) ** 2
+        fastest = max(fastest, square)
+    return abs(drift) * math.sqrt(fastest)
 
 
 @functools.cache
@@ -66,9 +68,9 @@ def passing(depth, nodes, functions, spins=0):
     if depth is None:
 
         @kernel()
-        def below(x, cells, data, c, share, room):
+        def below(x, cells, data, c, share, margin):
             away = math.sqrt(closest(x, cells, data, c, nodes, functions)[1])
-            return data[c, RADIUS] - away < share * data[c, RADIUS] - room
+            return data[c, RADIUS] - away < share * data[c, RADIUS] - margin
 
     else:
         from .contact_points import places
@@ -79,30 +81,33 @@ def passing(depth, nodes, functions, spins=0):
             from .nonconvex_contacts import STEEPEST as steepest
 
         @kernel()
-        def below(x, cells, data, c, share, room):
-            limit = share * thickness(pair_of(data, c, nodes).shape) - max(steepest, 1.0) * room
+        def below(x, cells, data, c, share, margin):
+            limit = share * thickness(pair_of(data, c, nodes).shape) - max(steepest, 1.0) * margin
             parts = 1
             while parts <= PARTS:
-                seen, most = -math.inf, -math.inf
+                deepest_seen, largest = -math.inf, -math.inf
                 for n in range(parts):
                     spot = within(x, cells, data, c, nodes, functions, (n + 0.5) / parts)
                     slope = steepest * math.sqrt(dot(spot.d, spot.d)) if steepest else abs(dot(spot.gradient, spot.d))
-                    seen, most = max(seen, spot.depth), max(most, spot.depth + 0.5 * slope / parts)
-                if most < limit:
+                    deepest_seen, largest = (
+                        max(deepest_seen, spot.depth),
+                        max(largest, spot.depth + 0.5 * slope / parts),
+                    )
+                if largest < limit:
                     return True
-                if not seen < limit:
+                if not deepest_seen < limit:
                     return False
                 parts *= 4
             return False
 
     @kernel(MEETS)
-    def meets(room, way, kick, drift, x, v, f, inverse, cells, data, met):
+    def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
         for c in range(cells.shape[0]):
-            own = room + nearing(cells, c, nodes, kick, drift, v, f, inverse)
-            reach = data[c, RADIUS] + own
+            allowance = margin + nearing(cells, c, nodes, kick, drift, v, f, inverse)
+            reach = data[c, RADIUS] + allowance
             if closest(x, cells, data, c, nodes, functions)[1] > reach * reach:
                 continue
-            if not below(x, cells, data, c, MIDDLE, own):
+            if not below(x, cells, data, c, MIDDLE, allowance):
                 met[0], met[1], met[2] = cells[c, 0], cells[c, 1], cells[c, nodes]
                 met[3] = 0 if below(x, cells, data, c, CORE, 0.0) else 1
                 return True

@@ -129,9 +129,9 @@ def direction(axis, y, pair, spins):
 
 
 @kernel(forceinline=True)
-def delassus(one, other, light, lighter):
+def delassus(tangent, direction, light, lighter):
     """J M⁻¹ Jᵀ between two directions [1/kg], by that of the places and that of the rotation along the axes."""
-    p, q, r, s = one.axis, other.axis, one.arm, other.lever
+    p, q, r, s = tangent.axis, direction.axis, tangent.arm, direction.lever
     places = p[0] * q[0] * light[0] + p[1] * q[1] * light[1] + p[2] * q[2] * light[2]
     return places + r[0] * s[0] * lighter[0] + r[1] * s[1] * lighter[1] + r[2] * s[2] * lighter[2]
 
@@ -147,11 +147,11 @@ def mixture(c, p, s, q):
 
 
 @kernel(forceinline=True)
-def set_direction(touches, n, i, own):
+def set_direction(touches, n, i, row):
     """Write direction i of a contact."""
     for k in range(3):
-        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = own.axis[k], own.lever[k]
-        touches[n, ARMS + 3 * i + k] = own.arm[k]
+        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = row.axis[k], row.lever[k]
+        touches[n, ARMS + 3 * i + k] = row.arm[k]
 
 
 @kernel(forceinline=True)
@@ -178,22 +178,22 @@ def set_touch(touches, n, touch, cells, v, inverse, spins, functions):
         near * near * inverse[a, 2] + far * far * inverse[b, 2] + inverse[body, 2],
     )
     lighter = (inverse[spin, 0], inverse[spin, 1], inverse[spin, 2]) if spins else (0.0, 0.0, 0.0)
-    normal, one, other = (
+    normal, tangent, second = (
         direction(g, y, pair, spins), direction(e, y, pair, spins), direction(cross(g, e), y, pair, spins)
     )  # fmt: skip
-    first, last = delassus(one, one, light, lighter), delassus(other, other, light, lighter)
-    mixed = delassus(one, other, light, lighter)
+    first, last = delassus(tangent, tangent, light, lighter), delassus(second, second, light, lighter)
+    mixed = delassus(tangent, second, light, lighter)
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
         cosine, sine = math.cos(angle), math.sin(angle)
-        one, other = mixture(cosine, one, sine, other), mixture(cosine, other, -sine, one)
-        first, last = delassus(one, one, light, lighter), delassus(other, other, light, lighter)
+        tangent, second = mixture(cosine, tangent, sine, second), mixture(cosine, second, -sine, tangent)
+        first, last = delassus(tangent, tangent, light, lighter), delassus(second, second, light, lighter)
     set_direction(touches, n, 0, normal)
-    set_direction(touches, n, 1, one)
-    set_direction(touches, n, 2, other)
+    set_direction(touches, n, 1, tangent)
+    set_direction(touches, n, 2, second)
     touches[n, OWN], touches[n, OWN + 1], touches[n, OWN + 2] = delassus(normal, normal, light, lighter), first, last
-    touches[n, MIXED] = delassus(normal, one, light, lighter)
-    touches[n, MIXED + 1] = delassus(normal, other, light, lighter)
+    touches[n, MIXED] = delassus(normal, tangent, light, lighter)
+    touches[n, MIXED + 1] = delassus(normal, second, light, lighter)
     for i in range(3):
         touches[n, START + i] = along(touches, n, i, v)
         touches[n, FORCES + i] = 0.0
@@ -222,21 +222,21 @@ def meeting(depth, pieces, functions, spins, more=alone):
     more : kernel
         Has the arguments of `alone`.
     """
-    _, _, contacts, touch_of, (most, columns) = places(depth, spins)
+    _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
 
     @kernel(DETECT)
     def meet(h, x, v, inverse, cells, data, touches, begin):
-        found, count = np.empty((most * pieces, columns)), begin
+        buffer, count = np.empty((limit * pieces, columns)), begin
         at_node = np.full(x.shape[0], -1)
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, 2, functions, found)):
+            for n in range(contacts(x, cells, data, first, pieces, 2, functions, buffer)):
                 if count < touches.shape[0]:
-                    touch = touch_of(x, cells, data, 2, functions, found, n)
+                    touch = touch_of(x, cells, data, 2, functions, buffer, n)
                     if not touch.inner:
                         node = cells[touch.c, 0 if touch.place < 0.5 else 1]
-                        other = at_node[node]
-                        if other >= 0 and int(touches[other, ROWS + 2]) == cells[touch.c, 2]:
-                            touches[other, PUSH] += rubbed_by(touch) * facing(touch.spot.gradient)[0]
+                        row = at_node[node]
+                        if row >= 0 and int(touches[row, ROWS + 2]) == cells[touch.c, 2]:
+                            touches[row, PUSH] += rubbed_by(touch) * facing(touch.spot.gradient)[0]
                             continue
                         at_node[node] = count
                     set_touch(touches, count, touch, cells, v, inverse, spins, functions)

@@ -21,7 +21,7 @@ SAMPLES = 8
 
 
 @kernel()
-def point(x, cells, data, c, nodes, functions, place):
+def point(x, cells, data, c, nodes, functions, xi):
     """p, p' and p'' at a place of cell c, from the centre."""
     b = cells[c, nodes]
     p0 = p1 = p2 = d0 = d1 = d2 = e0 = e1 = e2 = 0.0
@@ -32,19 +32,19 @@ def point(x, cells, data, c, nodes, functions, place):
             c0 += weight * (data[c, at] + x[i, 0] - x[b, 0])
             c1 += weight * (data[c, at + 1] + x[i, 1] - x[b, 1])
             c2 += weight * (data[c, at + 2] + x[i, 2] - x[b, 2])
-        e0, e1, e2 = e0 * place + 2.0 * d0, e1 * place + 2.0 * d1, e2 * place + 2.0 * d2
-        d0, d1, d2 = d0 * place + p0, d1 * place + p1, d2 * place + p2
-        p0, p1, p2 = p0 * place + c0, p1 * place + c1, p2 * place + c2
+        e0, e1, e2 = e0 * xi + 2.0 * d0, e1 * xi + 2.0 * d1, e2 * xi + 2.0 * d2
+        d0, d1, d2 = d0 * xi + p0, d1 * xi + p1, d2 * xi + p2
+        p0, p1, p2 = p0 * xi + c0, p1 * xi + c1, p2 * xi + c2
     return (p0, p1, p2), (d0, d1, d2), (e0, e1, e2)
 
 
 @kernel()
-def share(a, nodes, functions, place):
+def share(a, nodes, functions, xi):
     """(N, N') of node a."""
     value = slope = 0.0
     for n in range(nodes - 1, -1, -1):
-        slope = slope * place + value
-        value = value * place + functions[n * nodes + a]
+        slope = slope * xi + value
+        value = value * xi + functions[n * nodes + a]
     return value, slope
 
 
@@ -55,14 +55,14 @@ def lightness(mass, cells, c, nodes):
     Nodes without mass are supported and have no row, or are carried by bodies; where all are it is 1. 0 for a body
     without mass.
     """
-    least, body = 0.0, mass[cells[c, nodes]]
+    lightest, body = 0.0, mass[cells[c, nodes]]
     for a in range(nodes):
-        own = mass[cells[c, a]]
-        if own > 0.0 and (least == 0.0 or own < least):
-            least = own
+        node_mass = mass[cells[c, a]]
+        if node_mass > 0.0 and (lightest == 0.0 or node_mass < lightest):
+            lightest = node_mass
     if not body > 0.0:
         return 0.0
-    return min(math.sqrt(least / body), 1.0) if least > 0.0 else 1.0
+    return min(math.sqrt(lightest / body), 1.0) if lightest > 0.0 else 1.0
 
 
 @kernel(forceinline=True)
@@ -70,8 +70,8 @@ def far(x, cells, data, c, nodes):
     """Tell if the whole of cell c is certainly out of reach: its first node is, by more than twice its length."""
     b, first, length = cells[c, nodes], 0.0, 0.0
     for k in range(3):
-        here = data[c, AWAY + k] + x[cells[c, 0], k] - x[b, k]
-        first += here * here
+        distance = data[c, AWAY + k] + x[cells[c, 0], k] - x[b, k]
+        first += distance * distance
     for a in range(1, nodes):
         line = 0.0
         for k in range(3):
@@ -87,34 +87,34 @@ def far(x, cells, data, c, nodes):
 @kernel()
 def closest(x, cells, data, c, nodes, functions):
     """(place of the point of cell c nearest the centre, its squared distance)."""
-    place = 0.0
+    xi = 0.0
     if nodes == 2:
         p, d, _ = point(x, cells, data, c, nodes, functions, 0.0)
         square = dot(d, d)
         if square > 0.0:
-            place = min(max(-dot(p, d) / square, 0.0), 1.0)
+            xi = min(max(-dot(p, d) / square, 0.0), 1.0)
     else:
         best = math.inf
         for n in range(SAMPLES + 1):
             p, d, _ = point(x, cells, data, c, nodes, functions, n / SAMPLES)
             if dot(p, p) < best:
-                best, place = dot(p, p), n / SAMPLES
-        low, high = max(place - 1.0 / SAMPLES, 0.0), min(place + 1.0 / SAMPLES, 1.0)
+                best, xi = dot(p, p), n / SAMPLES
+        low, high = max(xi - 1.0 / SAMPLES, 0.0), min(xi + 1.0 / SAMPLES, 1.0)
         for _ in range(60):  # Newton on p·p', by bisection where it leaves the bracket
-            p, d, e = point(x, cells, data, c, nodes, functions, place)
+            p, d, e = point(x, cells, data, c, nodes, functions, xi)
             slope, curve = dot(p, d), dot(d, d) + dot(p, e)
             if slope > 0.0:
-                high = place
+                high = xi
             else:
-                low = place
-            step = place - slope / curve if curve > 0.0 else -1.0
+                low = xi
+            step = xi - slope / curve if curve > 0.0 else -1.0
             if not low <= step <= high:
                 step = 0.5 * (low + high)
-            moved, place = abs(step - place), step
+            moved, xi = abs(step - xi), step
             if moved <= 1e-15:
                 break
-    p, _, _ = point(x, cells, data, c, nodes, functions, place)
-    return place, dot(p, p)
+    p, _, _ = point(x, cells, data, c, nodes, functions, xi)
+    return xi, dot(p, p)
 
 
 @kernel(forceinline=True)
@@ -123,9 +123,9 @@ def touched(x, cells, data, first, pieces, nodes, functions):
     nearest, where, best = -1, 0.0, math.inf
     for c in range(first, first + pieces):
         if not far(x, cells, data, c, nodes):
-            place, square = closest(x, cells, data, c, nodes, functions)
+            xi, square = closest(x, cells, data, c, nodes, functions)
             if square < best:
-                nearest, where, best = c, place, square
+                nearest, where, best = c, xi, square
     return (nearest if best < data[first, RADIUS] ** 2 else -1), where, best
 
 
@@ -145,8 +145,8 @@ def in_box(spins):
     def in_box(skin, x, cells, data, c, nodes, functions):
         if not in_sphere(skin, x, cells, data, c, nodes, functions):
             return False
-        middle, way, _ = point(x, cells, data, c, nodes, functions, 0.5)
-        pair, square, reach = paired(x, cells, data, c, nodes), 0.0, skin + 0.5 * math.sqrt(dot(way, way))
+        middle, vector, _ = point(x, cells, data, c, nodes, functions, 0.5)
+        pair, square, reach = paired(x, cells, data, c, nodes), 0.0, skin + 0.5 * math.sqrt(dot(vector, vector))
         middle = times(pair.axes, middle)
         if spins == 2:
             middle = from_shape(middle, data, c, nodes)

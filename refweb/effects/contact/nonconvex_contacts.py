@@ -44,10 +44,10 @@ COLUMNS = 6
 
 
 @kernel()
-def note(found, n, c, place, inner, weight, rise):
+def note(buffer, n, c, xi, inner, weight, rise):
     """Write a contact to a row."""
-    found[n, 0], found[n, 1], found[n, 2] = c, place, inner
-    found[n, WEIGHT], found[n, SHARE], found[n, RISE] = weight, max(weight, 0.0), rise
+    buffer[n, 0], buffer[n, 1], buffer[n, 2] = c, xi, inner
+    buffer[n, WEIGHT], buffer[n, SHARE], buffer[n, RISE] = weight, max(weight, 0.0), rise
 
 
 @kernel()
@@ -57,20 +57,20 @@ def least_between(begin, slope, end, last):
     b, a = 6.0 * mean - 4.0 * slope - 2.0 * last, 3.0 * (slope + last - 2.0 * mean)
     root = math.sqrt(max(b * b - 4.0 * a * slope, 0.0))
     q = -0.5 * (b + math.copysign(root, b))
-    for place in (slope / q if q != 0.0 else -1.0, q / a if a != 0.0 else -1.0):
-        if 0.0 < place < 1.0:
-            return place
+    for candidate in (slope / q if q != 0.0 else -1.0, q / a if a != 0.0 else -1.0):
+        if 0.0 < candidate < 1.0:
+            return candidate
     return slope / (slope - last)
 
 
 @kernel()
-def share_out(found, begin, end):
+def share_out(buffer, begin, end):
     """Write the shares of the maxima among the places between the ends of an element."""
     for n in range(begin, end):
-        if found[n, WEIGHT] > 0.0:
-            before = found[n - 1, RISE] if n > begin and found[n - 1, WEIGHT] < 0.0 else 0.0
-            after = found[n + 1, RISE] if n + 1 < end and found[n + 1, WEIGHT] < 0.0 else 0.0
-            found[n, SHARE] = max(1.0 - 0.5 * (before + after) / found[n, RISE], 0.0)
+        if buffer[n, WEIGHT] > 0.0:
+            before = buffer[n - 1, RISE] if n > begin and buffer[n - 1, WEIGHT] < 0.0 else 0.0
+            after = buffer[n + 1, RISE] if n + 1 < end and buffer[n + 1, WEIGHT] < 0.0 else 0.0
+            buffer[n, SHARE] = max(1.0 - 0.5 * (before + after) / buffer[n, RISE], 0.0)
 
 
 @functools.cache
@@ -78,21 +78,21 @@ def several(within, rise):
     """(kernel of the deepest place of an element, kernel of all contacts of a line), as in `places`."""
 
     @kernel()
-    def between(x, cells, data, c, nodes, functions, low, high, place, sign):
+    def between(x, cells, data, c, nodes, functions, low, high, xi, sign):
         pair, moved = pair_of(data, c, nodes), math.inf
         for _ in range(100):  # Newton's method, by bisection where it leaves the bracket or comes no nearer
-            value, curve = rise(pair, place, within(x, cells, data, c, nodes, functions, place))
+            value, curve = rise(pair, xi, within(x, cells, data, c, nodes, functions, xi))
             if sign * value > 0.0:
-                low = place
+                low = xi
             else:
-                high = place
-            step = place - value / curve if sign * curve < 0.0 else -1.0
-            if not low <= step <= high or abs(step - place) > 0.5 * moved:
+                high = xi
+            step = xi - value / curve if sign * curve < 0.0 else -1.0
+            if not low <= step <= high or abs(step - xi) > 0.5 * moved:
                 step = 0.5 * (low + high)
-            moved, place = abs(step - place), step
+            moved, xi = abs(step - xi), step
             if moved <= 1e-15:
                 break
-        return place
+        return xi
 
     @kernel()
     def dip(x, cells, data, c, nodes, functions, low, high, begin, end):
@@ -102,20 +102,20 @@ def several(within, rise):
             width = high - low
             if not (sign * begin[1] < 0.0 and sign * end[1] > 0.0):
                 break
-            place = low + width * least_between(begin[0], width * begin[1], end[0], width * end[1])
-            value, curve = rise(pair, place, within(x, cells, data, c, nodes, functions, place))
+            xi = low + width * least_between(begin[0], width * begin[1], end[0], width * end[1])
+            value, curve = rise(pair, xi, within(x, cells, data, c, nodes, functions, xi))
             if (value > 0.0) != (sign > 0.0):
-                return place
+                return xi
             if abs(value) > abs(curve) * width:
                 break
             if sign * curve < 0.0:
-                low, begin = place, (value, curve)
+                low, begin = xi, (value, curve)
             else:
-                high, end = place, (value, curve)
+                high, end = xi, (value, curve)
         return 2.0
 
     @kernel()
-    def scan(x, cells, data, c, nodes, functions, found, begin):
+    def scan(x, cells, data, c, nodes, functions, buffer, begin):
         """Write the contacts of a cell between its ends to rows from ``begin`` on; (row behind, depths of its ends)."""
         pair, count = pair_of(data, c, nodes), begin
         _, d, _ = point(x, cells, data, c, nodes, functions, 0.5)
@@ -128,20 +128,20 @@ def several(within, rise):
         parts = int(min(max(2.0 * steepest / pair.shape.fine, LEAST), SAMPLES))
         n, last_n, sure, low, before, deep_before = 0, -1, 0, 0.0, (0.0, 0.0), 0.0
         while True:
-            place = n / parts
-            spot = within(x, cells, data, c, nodes, functions, place)
+            xi = n / parts
+            spot = within(x, cells, data, c, nodes, functions, xi)
             clear = deep_before + spot.depth + steepest * (n - last_n) / parts <= 0.0
             if not clear and n > sure:  # look again nearer to what was certain
                 n = sure
                 continue
-            value = rise(pair, place, spot)
+            value = rise(pair, xi, spot)
             if n == 0:
                 first = spot.depth
             elif not clear and n == last_n + 1:
                 turn = (before[0] > 0.0) != (value[0] > 0.0)
-                inner = 2.0 if turn else dip(x, cells, data, c, nodes, functions, low, place, before, value)
+                inner = 2.0 if turn else dip(x, cells, data, c, nodes, functions, low, xi, before, value)
                 for k in range(1 if turn else 2 if inner < 1.0 else 0):
-                    begins, ends = (low, place) if turn else (low, inner) if k == 0 else (inner, place)
+                    begins, ends = (low, xi) if turn else (low, inner) if k == 0 else (inner, xi)
                     sign = 1.0 if (before[0] > 0.0) == (k == 0) else -1.0
                     at = before[0] / (before[0] - value[0]) if turn else 0.5
                     at = begins + at * (ends - begins)
@@ -149,38 +149,38 @@ def several(within, rise):
                     deep = within(x, cells, data, c, nodes, functions, at).depth
                     if deep > 0.0 and 0.0 < at < 1.0:
                         felt = 4.0 * at * (1.0 - at) * deep * power_of_depth(pair.exponent, deep)
-                        note(found, count, c, at, 1.0, sign, felt)
+                        note(buffer, count, c, at, 1.0, sign, felt)
                         count += 1
             if n == parts:
                 last = spot.depth
                 break
             far_on = -spot.depth / steepest * parts if spot.depth < 0.0 else 0.0
-            last_n, low, before, deep_before = n, place, value, spot.depth
+            last_n, low, before, deep_before = n, xi, value, spot.depth
             sure, n = min(n + max(int(far_on), 1), parts), min(n + max(int(FURTHER * far_on), 1), parts)
-        share_out(found, begin, count)
+        share_out(buffer, begin, count)
         return count, first, last
 
     @kernel()
     def deepest(x, cells, data, c, nodes, functions):
-        found, where, most = np.empty((PLACES, COLUMNS)), 0.0, -math.inf
-        count, first, last = scan(x, cells, data, c, nodes, functions, found, 0)
-        most = max(first, last)
+        buffer, where, largest = np.empty((PLACES, COLUMNS)), 0.0, -math.inf
+        count, first, last = scan(x, cells, data, c, nodes, functions, buffer, 0)
+        largest = max(first, last)
         for n in range(count):
-            deep = within(x, cells, data, c, nodes, functions, found[n, 1]).depth
-            if deep > most:
-                where, most = found[n, 1], deep
-        return where, most
+            deep = within(x, cells, data, c, nodes, functions, buffer[n, 1]).depth
+            if deep > largest:
+                where, largest = buffer[n, 1], deep
+        return where, largest
 
     @kernel()
-    def contacts(x, cells, data, first, pieces, nodes, functions, found):
+    def contacts(x, cells, data, first, pieces, nodes, functions, buffer):
         count = 0
         for c in range(first, first + pieces):
             if far(x, cells, data, c, nodes):
                 continue
-            count, begin, end = scan(x, cells, data, c, nodes, functions, found, count)
+            count, begin, end = scan(x, cells, data, c, nodes, functions, buffer, count)
             for at, deep in ((0.0, begin), (1.0, end)):
                 if deep > 0.0:
-                    note(found, count, c, at, 0.0, 1.0, 0.0)
+                    note(buffer, count, c, at, 0.0, 1.0, 0.0)
                     count += 1
         return count
 

@@ -72,11 +72,11 @@ def rounded_up(value):
     return float(f"{math.ceil(value / unit * (1.0 - 1e-12)) * unit:.1e}")
 
 
-def too_soft(deepest, where, most, names):
-    """The `PenetrationError` of a contact deeper than ``most`` [m], whose stiffness was chosen for some bodies."""
+def too_soft(deepest, where, limit, names):
+    """The `PenetrationError` of a contact deeper than ``limit`` [m], whose stiffness was chosen for some bodies."""
     stiffer = rounded_up(max(deepest.enough, STIFFER * deepest.stiffness))
     return PenetrationError(
-        f"{where} with stiffness = {deepest.stiffness:g}, {most:.3g} m are allowed; repeated with stiffness = "
+        f"{where} with stiffness = {deepest.stiffness:g}, {limit:.3g} m are allowed; repeated with stiffness = "
         f"{stiffer:g}",
         dict.fromkeys(names, stiffer),
     )
@@ -153,15 +153,15 @@ class Deepest(NamedTuple):
         In the core the depth says little: it is no less than what the energy at the start asks for.
         """
         share = self.overlap / (AIM * allowed(self.body))
-        own = self.stiffness * share ** (self.exponent + self.moving)
-        return rounded_up(max(own, self.least) if self.in_core else own)
+        factor = self.stiffness * share ** (self.exponent + self.moving)
+        return rounded_up(max(factor, self.least) if self.in_core else factor)
 
     def plain(self):
         """Convert to values for ``run.json``."""
         size = allowed(self.body)
-        own = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
-        own |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
-        return own | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
+        values = {"overlap": self.overlap, "time": self.time if self.overlap > 0.0 else None, "line": self.line}
+        values |= {"allowed": size if math.isfinite(size) else None, "stiffness": self.stiffness, "chosen": self.chosen}
+        return values | ({"surface_error": error} if (error := self.body.shape.error) is not None else {})
 
     def _where(self):
         instant = f"t = {self.time:.6g} s" if self.moving else f"load step {self.time:g}"
@@ -237,15 +237,15 @@ class Overlaps:
         return self.system.net.bodies
 
     def _deepest(self, i, overlap, time, line):
-        body, (stiffness, exponent), least = self.bodies[i], self._laws[i], 0.0
+        body, (stiffness, exponent), smallest = self.bodies[i], self._laws[i], 0.0
         if overlap > CORE * body.thickness:
-            least = first_stiffness(self.system, body, exponent, self._load_steps)
+            smallest = first_stiffness(self.system, body, exponent, self._load_steps)
         if self._moving and time == 0.0:
             self._initial[i] = overlap
         net, unmoved = self.system.net, self.system.held
-        held = overlap > allowed(body) and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
-        own = stiffness, exponent, self._moving, least, body.name in self._chosen, self._initial[i], held
-        return Deepest(body, overlap, time, line, *own)
+        fixed_pair = overlap > allowed(body) and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
+        fields = stiffness, exponent, self._moving, smallest, body.name in self._chosen, self._initial[i], fixed_pair
+        return Deepest(body, overlap, time, line, *fields)
 
     def stiffness_of(self, body):
         """Stiffness of the contact of a body [N/m^p]."""
@@ -329,8 +329,8 @@ def first_stiffness(system, body, exponent, load_steps=()):
     if net.quasi_static:
         return rounded_up(max(asked, float(lines.max())))
     asked = max(asked, (exponent + 1.0) * _energy(system, body) / deep ** (exponent + 1.0))
-    if own := [pair for pair in pairs_of(system) if body in pair]:
-        asked = max([asked, *(first_between(system, pair, exponent) for pair in own)])
+    if pairs := [pair for pair in pairs_of(system) if body in pair]:
+        asked = max([asked, *(first_between(system, pair, exponent) for pair in pairs)])
     return rounded_up(asked if asked > 0.0 else float(lines.min()))
 
 
@@ -375,11 +375,11 @@ def _push(system, body, t):
 def _energy(system, body):
     """½ μ v² of a web and a body that meet, and the energy by which that turns [J], see `first_stiffness`."""
     net, nodes = system.net, system.net.nodes
-    held = system.supported[:nodes]
-    free = np.flatnonzero(~held.all(axis=1))
+    fixed = system.supported[:nodes]
+    free = np.flatnonzero(~fixed.all(axis=1))
     if not len(free):
         free = np.arange(nodes)
-    web, own = float(net.mass[free].sum()), float(net.mass[body.row])
+    web, body_mass = float(net.mass[free].sum()), float(net.mass[body.row])
     v, away = system.initial_velocity(), net.points[free] - net.points[body.row]
     distance, speed = np.linalg.norm(away, axis=1), np.linalg.norm(v[free] - v[body.row], axis=1)
     nearest = int(distance.argmin())
@@ -390,11 +390,11 @@ def _energy(system, body):
         system.drive(t, np.zeros_like(v), driven)
         fastest = max(fastest, float(np.linalg.norm(driven, axis=1).max()))
     force = np.where(system.supported, 0.0, system.outer_force(0.0))
-    falls = np.zeros(3) if body.fixed else force[body.row] / own
-    carried = held.any() and not body.fixed
+    falls = np.zeros(3) if body.fixed else force[body.row] / body_mass
+    carried = fixed.any() and not body.fixed
     along = np.zeros(3) if carried or not web > 0.0 else force[free].sum(axis=0) / web
     gained = 2.0 * float(np.linalg.norm(falls - along)) * max(float(distance[nearest]) - body.thickness, 0.0)
-    mass = web if body.fixed else own if held.any() else own * web / (own + web)
+    mass = web if body.fixed else body_mass if fixed.any() else body_mass * web / (body_mass + web)
     turning = 0.0
     if body.turn is not None:
         turning = 0.5 * body.moment * float(v[body.spin] @ body.turning(np.zeros_like(v), v))

@@ -74,8 +74,8 @@ class DeepestPair(NamedTuple):
     @property
     def enough(self):
         """Stiffness that would do [N/m^p]: of an overlap that is `AIM` of what is allowed."""
-        own = self.stiffness * (self.overlap / (AIM * self.allowed)) ** (self.exponent + 1.0)
-        return rounded_up(max(own, self.least) if self.in_core else own)
+        factor = self.stiffness * (self.overlap / (AIM * self.allowed)) ** (self.exponent + 1.0)
+        return rounded_up(max(factor, self.least) if self.in_core else factor)
 
     def plain(self):
         """Convert to values for ``run.json``."""
@@ -143,8 +143,8 @@ class PairOverlaps:
         stiffness, exponent, *_ = self._contact.law_between(*bodies)
         chosen = tuple(body.name for body in bodies if body.name in self._chosen)
         deep = overlap > CORE * min(body.thickness for body in bodies)
-        least = first_between(self._system, bodies, exponent) if deep else 0.0
-        return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, least, initial)
+        smallest = first_between(self._system, bodies, exponent) if deep else 0.0
+        return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, smallest, initial)
 
     def note(self, i, overlap, time):
         """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
@@ -181,19 +181,19 @@ class PairOverlaps:
         if self._way is None:
             return "not certified"
         for pair in self.found:
-            if not pair.overlap + (way := self._way(pair)) < pair.thickness:
+            if not pair.overlap + (path := self._way(pair)) < pair.thickness:
                 when = f", deepest at t = {pair.time:.6g} s" if pair.overlap > 0.0 else ""
                 return (
-                    f"not certified: bodies {pair.name} may come nearer by {way:.3g} m in a step, and their middles "
+                    f"not certified: bodies {pair.name} may come nearer by {path:.3g} m in a step, and their middles "
                     f"are {pair.thickness:.3g} m below their surfaces{when}"
                 )
         return "certified"
 
-    def _told(self, time, one, other, *_):
+    def _told(self, time, body_a, body_b, *_):
         """The same of steps that were followed, of which two bodies have met at a time, or none."""
         if not math.isfinite(time):
             return "certified"
-        pair = next(pair for pair in self.found if [body.row for body in pair.bodies] == [one, other])
+        pair = next(pair for pair in self.found if [body.row for body in pair.bodies] == [body_a, body_b])
         return (
             f"not certified: bodies {pair.name} came as near each other as {pair.thickness:.3g} m below a surface, "
             f"where they may pass, at t = {time:.6g} s"

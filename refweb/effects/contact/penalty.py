@@ -105,23 +105,23 @@ def foresight(depth, spins=0):
 
     @kernel()
     def reject_step(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
-        own, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
-        place, deep = deepest(x, cells, data, c, nodes, functions)
+        stiffness_sum, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
+        xi, deep = deepest(x, cells, data, c, nodes, functions)
         first = within(x, cells, data, c, nodes, functions, 0.0).depth
         last = within(x, cells, data, c, nodes, functions, 1.0).depth
-        _, d, _ = point(x, cells, data, c, nodes, functions, place)
+        _, d, _ = point(x, cells, data, c, nodes, functions, xi)
         length = math.sqrt(dot(d, d))
         deep = max(deep, first, last)
         nearest = 0.5 * (first + last + length) if nodes == 2 else max(first, last) + float(nodes) * length
         if max(deep, nearest) + reach <= 0.0:
             return Foreseen(0.0, length)
         for a in range(nodes):
-            own += mass[cells[c, a]]
-        own = own * body / (own + body) if body > 0.0 else own
+            stiffness_sum += mass[cells[c, a]]
+        stiffness_sum = stiffness_sum * body / (stiffness_sum + body) if body > 0.0 else stiffness_sum
         more = min(0.5 * reach, thickness(pair.shape))
         if speed > 0.0:
             power = pair.exponent + 1.0
-            more = min(more, (0.5 * power * own * speed * speed / pair.stiffness) ** (1.0 / power))
+            more = min(more, (0.5 * power * stiffness_sum * speed * speed / pair.stiffness) ** (1.0 / power))
         if not careful:
             more = min(SHALLOW * more, deep if deep > 0.0 else math.inf)
         return Foreseen(max(deep, 0.0) + more, length)
@@ -132,23 +132,23 @@ def foresight(depth, spins=0):
 @kernel(forceinline=True)
 def add_stiffness(blocks, touch, definite, nodes, functions, z):
     """Add what a contact has of the stiffness, along the axes of the body; ``z`` is what `place_moves` writes."""
-    c, place, pair, spot = touch.c, touch.place, touch.pair, touch.spot
+    c, xi, pair, spot = touch.c, touch.place, touch.pair, touch.spot
     deep, d, g, h = spot.depth, spot.d, spot.gradient, spot.hessian
-    w, w1, _ = window(pair.once, place, touch.inner)
+    w, w1, _ = window(pair.once, xi, touch.inner)
     steep = touch.weight * pair.stiffness * w * slope_of_power(pair.exponent, deep)
     push = touch.weight * pair.stiffness * power_of_depth(pair.exponent, deep)
     across = w1 * push + steep * dot(g, d)
     turned, push = hessian_times(h, d), w * push
     matrix = ((h[0], h[1], h[2]), (h[1], h[3], h[4]), (h[2], h[4], h[5]))
     for a in range(nodes + 1):
-        own, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+        weight_a, slope = share(a, nodes, functions, xi) if a < nodes else (-1.0, 0.0)
         for b in range(nodes + 1):
-            other = share(b, nodes, functions, place)[0] if b < nodes else -1.0
+            weight_b = share(b, nodes, functions, xi)[0] if b < nodes else -1.0
             for i in range(3):
-                tilt = across * own * g[i] + push * (own * turned[i] + slope * g[i])
+                tilt = across * weight_a * g[i] + push * (weight_a * turned[i] + slope * g[i])
                 for j in range(3):
                     value = steep * g[i] * g[j] + (0.0 if definite else push * matrix[i][j])
-                    blocks[c, 3 * a + i, 3 * b + j] += own * other * value + tilt * z[b, j]
+                    blocks[c, 3 * a + i, 3 * b + j] += weight_a * weight_b * value + tilt * z[b, j]
 
 
 @kernel(forceinline=True)
@@ -162,22 +162,22 @@ def add_row_sums(rates, reject_step, speed, mass, cells, data, c, nodes, spins):
     deep, length, pair = reject_step.depth, reject_step.length, pair_of(data, c, nodes)
     steep = scale * pair.stiffness * slope_of_power(pair.exponent, deep)
     delta = lightness(mass, cells, c, nodes)
-    b, thick, own = cells[c, nodes], thickness(pair.shape), SPREAD * steep
+    b, thick, steepest = cells[c, nodes], thickness(pair.shape), SPREAD * steep
     if 0.0 < pair.shape.fine < math.inf:
-        own *= HOLLOW
+        steepest *= HOLLOW
     if pair.once:  # a line turns under a push that slides along it
         tilt = scale * deep / length if length > 0.0 else 0.0
-        own = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
+        steepest = steep * (1.0 + 3.0 * tilt + (2.0 * tilt * thick / length if length > 0.0 else 0.0))
     spun = 0.0
     if spins:
         r, arm = cells[c, nodes + 1], lever_of(data, c, nodes)
         spun = min(delta * arm * math.sqrt(mass[b] / mass[r]), 1.0)
-        rates[r] += own * arm * arm * (1.0 + (1.0 + delta) / spun)
-    body = own * (1.0 + (1.0 + spun) / delta) if delta > 0.0 else own
+        rates[r] += steepest * arm * arm * (1.0 + (1.0 + delta) / spun)
+    body = steepest * (1.0 + (1.0 + spun) / delta) if delta > 0.0 else steepest
     rates[b] = max(rates[b] + body, (10.0 * speed / thick) ** 2 * mass[b])
     for a in range(nodes):
         r = cells[c, a]
-        rates[r] = max(rates[r] + own * (1.0 + delta + spun), (10.0 * speed / thick) ** 2 * mass[r])
+        rates[r] = max(rates[r] + steepest * (1.0 + delta + spun), (10.0 * speed / thick) ** 2 * mass[r])
 
 
 @functools.cache
@@ -198,16 +198,16 @@ def kernels(depth, pieces, nodes, functions, spins=0):
         2 where the last rows of a cell are those of the rotation of the body, else 0.
     """
     arity, paired = nodes + 1 + spins, pairing(spins)
-    _, _, contacts, touch_of, (most, columns) = places(depth, spins)
+    _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
     reject_step = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
-        found = np.empty((most * pieces, columns))
+        buffer = np.empty((limit * pieces, columns))
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                touch = touch_of(x, cells, data, nodes, functions, found, n)
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
+                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 c, push = touch.c, push_of(touch)
                 out[c, 0] = max(out[c, 0], touch.spot.depth)
                 g = times_transposed(touch.pair.axes, touch.spot.gradient)
@@ -223,24 +223,24 @@ def kernels(depth, pieces, nodes, functions, spins=0):
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
-        found = np.empty((most * pieces, columns))
+        buffer = np.empty((limit * pieces, columns))
         out[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                touch = touch_of(x, cells, data, nodes, functions, found, n)
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
+                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 pair, deep = touch.pair, touch.spot.depth
                 stored = pair.stiffness / (pair.exponent + 1.0) * power_of_depth(pair.exponent, deep) * deep
                 out[touch.c] += touch.weight * window(pair.once, touch.place, touch.inner)[0] * stored
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
-        found, z, q = np.empty((most * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
+        buffer, z, q = np.empty((limit * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
         pushes, arms, turning = np.empty((pieces, nodes, 3)), np.empty((nodes, 3)), spins > 0 and not definite
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
             pushes[:] = 0.0
-            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, found)):
-                touch = touch_of(x, cells, data, nodes, functions, found, n)
+            for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
+                touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 if definite and touch.weight < 0.0:
                     continue
                 place_moves(touch, touch.inner and not definite, nodes, functions, z)

@@ -19,10 +19,10 @@ from .pair import AWAY
 
 
 @kernel()
-def add_push(pushes, size, along, place, nodes, functions):
+def add_push(pushes, size, along, xi, nodes, functions):
     """Add the forces on the nodes of an element, ``pushes (nodes, 3)``, of one at a place."""
     for a in range(nodes):
-        value, _ = share(a, nodes, functions, place)
+        value, _ = share(a, nodes, functions, xi)
         for k in range(3):
             pushes[a, k] += value * size * along[k]
 
@@ -93,9 +93,9 @@ def add_velocities(block, damping, v, cells, c, nodes, axes):
     at = 3 * (nodes + 1)
     for b in range(nodes + 2):
         r = cells[c, b]
-        own = times(axes, (v[r, 0], v[r, 1], v[r, 2]))
+        omega = times(axes, (v[r, 0], v[r, 1], v[r, 2]))
         for i in range(at + 3):
             k0, k1, k2 = damping[i, 3 * b], damping[i, 3 * b + 1], damping[i, 3 * b + 2]
-            block[i, at] -= k2 * own[1] - k1 * own[2]
-            block[i, at + 1] -= k0 * own[2] - k2 * own[0]
-            block[i, at + 2] -= k1 * own[0] - k0 * own[1]
+            block[i, at] -= k2 * omega[1] - k1 * omega[2]
+            block[i, at + 1] -= k0 * omega[2] - k2 * omega[0]
+            block[i, at + 2] -= k1 * omega[0] - k0 * omega[1]

@@ -40,19 +40,19 @@ def kernels(pieces, nodes, functions):
             for c in range(first, first + pieces):
                 for k in range(CONTACT_COLUMNS):
                     out[c, k] = 0.0
-            c, place, square = touched(x, cells, data, first, pieces, nodes, functions)
+            c, xi, square = touched(x, cells, data, first, pieces, nodes, functions)
             if c < 0:
                 continue
             distance = math.sqrt(square)
             out[c, 0] = data[c, RADIUS] - distance
             if square == 0.0:
                 continue
-            p, _, _ = point(x, cells, data, c, nodes, functions, place)
+            p, _, _ = point(x, cells, data, c, nodes, functions, xi)
             push = data[c, PENALTY] * out[c, 0]
             for k in range(3):
                 pull = push * p[k] / distance
                 for a in range(nodes):
-                    f[cells[c, a], k] += share(a, nodes, functions, place)[0] * pull
+                    f[cells[c, a], k] += share(a, nodes, functions, xi)[0] * pull
                 f[cells[c, nodes], k] -= pull
                 out[c, FELT + k] = -pull
 
@@ -72,20 +72,20 @@ def kernels(pieces, nodes, functions):
         gradient, mixed, shares = np.empty(size), np.empty(size), np.empty(nodes + 1)
         blocks[:] = 0.0
         for first in range(0, cells.shape[0], pieces):
-            c, place, square = touched(x, cells, data, first, pieces, nodes, functions)
+            c, xi, square = touched(x, cells, data, first, pieces, nodes, functions)
             if c < 0 or square == 0.0:
                 continue
-            p, d, e = point(x, cells, data, c, nodes, functions, place)
+            p, d, e = point(x, cells, data, c, nodes, functions, xi)
             distance, curve = math.sqrt(square), dot(d, d) + dot(p, e)
             for a in range(nodes + 1):
-                value, slope = share(a, nodes, functions, place) if a < nodes else (-1.0, 0.0)
+                value, slope = share(a, nodes, functions, xi) if a < nodes else (-1.0, 0.0)
                 shares[a] = value
                 for k in range(3):
                     gradient[3 * a + k] = value * p[k] / distance
                     mixed[3 * a + k] = value * d[k] + slope * p[k]
             penalty = data[c, PENALTY]
             curved = 0.0 if definite else penalty * (data[c, RADIUS] - distance) / distance
-            inside = 0.0 < place < 1.0
+            inside = 0.0 < xi < 1.0
             for r in range(size):
                 for s in range(size):
                     value = (penalty + curved) * gradient[r] * gradient[s]
@@ -100,31 +100,31 @@ def kernels(pieces, nodes, functions):
         # Row sums of functions and of their slopes are larger on curved elements, by less than the square of nodes.
         scale = 1.0 if nodes == 2 else float(nodes * nodes)
         for first in range(0, cells.shape[0], pieces):
-            before = most = 0.0
+            before = largest = 0.0
             b = cells[first, nodes]
             for c in range(first, first + pieces):
-                place, square = closest(x, cells, data, c, nodes, functions)
+                xi, square = closest(x, cells, data, c, nodes, functions)
                 radius, penalty, distance = data[c, RADIUS], data[c, PENALTY], math.sqrt(square)
                 if distance - radius >= reach:
                     before = 0.0
                     continue
                 delta = lightness(mass, cells, c, nodes)
                 # The line turns under a push that slides along it, which adds by depth over length.
-                turn = own = 0.0
-                _, d, _ = point(x, cells, data, c, nodes, functions, place)
+                turn = own_rate = 0.0
+                _, d, _ = point(x, cells, data, c, nodes, functions, xi)
                 length = math.sqrt(dot(d, d))
                 if square < radius * radius and length > 0.0:
                     turn = scale * (radius - distance) / length
-                    own = 2.0 * penalty * turn * (1.0 + distance / length)
-                own = scale * (own + penalty * (1.0 + delta) * (1.0 + turn))
+                    own_rate = 2.0 * penalty * turn * (1.0 + distance / length)
+                own_rate = scale * (own_rate + penalty * (1.0 + delta) * (1.0 + turn))
                 # One piece of a line touches at a time: a node between two of them feels the larger.
-                rates[cells[c, 0]] += max(own - before, 0.0)
+                rates[cells[c, 0]] += max(own_rate - before, 0.0)
                 for a in range(1, nodes):
-                    rates[cells[c, a]] += own
-                before = own
+                    rates[cells[c, a]] += own_rate
+                before = own_rate
                 body = scale * penalty * (1.0 + turn) * (1.0 + 1.0 / delta if delta > 0.0 else 1.0)
-                rates[b] += max(body - most, 0.0)
-                most = max(most, body)
+                rates[b] += max(body - largest, 0.0)
+                largest = max(largest, body)
                 # Nothing passes through between two steps: they are at most a tenth of the radius at half the bound.
                 crossing = (10.0 * speed / radius) ** 2
                 for a in range(nodes + 1):

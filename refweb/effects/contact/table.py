@@ -129,8 +129,8 @@ class Contact(Table):
     bodies: dict = field(_bodies, default_factory=dict)
 
     def _of(self, body, key):
-        own = getattr(self.bodies.get(body.name), key, None)
-        return getattr(self, key) if own is None else own
+        given = getattr(self.bodies.get(body.name), key, None)
+        return getattr(self, key) if given is None else given
 
     def law_of(self, body):
         """(stiffness, exponent) of a body; the stiffness is None where it is left out."""
@@ -146,8 +146,8 @@ class Contact(Table):
 
     def with_stiffness(self, stiffness):
         """The table with a stiffness for some bodies, by name."""
-        own = {name: replace(self.bodies.get(name, BodyContact()), stiffness=k) for name, k in stiffness.items()}
-        return replace(self, bodies={**self.bodies, **own})
+        by_body = {name: replace(self.bodies.get(name, BodyContact()), stiffness=k) for name, k in stiffness.items()}
+        return replace(self, bodies={**self.bodies, **by_body})
 
     def extend(self, net):
         """The net whose free bodies turn where friction turns them."""

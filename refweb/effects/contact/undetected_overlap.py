@@ -60,7 +60,7 @@ class Silent:
 
     def kept(self):
         """Known overlaps, shape (pairs, 3): number of a pair, depth [m] and time [s]."""
-        return np.array([(n, *seen) for n, seen in self._found.items()]).reshape(-1, 3)
+        return np.array([(n, *values) for n, values in self._found.items()]).reshape(-1, 3)
 
     def take(self, kept):
         """Go on with what was known."""
@@ -78,31 +78,31 @@ class Silent:
             yield f"{more} more pairs of bodies are in each other"
 
 
-def _depth(body, other, places, x):
+def _depth(body, body_b, places, x):
     """Depth of the skeleton of a body in another one [m]."""
     parts = body.shape.skeleton()
     if parts is None:
         return 0.0
-    axes, its = (one.axes @ one.rotation(x).T for one in (body, other))
-    own = (_along(parts) + body.offset) @ axes + places[body.row] - places[other.row]
-    own = own @ its.T - other.offset
-    depth, deepest = other.shape.depth(), 0.0
-    grown = other.shape.touched(float(parts[:, THICKNESS].max()))
-    for place, thickness in zip(own, np.repeat(parts[:, THICKNESS], PLACES), strict=True):
+    axes, its = (item.axes @ item.rotation(x).T for item in (body, body_b))
+    points_in_b = (_along(parts) + body.offset) @ axes + places[body.row] - places[body_b.row]
+    points_in_b = points_in_b @ its.T - body_b.offset
+    depth, deepest = body_b.shape.depth(), 0.0
+    grown = body_b.shape.touched(float(parts[:, THICKNESS].max()))
+    for point, thickness in zip(points_in_b, np.repeat(parts[:, THICKNESS], PLACES), strict=True):
         thick = grown._replace(radius=float(grown.radius + thickness))
-        deepest = max(deepest, depth(tuple(place.tolist()), thick)[0])
+        deepest = max(deepest, depth(tuple(point.tolist()), thick)[0])
     return deepest
 
 
 def _along(parts):
     """Places on parts of a skeleton, shape (parts × `PLACES`, 3)."""
-    found = np.empty((len(parts), PLACES, 3))
+    points = np.empty((len(parts), PLACES, 3))
     for n, part in enumerate(parts):
         share = np.linspace(0.0, 1.0, PLACES)[:, None]
         if part[KIND] == ARC:
             angle = part[OWNS] + share * (part[OWNS + 1] - part[OWNS])
-            found[n] = part[FROM:TO] + np.cos(angle) * part[TO:THIRD] + np.sin(angle) * part[THIRD:OWNS]
+            points[n] = part[FROM:TO] + np.cos(angle) * part[TO:THIRD] + np.sin(angle) * part[THIRD:OWNS]
         else:
             end = part[FROM:TO] if part[KIND] == POINT else part[TO:THIRD]
-            found[n] = (1.0 - share) * part[FROM:TO] + share * end
-    return found.reshape(-1, 3)
+            points[n] = (1.0 - share) * part[FROM:TO] + share * end
+    return points.reshape(-1, 3)

@@ -66,11 +66,11 @@ def kernels(nodes):
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             row, (e, _) = cells[c, 0], direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            own = drag_on(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
+            force_ = drag_on(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
             power = 0.0
             for k in range(3):
-                f[row, k] += own[k]
-                power += own[k] * v[row, k]
+                f[row, k] += force_[k]
+                power += force_[k] * v[row, k]
             out[c, 0] = power
 
     @kernel(STIFFNESS)
@@ -105,8 +105,8 @@ def kernels(nodes):
         for c in range(cells.shape[0]):
             w0, w1, w2 = data[c, WIND], data[c, WIND + 1], data[c, WIND + 2]
             fastest = speed + math.sqrt(w0 * w0 + w1 * w1 + w2 * w2)
-            most = 4.0 * (data[c, NORMAL] + data[c, TANGENTIAL]) * fastest * fastest / data[c, LENGTH]
+            coefficient = 4.0 * (data[c, NORMAL] + data[c, TANGENTIAL]) * fastest * fastest / data[c, LENGTH]
             for b in range(nodes):
-                rates[cells[c, 0]] += most * abs(data[c, SLOPES + b])
+                rates[cells[c, 0]] += coefficient * abs(data[c, SLOPES + b])
 
     return force, stiffness, damping, bound

@@ -34,11 +34,11 @@ def solve_three(a, b):
     c0 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
     c1 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
     c2 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
-    whole = a[0, 0] * c0 + a[0, 1] * c1 + a[0, 2] * c2
+    determinant = a[0, 0] * c0 + a[0, 1] * c1 + a[0, 2] * c2
     y0 = b[0] * c0 + b[1] * (a[0, 2] * a[2, 1] - a[0, 1] * a[2, 2]) + b[2] * (a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1])
     y1 = b[0] * c1 + b[1] * (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0]) + b[2] * (a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2])
     y2 = b[0] * c2 + b[1] * (a[0, 1] * a[2, 0] - a[0, 0] * a[2, 1]) + b[2] * (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])
-    return y0 / whole, y1 / whole, y2 / whole
+    return y0 / determinant, y1 / determinant, y2 / determinant
 
 
 @kernel(forceinline=True)
@@ -77,10 +77,10 @@ def solving(speeds_up, answer, push):
         own0 = own1 = own2 = 0.0
         for m in range(n, n + count):
             own0, own1, own2 = own0 + touches[m, FORCE], own1 + touches[m, FORCE + 1], own2 + touches[m, FORCE + 2]
-        all_of, own = speeds_up(touches, n, f, inverse), answer(touches, n, (own0, own1, own2), inverse)
+        all_of, response = speeds_up(touches, n, f, inverse), answer(touches, n, (own0, own1, own2), inverse)
         for k in range(3):
             u[k] = touches[n, START + k] + 0.5 * h * all_of[k]
-            ahead[k] = u[k] - 0.5 * h * own[k]
+            ahead[k] = u[k] - 0.5 * h * response[k]
         for _ in range(MOST):
             matrix[:] = 0.0
             own0 = own1 = own2 = 0.0
@@ -88,42 +88,46 @@ def solving(speeds_up, answer, push):
                 t = touches[m, DIRECTION], touches[m, DIRECTION + 1], touches[m, DIRECTION + 2]
                 normal, tangential = touches[m, COEFFICIENTS], touches[m, COEFFICIENTS + 1]
                 add_slope(t, (u[0], u[1], u[2]), normal, tangential, matrix)
-                one = drag_on(t, (u[0], u[1], u[2]), normal, tangential)
-                own0, own1, own2 = own0 + one[0], own1 + one[1], own2 + one[2]
-            own, size = answer(touches, n, (own0, own1, own2), inverse), 0.0
+                pull = drag_on(t, (u[0], u[1], u[2]), normal, tangential)
+                own0, own1, own2 = own0 + pull[0], own1 + pull[1], own2 + pull[2]
+            response, size = answer(touches, n, (own0, own1, own2), inverse), 0.0
             for k in range(3):
-                rest[k] = ahead[k] - u[k] + 0.5 * h * own[k]
+                rest[k] = ahead[k] - u[k] + 0.5 * h * response[k]
                 size = max(size, abs(u[k]), abs(ahead[k]))
             for j in range(3):
-                one = answer(touches, n, (matrix[0, j], matrix[1, j], matrix[2, j]), inverse)
+                pull = answer(touches, n, (matrix[0, j], matrix[1, j], matrix[2, j]), inverse)
                 for k in range(3):
-                    matrix[k, j] = 0.5 * h * one[k] + (1.0 if k == j else 0.0)
+                    matrix[k, j] = 0.5 * h * pull[k] + (1.0 if k == j else 0.0)
             if not max(abs(rest[0]), abs(rest[1]), abs(rest[2])) > CLOSE * size:
                 break
             y = solve_three(matrix, (rest[0], rest[1], rest[2]))
             for k in range(3):
                 u[k] += y[k]
-        most = 0.0
+        largest = 0.0
         for m in range(n, n + count):
             t = touches[m, DIRECTION], touches[m, DIRECTION + 1], touches[m, DIRECTION + 2]
-            own = drag_on(t, (u[0], u[1], u[2]), touches[m, COEFFICIENTS], touches[m, COEFFICIENTS + 1])
-            p = own[0] - touches[m, FORCE], own[1] - touches[m, FORCE + 1], own[2] - touches[m, FORCE + 2]
+            response = drag_on(t, (u[0], u[1], u[2]), touches[m, COEFFICIENTS], touches[m, COEFFICIENTS + 1])
+            p = (
+                response[0] - touches[m, FORCE],
+                response[1] - touches[m, FORCE + 1],
+                response[2] - touches[m, FORCE + 2],
+            )
             change = answer(touches, n, p, inverse)
             push(touches, n, p, f)
             for k in range(3):
-                touches[m, FORCE + k] = own[k]
-                most = max(most, h * abs(change[k]))
-        return most
+                touches[m, FORCE + k] = response[k]
+                largest = max(largest, h * abs(change[k]))
+        return largest
 
     @kernel(GAUSS_SEIDEL)
     def sweep(h, number, f, inverse, touches, count):
         """Solve row by row; the largest change of a velocity [m/s]."""
-        most, n, matrix, vectors = 0.0, 0, np.empty((3, 3)), np.empty((3, 3))
+        largest, n, matrix, vectors = 0.0, 0, np.empty((3, 3)), np.empty((3, 3))
         while n < count:
-            here = int(touches[n, COUNT])
-            most = max(most, settle(h, f, inverse, touches, n, here, matrix, vectors))
-            n += here
-        return most
+            nodes_here = int(touches[n, COUNT])
+            largest = max(largest, settle(h, f, inverse, touches, n, nodes_here, matrix, vectors))
+            n += nodes_here
+        return largest
 
     return sweep
 

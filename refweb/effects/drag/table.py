@@ -131,9 +131,9 @@ class Drag(Table):
         diameter = np.sqrt(4.0 * net.area / math.pi) if self.diameter is None else np.full(elements, self.diameter)
         pressed = 0.5 * self.density * diameter * net.natural_length
         cells, numbers = [], []
-        for a, place in enumerate(net.places):
+        for a, position in enumerate(net.places):
             order = [a, *(b for b in range(count) if b != a)]
-            slopes = (power[1:] * place ** (power[1:] - 1)) @ functions[1:]
+            slopes = (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
             both = np.outer(shares[a] * pressed, [self.normal, math.pi * self.tangential])
             rest = np.tile([*self.wind], (elements, 1)), net.line_data[:, REFERENCE : REFERENCE + 3]
             tail = np.zeros((elements, 1)), net.natural_length[:, None], np.tile(slopes[order], (elements, 1))
@@ -148,12 +148,12 @@ class Drag(Table):
 
     def _of(self, body):
         """½ ρ C A of a body [kg/m]."""
-        own, sphere = self.bodies.get(body.name, BodyDrag()), body.shape.once
+        settings, sphere = self.bodies.get(body.name, BodyDrag()), body.shape.once
         for key in () if sphere else ("coefficient", "area"):
-            if getattr(own, key) is None:
+            if getattr(settings, key) is None:
                 raise InputError(f'bodies."{body.name}".{key} is missing: only of spheres it is known')
-        coefficient = SPHERE if own.coefficient is None else own.coefficient
-        return 0.5 * self.density * coefficient * (own.area or math.pi * body.shape.grown().radius ** 2)
+        coefficient = SPHERE if settings.coefficient is None else settings.coefficient
+        return 0.5 * self.density * coefficient * (settings.area or math.pi * body.shape.grown().radius ** 2)
 
     def _family(self, net, cells, data, elements=None):
         blows, kick = any(self.wind), rubbing

@@ -52,13 +52,13 @@ def distance(p, u, w, joined):
 @kernel(forceinline=True)
 def longest_of(p, u, w):
     """Largest difference of what is p − … of the first and of the other element: at one of their ends."""
-    most = 0.0
+    longest = 0.0
     for i in range(2):
         for j in range(2):
             a, b = p[0] + i * u[0] - j * w[0], p[1] + i * u[1] - j * w[1]
             c = p[2] + i * u[2] - j * w[2]
-            most = max(most, a * a + b * b + c * c)
-    return math.sqrt(most)
+            longest = max(longest, a * a + b * b + c * c)
+    return math.sqrt(longest)
 
 
 @kernel(forceinline=True)
@@ -75,25 +75,25 @@ def ways_of(cells, c, kick, drift, v, f, inverse):
 
 
 @kernel(forceinline=True)
-def gone(vector, share, way):
+def gone(vector, share, path):
     """A vector after a share of its way."""
-    return vector[0] + share * way[0], vector[1] + share * way[1], vector[2] + share * way[2]
+    return vector[0] + share * path[0], vector[1] + share * path[1], vector[2] + share * path[2]
 
 
 @kernel()
-def meet(room, place, ways, joined):
-    """(Whether a pair comes nearer than ``room`` on its way, its distance at the start, by how much it may change)."""
-    (p, u, w), (dp, du, dw) = place, ways
-    most, share, start = longest_of(dp, du, dw), 0.0, distance(p, u, w, joined)
+def meet(margin, geometry, ways, joined):
+    """(True if a pair comes nearer than ``margin`` on its way, distance at the start, largest change of it)."""
+    (p, u, w), (dp, du, dw) = geometry, ways
+    longest, share, start = longest_of(dp, du, dw), 0.0, distance(p, u, w, joined)
     left = start
     for _ in range(LOOKS):
-        if not left - room > 0.0:
-            return True, start, most
-        if left - room > (1.0 - share) * most:
-            return False, start, most
-        share += (left - room) / most
+        if not left - margin > 0.0:
+            return True, start, longest
+        if left - margin > (1.0 - share) * longest:
+            return False, start, longest
+        share += (left - margin) / longest
         left = distance(gone(p, share, dp), gone(u, share, du), gone(w, share, dw), joined)
-    return True, start, most
+    return True, start, longest
 
 
 @kernel(forceinline=True)
@@ -104,12 +104,12 @@ def note(cells, c, met):
 
 
 @kernel(MEETS)
-def meets(room, way, kick, drift, x, v, f, inverse, cells, data, met):
+def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
     if cells.shape[1] != 4:
-        _, cells, data = found(max(way, 0.0) + room, x, cells, data)
+        _, cells, data = found(max(path, 0.0) + margin, x, cells, data)
     for c in range(cells.shape[0]):
         if data[c, SCALE] > 0.0:
-            near, joined = room + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
+            near, joined = margin + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
             ways = ways_of(cells, c, kick, drift, v, f, inverse)
             if meet(near, place_of(x, cells, data, c), ways, joined)[0]:
                 note(cells, c, met)
@@ -118,11 +118,11 @@ def meets(room, way, kick, drift, x, v, f, inverse, cells, data, met):
 
 
 @kernel(CCD_NEIGHBOURS)
-def watch(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met):
+def watch(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen, met):
     count = cells.shape[0]
     past, until, came = due[count], due[count + 1], False
-    if past + way + room >= until:  # choose those whose turn comes soon
-        until, chosen[count] = past + AHEAD * (way + room) if count else math.inf, 0
+    if past + path + margin >= until:  # choose those whose turn comes soon
+        until, chosen[count] = past + AHEAD * (path + margin) if count else math.inf, 0
         for c in range(count):
             if due[c] <= until:
                 chosen[chosen[count]] = c
@@ -131,10 +131,10 @@ def watch(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, me
     next_one = until
     for n in range(chosen[count]):
         c = chosen[n]
-        if due[c] > past + way + room:
+        if due[c] > past + path + margin:
             next_one = min(next_one, due[c])
             continue
-        near, joined = room + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
+        near, joined = margin + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
         ways = ways_of(cells, c, kick, drift, v, f, inverse)
         closed, start, _ = meet(near, place_of(x, cells, data, c), ways, joined)
         due[c] = past + start
@@ -142,7 +142,7 @@ def watch(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, me
         if closed and data[c, SCALE] > 0.0 and not came:
             note(cells, c, met)
             came = True
-    due[count], due[count + 2] = past + way, next_one
+    due[count], due[count + 2] = past + path, next_one
     return came
 
 
@@ -157,8 +157,8 @@ def soon(x, v, cells, data):
             w = v[m, 0] - v[k, 0], v[m, 1] - v[k, 1], v[m, 2] - v[k, 2]
             speed = 2.0 * longest_of(p, u, w)
             if speed > 0.0:
-                place = place_of(x, cells, data, c)
-                left = distance(place.p, place.u, place.w, False) - data[c, TOUCH]
+                geometry = place_of(x, cells, data, c)
+                left = distance(geometry.p, geometry.u, geometry.w, False) - data[c, TOUCH]
                 time = min(time, max(TRAVEL * data[c, TOUCH], 0.5 * left) / speed)
     return time
 
@@ -179,16 +179,18 @@ def neighbours(net, beside, touch):
         Distance at which lines touch [m].
     """
     cells, count = net.cells, len(net.cells)
-    place = np.stack([net.points[cells[:, 0]]] * 2, axis=1)
-    place[:, 1] += net.line_data[:, REFERENCE : REFERENCE + 3]
+    positions = np.stack([net.points[cells[:, 0]]] * 2, axis=1)
+    positions[:, 1] += net.line_data[:, REFERENCE : REFERENCE + 3]
     ends = np.arange(2 * count)  # element, and which of its nodes
     order = ends[np.argsort(cells.ravel(), kind="stable")]
     begin = np.searchsorted(cells.ravel()[order], np.arange(net.nodes + 1))
     joined = []
     for size in np.unique(np.diff(begin)):
         starts = begin[:-1][np.diff(begin) == size]
-        one, other = np.triu_indices(size, 1)
-        joined.append(np.stack([order[starts[:, None] + one].ravel(), order[starts[:, None] + other].ravel()], axis=1))
+        first_index, second = np.triu_indices(size, 1)
+        joined.append(
+            np.stack([order[starts[:, None] + first_index].ravel(), order[starts[:, None] + second].ravel()], axis=1)
+        )
     joined = np.concatenate([*joined, np.zeros((0, 2), dtype=np.int64)])
     twice = (np.sort(cells[joined[:, 0] // 2], axis=1) == np.sort(cells[joined[:, 1] // 2], axis=1)).all(axis=1)
     joined = joined[~twice]
@@ -197,7 +199,7 @@ def neighbours(net, beside, touch):
     pairs = np.concatenate([joined, near])
     elements, first = pairs // 2, pairs % 2
     rows = np.stack([cells[elements, first], cells[elements, 1 - first]], axis=2).reshape(-1, 4)
-    at = np.stack([place[elements, first], place[elements, 1 - first]], axis=2).reshape(-1, 4, 3)
+    at = np.stack([positions[elements, first], positions[elements, 1 - first]], axis=2).reshape(-1, 4, 3)
     data = np.zeros((len(pairs), WIDTH))
     data[:, TOUCH], data[:, SCALE] = touch, 1.0
     data[:, SHAPE : SHAPE + 9] = (at[:, 1:] - at[:, :1]).reshape(-1, 9)

@@ -99,19 +99,19 @@ def damping(t, x, v, blocks, cells, data, definite):
 @kernel()
 def add_bounds(reach, speed, x, mass, rates, cells, data, viscous):
     """Add the row sums of ∂F/∂v, or of ∂F/∂x, to the rates."""
-    own, most = np.zeros(rates.size), np.zeros(rates.size)
+    rates_here, largest = np.zeros(rates.size), np.zeros(rates.size)
     for c in range(cells.shape[0]):
-        room = reject_step(reach, speed, x, mass, cells, data, c)
-        if room > 0.0:
+        depth = reject_step(reach, speed, x, mass, cells, data, c)
+        if depth > 0.0:
             now = (1.875 * stored(x, cells, data, c) / data[c, SCALE]) ** 0.4
-            room = min(room, max(2.0 * now, SHALLOW * room))
-            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
-            value *= data[c, DAMPING] * (0.5 * room / data[c, TOUCH] if viscous else speed)
+            depth = min(depth, max(2.0 * now, SHALLOW * depth))
+            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], depth)
+            value *= data[c, DAMPING] * (0.5 * depth / data[c, TOUCH] if viscous else speed)
             for n in range(4):
-                own[cells[c, n]] += value
-                most[cells[c, n]] = max(most[cells[c, n]], value)
+                rates_here[cells[c, n]] += value
+                largest[cells[c, n]] = max(largest[cells[c, n]], value)
     for r in range(rates.size):
-        rates[r] += min(own[r], MOST * most[r])
+        rates[r] += min(rates_here[r], MOST * largest[r])
 
 
 @kernel()

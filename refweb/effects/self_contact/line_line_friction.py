@@ -95,43 +95,43 @@ def slip_rows(x, cells, data, c, rows, shares):
     ``shares (2, 2)`` is what forces along both are along û and ŵ, or along the components of threads.
     """
     _, push = pushed(x, cells, data, c)
-    whole = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
+    total = push[0][0] + push[1][0], push[0][1] + push[1][1], push[0][2] + push[1][2]
     p, u, w = place_of(x, cells, data, c)
     long, wide = math.sqrt(dot(u, u)), math.sqrt(dot(w, w))
-    if not (dot(whole, whole) > 0.0 and long > 0.0 and wide > 0.0):
+    if not (dot(total, total) > 0.0 and long > 0.0 and wide > 0.0):
         return 0.0
-    one, other = (u[0] / long, u[1] / long, u[2] / long), (w[0] / wide, w[1] / wide, w[2] / wide)
-    mixed = dot(one, other)
+    first_unit, second = (u[0] / long, u[1] / long, u[2] / long), (w[0] / wide, w[1] / wide, w[2] / wide)
+    mixed = dot(first_unit, second)
     apart = 1.0 + ALIKE * data[c, TOUCH] ** 2 / (data[c, LENGTH] * data[c, OTHER])
     both, differ = 1.0 / math.sqrt(2.0 * (apart + mixed)), 1.0 / math.sqrt(2.0 * (apart - mixed))
     shares[0, 0], shares[0, 1], shares[1, 0], shares[1, 1] = both, both, differ, -differ
-    p0, p1, p2 = whole
+    p0, p1, p2 = total
     for i in range(2):  # what pushes along either line, at a joint, is no pressure
         first, last = shares[i, 0], shares[i, 1]
         e = (
-            first * one[0] + last * other[0],
-            first * one[1] + last * other[1],
-            first * one[2] + last * other[2],
+            first * first_unit[0] + last * second[0],
+            first * first_unit[1] + last * second[1],
+            first * first_unit[2] + last * second[2],
         )
-        size = dot(whole, e)
+        size = dot(total, e)
         p0, p1, p2 = p0 - size * e[0], p1 - size * e[1], p2 - size * e[2]
     size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
     if not size > 0.0:
         return 0.0
     n = p0 / size, p1 / size, p2 / size
-    within = dot(whole, n)
+    within = dot(total, n)
     if not within > 0.0:
         return 0.0
     a, b = dot(push[1], n) / within, -dot(push[3], n) / within
     if data[c, ROLLS] == 0.0:
-        set_rows_of_threads(one, n, a, b, rows, shares)
+        set_rows_of_threads(first_unit, n, a, b, rows, shares)
         return size
     d = p[0] + a * u[0] - b * w[0], p[1] + a * u[1] - b * w[1], p[2] + a * u[2] - b * w[2]
-    own, its = dot(one, d), dot(other, d)
+    first_share, its = dot(first_unit, d), dot(second, d)
     for k in range(3):
-        tilt, lean = (d[k] - own * one[k]) / long, (d[k] - its * other[k]) / wide
+        tilt, lean = (d[k] - first_share * first_unit[k]) / long, (d[k] - its * second[k]) / wide
         for i in range(2):
-            mean = shares[i, 0] * one[k] + shares[i, 1] * other[k]
+            mean = shares[i, 0] * first_unit[k] + shares[i, 1] * second[k]
             rows[i, 0, k] = (1.0 - a) * mean - shares[i, 0] * tilt
             rows[i, 1, k] = a * mean + shares[i, 0] * tilt
             rows[i, 2, k] = -(1.0 - b) * mean - shares[i, 1] * lean
@@ -155,12 +155,12 @@ def rub(x, v, f, cells, data, c, rows, shares):
     normal = slip_rows(x, cells, data, c, rows, shares)
     if normal == 0.0:
         return 0.0
-    one, other = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
-    drag = data[c, FRICTION] * normal / math.sqrt(one * one + other * other + data[c, SLIP] ** 2)
+    first, second = slip_of(v, cells, c, rows, 0), slip_of(v, cells, c, rows, 1)
+    drag = data[c, FRICTION] * normal / math.sqrt(first * first + second * second + data[c, SLIP] ** 2)
     for n in range(4):
         for k in range(3):
-            f[cells[c, n], k] -= drag * (one * rows[0, n, k] + other * rows[1, n, k])
-    return -drag * (one * one + other * other)
+            f[cells[c, n], k] -= drag * (first * rows[0, n, k] + second * rows[1, n, k])
+    return -drag * (first * first + second * second)
 
 
 @kernel(FORCE)
@@ -179,10 +179,10 @@ def force(t, x, v, f, cells, data, out):
 @kernel(STIFFNESS)
 def stiffness(t, x, v, blocks, cells, data, definite):
     rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
-    place, speed, ahead, behind = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
-    own = np.empty((1, 4), dtype=np.int32)
+    geometry, speed, ahead, behind = np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3)), np.empty((4, 3))
+    all_rows = np.empty((1, 4), dtype=np.int32)
     for n in range(4):
-        own[0, n] = n
+        all_rows[0, n] = n
     for c in range(cells.shape[0]):
         blocks[c] = 0.0
         if definite or slip_rows(x, cells, data, c, rows, shares) == 0.0:
@@ -190,16 +190,16 @@ def stiffness(t, x, v, blocks, cells, data, definite):
         numbers, step = data[c : c + 1], STEP * data[c, TOUCH]
         for n in range(4):
             for k in range(3):
-                place[n, k], speed[n, k] = x[cells[c, n], k], v[cells[c, n], k]
+                geometry[n, k], speed[n, k] = x[cells[c, n], k], v[cells[c, n], k]
         for m in range(12):
             n, k = m // 3, m % 3
-            was = place[n, k]
+            was = geometry[n, k]
             ahead[:], behind[:] = 0.0, 0.0
-            place[n, k] = was + step
-            rub(place, speed, ahead, own, numbers, 0, rows, shares)
-            place[n, k] = was - step
-            rub(place, speed, behind, own, numbers, 0, rows, shares)
-            place[n, k] = was
+            geometry[n, k] = was + step
+            rub(geometry, speed, ahead, all_rows, numbers, 0, rows, shares)
+            geometry[n, k] = was - step
+            rub(geometry, speed, behind, all_rows, numbers, 0, rows, shares)
+            geometry[n, k] = was
             for i in range(12):
                 blocks[c, i, m] = (behind[i // 3, i % 3] - ahead[i // 3, i % 3]) / (2.0 * step)
 
@@ -225,12 +225,12 @@ def damping(t, x, v, blocks, cells, data, definite):
 
 @kernel(BOUND)
 def bound(reach, speed, x, mass, rates, cells, data):
-    own = np.zeros(rates.size)
+    rates_here = np.zeros(rates.size)
     if cells.shape[0]:
-        press_bound(reach, speed, x, mass, own, cells, data)
+        press_bound(reach, speed, x, mass, rates_here, cells, data)
         friction = data[0, FRICTION if cells.shape[1] == 4 else RUBBING]
         for r in range(rates.size):
-            rates[r] += friction * own[r]
+            rates[r] += friction * rates_here[r]
 
 
 # Kicks
@@ -326,15 +326,15 @@ def slot_of(memory, touches, n, number):
     """(row, first column) of what is remembered of a pair; a new one takes the place that is oldest."""
     row, oldest, at = int(touches[n, KEYS]) % memory.shape[0], math.inf, 0
     for slot in range(SLOTS):
-        here = NOTED * slot
+        slot_begin = NOTED * slot
         if (
-            memory[row, here + 2] > 0.0
-            and memory[row, here] == touches[n, KEYS]
-            and (memory[row, here + 1] == touches[n, KEYS + 1])
+            memory[row, slot_begin + 2] > 0.0
+            and memory[row, slot_begin] == touches[n, KEYS]
+            and (memory[row, slot_begin + 1] == touches[n, KEYS + 1])
         ):
-            return row, here
-        if memory[row, here + 2] < oldest:
-            oldest, at = memory[row, here + 2], here
+            return row, slot_begin
+        if memory[row, slot_begin + 2] < oldest:
+            oldest, at = memory[row, slot_begin + 2], slot_begin
     return row, at
 
 
@@ -346,8 +346,8 @@ def recall(number, memory, f, touches, begin, end):
         if same and memory[row, at + 2] == number - 1 and number > 1:
             # of F = Σ Fᵢ (what direction i is along û and ŵ), the components again
             a, b, c, d = touches[n, KEYS + 2], touches[n, KEYS + 3], touches[n, KEYS + 4], touches[n, KEYS + 5]
-            whole, one, other = a * d - b * c, memory[row, at + 3], memory[row, at + 4]
-            q, s = (d * one - b * other) / whole, (a * other - c * one) / whole
+            determinant, first, second = a * d - b * c, memory[row, at + 3], memory[row, at + 4]
+            q, s = (d * first - b * second) / determinant, (a * second - c * first) / determinant
             touches[n, FORCES + 1], touches[n, FORCES + 2] = q, s
             apply_force(touches, n, 0.0, q, s, f)
 

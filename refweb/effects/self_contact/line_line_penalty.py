@@ -51,16 +51,16 @@ NO_PUSH = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
 def overlap(p, u, w, n, s, t, of):
     """(J, its slopes by ½ p·p, p·u, p·w, ½ u·u, u·w and ½ w·w), E = f J, see `first`."""
     uu, uw, ww, nn, pp, pu, pw = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, p), dot(p, u), dot(p, w)
-    one, a = first(pp, pu, pw, uw, ww, nn, s, t, of.touch)
-    other, b = first(pp, -pw, -pu, uw, uu, nn, t, s, of.touch)
-    own, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.other
-    return own * one + more * other, (
-        own * a[0] + more * b[0],
-        own * a[1] - more * b[2],
-        own * a[2] - more * b[1],
-        own * a[3] + more * b[5],
-        own * a[4] + more * b[4],
-        own * a[5] + more * b[3],
+    first_share, a = first(pp, pu, pw, uw, ww, nn, s, t, of.touch)
+    second_share, b = first(pp, -pw, -pu, uw, uu, nn, t, s, of.touch)
+    half_scale, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.other
+    return half_scale * first_share + more * second_share, (
+        half_scale * a[0] + more * b[0],
+        half_scale * a[1] - more * b[2],
+        half_scale * a[2] - more * b[1],
+        half_scale * a[3] + more * b[5],
+        half_scale * a[4] + more * b[4],
+        half_scale * a[5] + more * b[3],
     )
 
 
@@ -88,24 +88,24 @@ def to_nodes(p, u, w, s, t, slopes):
 
 
 @kernel(forceinline=True)
-def between(place, s, t):
+def between(geometry, s, t):
     """Vector from the share t of the other element to the share s of the first."""
-    p, u, w = place
+    p, u, w = geometry
     return p[0] + s * u[0] - t * w[0], p[1] + s * u[1] - t * w[1], p[2] + s * u[2] - t * w[2]
 
 
 @kernel(forceinline=True)
 def slopes_of_factor(u, w, n, f, area):
     """(∂f/∂u, ∂f/∂w)."""
-    one, other, scale = cross(w, n), cross(n, u), 1.0 / (f * area * area)
+    first, second, scale = cross(w, n), cross(n, u), 1.0 / (f * area * area)
     return (
-        (scale * one[0], scale * one[1], scale * one[2]),
-        (scale * other[0], scale * other[1], scale * other[2]),
+        (scale * first[0], scale * first[1], scale * first[2]),
+        (scale * second[0], scale * second[1], scale * second[2]),
     )
 
 
 @kernel(forceinline=True)
-def crossed(place, n, of):
+def crossed(geometry, n, of):
     """(J, its slopes, squared distance) of a pair that overlaps far from its ends; J is 0 of all others.
 
     Of a crossing at the places s and t of both infinite lines, a distance h apart, R = c² − h² and N = |u × w|, the
@@ -115,42 +115,42 @@ def crossed(place, n, of):
 
     The slopes are numbers a, b, α and β: ∂J/∂p = a n, ∂J/∂u = w × (a p + b n) + α u, and ∂J/∂w = (a p + b n) × u + β w.
     """
-    (p, u, w), touch = place, of.touch
+    (p, u, w), touch = geometry, of.touch
     uu, uw, ww, nn, pn = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, n)
-    room = touch * touch * nn - pn * pn
-    if not (room > 0.0 and nn > 0.0):
+    remainder = touch * touch * nn - pn * pn
+    if not (remainder > 0.0 and nn > 0.0):
         return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
-    first, other = math.sqrt(uu), math.sqrt(ww)
-    both = first * other
-    one = 1.0 / (nn * both)  # of three numbers by one division: those and roots are most of the time
-    inverse, short = one * both, one * nn
-    room *= inverse
-    half = math.sqrt(room * inverse)
+    first, second_length = math.sqrt(uu), math.sqrt(ww)
+    both = first * second_length
+    reciprocal = 1.0 / (nn * both)  # of three numbers by one division: those and roots are most of the time
+    inverse, short = reciprocal * both, reciprocal * nn
+    remainder *= inverse
+    half = math.sqrt(remainder * inverse)
     d, e = dot(u, p), dot(w, p)
     s, t, along = (uw * e - ww * d) * inverse, (uu * e - uw * d) * inverse, half * abs(uw) + touch
-    wide, high = max(half * other, along * other * short), max(half * first, along * first * short)
+    wide, high = max(half * second_length, along * second_length * short), max(half * first, along * first * short)
     if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
         return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
-    size = of.length * other + of.other * first
-    scale = 8.0 / 15.0 * of.scale * room * half
-    j, by_p, share = scale * room * size, -5.0 * scale * pn * inverse * size, scale * room * short
+    size = of.length * second_length + of.other * first
+    scale = 8.0 / 15.0 * of.scale * remainder * half
+    j, by_p, share = scale * remainder * size, -5.0 * scale * pn * inverse * size, scale * remainder * short
     turn = -(by_p * pn + j) * inverse
-    return j, by_p, turn, of.other * other * share, of.length * first * share, pn * pn * inverse
+    return j, by_p, turn, of.other * second_length * share, of.length * first * share, pn * pn * inverse
 
 
 @kernel()
-def forces_of(place, of):
+def forces_of(geometry, of):
     """(How deep a pair that may touch overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes)."""
-    p, u, w = place
+    p, u, w = geometry
     n = cross(u, w)
     f, area = angle_factor(n, of.length, of.other, of.touch)
-    j, by_p, turn, own, more, square = crossed(place, n, of)
+    j, by_p, turn, direct, more, square = crossed(geometry, n, of)
     if j == 0.0:
-        return forces_near_ends(place, n, f, area, of)
-    a, b, own, more = f * by_p, f * turn + j / (f * area * area), f * own, f * more
+        return forces_near_ends(geometry, n, f, area, of)
+    a, b, direct, more = f * by_p, f * turn + j / (f * area * area), f * direct, f * more
     m = a * p[0] + b * n[0], a * p[1] + b * n[1], a * p[2] + b * n[2]
     q, r = cross(w, m), cross(m, u)
-    q = q[0] + own * u[0], q[1] + own * u[1], q[2] + own * u[2]
+    q = q[0] + direct * u[0], q[1] + direct * u[1], q[2] + direct * u[2]
     r = r[0] + more * w[0], r[1] + more * w[1], r[2] + more * w[2]
     return max(of.touch - math.sqrt(square), 0.0), (
         (q[0] - a * n[0], q[1] - a * n[1], q[2] - a * n[2]),
@@ -161,12 +161,12 @@ def forces_of(place, of):
 
 
 @kernel(forceinline=True)
-def forces_near_ends(place, n, f, area, of):
+def forces_near_ends(geometry, n, f, area, of):
     """The same of a pair that overlaps near an end, or does not: lines may meet far from both segments."""
-    s, t, square = nearest(place.p, place.u, place.w)
+    s, t, square = nearest(geometry.p, geometry.u, geometry.w)
     if square > (REACH * of.touch) ** 2:
         return NOT_SEEN, NO_PUSH
-    p, u, w = between(place, s, t), place.u, place.w
+    p, u, w = between(geometry, s, t), geometry.u, geometry.w
     j, (a, b, c, d, e, g) = overlap(p, u, w, n, s, t, of)
     if j == 0.0:
         return NOT_SEEN, NO_PUSH
@@ -182,10 +182,10 @@ def pushed(x, cells, data, c):
     What is apart costs no call, and a call takes no array, nor does what is written here: to count the references to
     the arrays of a pair takes as long as its push.
     """
-    place, of = place_of(x, cells, data, c), numbers_of(data, c)
-    if apart(place, of.touch):
+    geometry, of = place_of(x, cells, data, c), numbers_of(data, c)
+    if apart(geometry, of.touch):
         return NOT_SEEN, NO_PUSH
-    return forces_of(place, of)
+    return forces_of(geometry, of)
 
 
 @kernel(forceinline=True)
@@ -197,22 +197,22 @@ def give(share, f, cells, c, forces):
 
 
 @kernel()
-def energy_of(place, of):
+def energy_of(geometry, of):
     """Energy of a pair that may touch [J]."""
-    n = cross(place.u, place.w)
-    j = crossed(place, n, of)[0]
+    n = cross(geometry.u, geometry.w)
+    j = crossed(geometry, n, of)[0]
     if j == 0.0:
-        s, t, square = nearest(place.p, place.u, place.w)
+        s, t, square = nearest(geometry.p, geometry.u, geometry.w)
         if not square > (REACH * of.touch) ** 2:
-            j = overlap(between(place, s, t), place.u, place.w, n, s, t, of)[0]
+            j = overlap(between(geometry, s, t), geometry.u, geometry.w, n, s, t, of)[0]
     return angle_factor(n, of.length, of.other, of.touch)[0] * j
 
 
 @kernel(forceinline=True)
 def stored(x, cells, data, c):
     """Energy of pair c [J]."""
-    place, of = place_of(x, cells, data, c), numbers_of(data, c)
-    return 0.0 if apart(place, of.touch) else energy_of(place, of)
+    geometry, of = place_of(x, cells, data, c), numbers_of(data, c)
+    return 0.0 if apart(geometry, of.touch) else energy_of(geometry, of)
 
 
 @kernel(FORCE)
@@ -243,27 +243,27 @@ def energy(t, x, cells, data, out):
     out[:] = 0.0
     chosen, rows, numbers = found(0.0, x, cells, data)
     for c in range(rows.shape[0]):
-        own = 0.5 * stored(x, rows, numbers, c)
+        half = 0.5 * stored(x, rows, numbers, c)
         for n in range(2):
-            out[chosen[c, n]] += own
+            out[chosen[c, n]] += half
 
 
 @kernel()
-def add_turning(block, place, j, slopes, by_u, by_w, f, area):
+def add_turning(block, geometry, j, slopes, by_u, by_w, f, area):
     """Add what follows of f as the elements turn: ∇f ∇J + ∇J ∇f + J ∇∇f; ``slopes (4, 3)`` are those of J."""
-    u, w, of_u, of_w = place.u, place.w, (-1.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 1.0)
+    u, w, of_u, of_w = geometry.u, geometry.w, (-1.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0, 1.0)
     uu, uw, ww, scale = dot(u, u), dot(u, w), dot(w, w), j / (f * area * area)
     for a in range(3):
         for b in range(3):
-            one = 1.0 if a == b else 0.0
-            first_block = scale * (ww * one - w[a] * w[b]) - j * by_u[a] * by_u[b] / f
-            mixed = scale * (2.0 * u[a] * w[b] - w[a] * u[b] - uw * one) - j * by_u[a] * by_w[b] / f
-            last_block = scale * (uu * one - u[a] * u[b]) - j * by_w[a] * by_w[b] / f
+            identity = 1.0 if a == b else 0.0
+            first_block = scale * (ww * identity - w[a] * w[b]) - j * by_u[a] * by_u[b] / f
+            mixed = scale * (2.0 * u[a] * w[b] - w[a] * u[b] - uw * identity) - j * by_u[a] * by_w[b] / f
+            last_block = scale * (uu * identity - u[a] * u[b]) - j * by_w[a] * by_w[b] / f
             for m in range(4):
                 tilt = of_u[m] * by_u[a] + of_w[m] * by_w[a]
                 for n in range(4):
-                    other = of_u[n] * by_u[b] + of_w[n] * by_w[b]
-                    value = tilt * slopes[n, b] + slopes[m, a] * other
+                    change = of_u[n] * by_u[b] + of_w[n] * by_w[b]
+                    value = tilt * slopes[n, b] + slopes[m, a] * change
                     value += of_u[m] * of_u[n] * first_block + of_w[m] * of_w[n] * last_block
                     value += of_u[m] * of_w[n] * mixed
                     block[3 * m + a, 3 * n + b] += value
@@ -273,10 +273,10 @@ def add_turning(block, place, j, slopes, by_u, by_w, f, area):
 @kernel()
 def add_all_second(x, cells, data, c, definite, block):
     """Add the second derivatives of the energy of pair c to its block, or a part that is positive semidefinite."""
-    place, of = place_of(x, cells, data, c), numbers_of(data, c)
-    if apart(place, of.touch):
+    geometry, of = place_of(x, cells, data, c), numbers_of(data, c)
+    if apart(geometry, of.touch):
         return
-    p, u, w = place
+    p, u, w = geometry
     n = cross(u, w)
     f, area = angle_factor(n, of.length, of.other, of.touch)
     half = 0.5 * of.scale * f
@@ -286,14 +286,14 @@ def add_all_second(x, cells, data, c, definite, block):
     if definite:
         return
     s, t, _ = nearest(p, u, w)
-    q = between(place, s, t)
+    q = between(geometry, s, t)
     j, by_products = overlap(q, u, w, n, s, t, of)
     by_nodes, slopes = to_nodes(q, u, w, s, t, by_products), np.empty((4, 3))
     for m in range(4):
         for k in range(3):
             slopes[m, k] = by_nodes[m][k]
     by_u, by_w = slopes_of_factor(u, w, n, f, area)
-    add_turning(block, place, j, slopes, by_u, by_w, f, area)
+    add_turning(block, geometry, j, slopes, by_u, by_w, f, area)
 
 
 @kernel(STIFFNESS)
@@ -304,58 +304,62 @@ def stiffness(t, x, v, blocks, cells, data, definite):
 
 
 @kernel(forceinline=True)
-def steepest(touch, scale, first_length, other_length, room):
-    """Bound on the stiffness of a pair [N/m] whose c² − D is at most ``room``: 8 c² κ f times the length in reach."""
+def steepest(touch, scale, first_length, other_length, depth):
+    """Bound on the stiffness of a pair [N/m] whose c² − D is at most ``depth``: 8 c² κ f times the length in reach."""
     eta = touch / math.sqrt(first_length * other_length)
     shared = eta * (min(first_length, other_length) + 2.0 * touch)
-    return MARGIN * 8.0 * touch * touch * scale * math.sqrt(4.0 * room + shared * shared)
+    return MARGIN * 8.0 * touch * touch * scale * math.sqrt(4.0 * depth + shared * shared)
 
 
 @kernel(forceinline=True)
-def room_left(most, touch, scale, stored_now, moving):
+def room_left(limit, touch, scale, stored_now, moving):
     """c² − D that a pair may come to: what is within reach, and for what its energy and that of motion allow."""
     if not scale > 0.0:
         return 0.0
-    most, power = min(most, touch * touch), 1.875 * (stored_now + moving) / scale
-    return most if power >= touch**5 else min(most, power**0.4)
+    limit, power = min(limit, touch * touch), 1.875 * (stored_now + moving) / scale
+    return limit if power >= touch**5 else min(limit, power**0.4)
 
 
 @kernel(forceinline=True)
 def reject_step(reach, speed, x, mass, cells, data, c):
     """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
-    place, touch = place_of(x, cells, data, c), data[c, TOUCH]
-    square = nearest(place.p, place.u, place.w)[2]
+    geometry, touch = place_of(x, cells, data, c), data[c, TOUCH]
+    square = nearest(geometry.p, geometry.u, geometry.w)[2]
     if not square < (REACH * touch + reach) ** 2:
         return 0.0
-    own, other = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
-    reduced = own * other / (own + other) if min(own, other) > 0.0 else max(own, other)
+    first_mass, second_mass = mass[cells[c, 0]] + mass[cells[c, 1]], mass[cells[c, 2]] + mass[cells[c, 3]]
+    reduced = (
+        first_mass * second_mass / (first_mass + second_mass)
+        if min(first_mass, second_mass) > 0.0
+        else max(first_mass, second_mass)
+    )
     moving = 0.5 * reduced * speed * speed if speed > 0.0 else math.inf
     left = max(math.sqrt(square) - reach, 0.0)
     return room_left(2.0 * touch * touch - left * left, touch, data[c, SCALE], stored(x, cells, data, c), moving)
 
 
 @kernel()
-def note_pairs(reach, speed, x, mass, cells, data, own, most):
+def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
     """Write the sum and the largest of the bounds of all pairs of each row."""
     for c in range(cells.shape[0]):
-        room = reject_step(reach, speed, x, mass, cells, data, c)
-        if room > 0.0:
-            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], room)
+        depth = reject_step(reach, speed, x, mass, cells, data, c)
+        if depth > 0.0:
+            value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], depth)
             for n in range(4):
-                own[cells[c, n]] += value
-                most[cells[c, n]] = max(most[cells[c, n]], value)
+                rates_here[cells[c, n]] += value
+                largest[cells[c, n]] = max(largest[cells[c, n]], value)
 
 
 @kernel()
-def note_all(speed, mass, cells, data, own, most):
+def note_all(speed, mass, cells, data, rates_here, largest):
     """The same where any two elements may touch: each has its middle touched by another like it."""
     for c in range(cells.shape[0]):
         touch, scale, length = data[c, TOUCH], data[c, SCALE], data[c, LENGTH]
         moving = math.inf if speed == 0.0 else 0.25 * (mass[cells[c, 0]] + mass[cells[c, 1]]) * speed * speed
-        room = room_left(math.inf, touch, scale, 0.0, moving)
-        value = steepest(touch, scale, length, length, room)
+        depth = room_left(math.inf, touch, scale, 0.0, moving)
+        value = steepest(touch, scale, length, length, depth)
         for n in range(2):
-            most[cells[c, n]] = own[cells[c, n]] = max(most[cells[c, n]], value)
+            largest[cells[c, n]] = rates_here[cells[c, n]] = max(largest[cells[c, n]], value)
 
 
 @kernel()
@@ -363,22 +367,22 @@ def longest(x, cells, data):
     """Length of the longest element."""
     square = 0.0
     for c in range(cells.shape[0]):
-        i, j, own = cells[c, 0], cells[c, 1], 0.0
+        i, j, longest_here = cells[c, 0], cells[c, 1], 0.0
         for k in range(3):
-            own += (data[c, ENDS + 3 + k] - data[c, ENDS + k] + x[j, k] - x[i, k]) ** 2
-        square = max(square, own)
+            longest_here += (data[c, ENDS + 3 + k] - data[c, ENDS + k] + x[j, k] - x[i, k]) ** 2
+        square = max(square, longest_here)
     return math.sqrt(square)
 
 
 @kernel(BOUND)
 def bound(reach, speed, x, mass, rates, cells, data):
-    own, most, reach = np.zeros(rates.size), np.zeros(rates.size), OF_REACH * reach
+    rates_here, largest, reach = np.zeros(rates.size), np.zeros(rates.size), OF_REACH * reach
     if cells.shape[1] == 4:
-        note_pairs(reach, speed, x, mass, cells, data, own, most)
+        note_pairs(reach, speed, x, mass, cells, data, rates_here, largest)
     elif reach > FAR * longest(x, cells, data):
-        note_all(speed, mass, cells, data, own, most)
+        note_all(speed, mass, cells, data, rates_here, largest)
     else:
         _, rows, numbers = found(reach, x, cells, data)
-        note_pairs(reach, speed, x, mass, rows, numbers, own, most)
+        note_pairs(reach, speed, x, mass, rows, numbers, rates_here, largest)
     for r in range(rates.size):
-        rates[r] += min(own[r], MOST * most[r])
+        rates[r] += min(rates_here[r], MOST * largest[r])

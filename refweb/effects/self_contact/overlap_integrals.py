@@ -88,8 +88,8 @@ def pieces(low, high, length, y, rate, quadratic, touch):
     root = half * half + square * deep
     if square > 0.0:
         q = -(half + math.copysign(math.sqrt(max(root, 0.0)), half))
-        one, other = q / square, (-deep / q if q != 0.0 else math.inf)
-        low, high = max(low, min(one, other)), min(high, max(one, other))
+        near_end, far_end = q / square, (-deep / q if q != 0.0 else math.inf)
+        low, high = max(low, min(near_end, far_end)), min(high, max(near_end, far_end))
     if not low < high:
         return 0, NOWHERE
     if rate == 0.0:
@@ -98,8 +98,8 @@ def pieces(low, high, length, y, rate, quadratic, touch):
     low, high = max(low, min(first, last)), min(high, max(first, last))
     if not low < high:
         return 0, NOWHERE
-    one, other = (touch - y) / rate, (length - touch - y) / rate
-    inner, outer = min(one, other), max(one, other)
+    near_end, far_end = (touch - y) / rate, (length - touch - y) / rate
+    inner, outer = min(near_end, far_end), max(near_end, far_end)
     if not low < inner < high:
         return (2, (low, outer, high, high)) if low < outer < high else (1, (low, high, high, high))
     return (3, (low, inner, outer, high)) if low < outer < high else (2, (low, inner, high, high))
@@ -108,8 +108,8 @@ def pieces(low, high, length, y, rate, quadratic, touch):
 @kernel(forceinline=True)
 def with_point(sums, q, weight, quadratic, y, rate, length):
     """Sums over Gauss points with another at q: of I, of W (c² − D) times 1, q and q², and of e times slopes of W."""
-    deep, place = quadratic[0] - q * (2.0 * quadratic[1] + q * quadratic[2]), y + q * rate
-    (near, rise), (far, fall) = step_at(place), step_at(place - length)
+    deep, position = quadratic[0] - q * (2.0 * quadratic[1] + q * quadratic[2]), y + q * rate
+    (near, rise), (far, fall) = step_at(position), step_at(position - length)
     pull = weight * deep * (near - far)
     energy = weight * deep * deep
     tilt = energy * (rise - fall)
@@ -190,11 +190,11 @@ def add_second(p, u, w, touch, scale, definite, order, block):
             weight, y = scale * span * WEIGHTS[point], y0 + s * rate
             d = across[0] + s * turn[0], across[1] + s * turn[1], across[2] + s * turn[2]
             deep, part = touch * touch - dot(d, d), short * y
-            place, past = y / touch, (y - length) / touch
-            near, far = step_at(place), step_at(past)
-            own, e, steep = weight * (near[0] - far[0]), deep * deep, -2.0 * deep
+            position, past = y / touch, (y - length) / touch
+            near, far = step_at(position), step_at(past)
+            integral, e, steep = weight * (near[0] - far[0]), deep * deep, -2.0 * deep
             by_y, by_m = weight * (near[1] - far[1]) / touch, weight * far[1] / touch
-            yy, mm = weight * (bend_at(place) - bend_at(past)) / touch**2, -weight * bend_at(past) / touch**2
+            yy, mm = weight * (bend_at(position) - bend_at(past)) / touch**2, -weight * bend_at(past) / touch**2
             if definite:
                 e = steep = 0.0
             of_p, of_w = (1.0 - s, s, -1.0, 0.0), (0.0, 0.0, -1.0, 1.0)
@@ -204,13 +204,13 @@ def add_second(p, u, w, touch, scale, definite, order, block):
                     y_p, y_w, d_p, d_w = unit[i], short * d[i], 2.0 * d[i], -2.0 * part * d[i]
                     z_p, z_w, e_p, e_w = unit[j], short * d[j], 2.0 * d[j], -2.0 * part * d[j]
                     flat = (1.0 if i == j else 0.0) - unit[i] * unit[j]
-                    slope, mixed = own * steep, by_y * steep
-                    pp = yy * e * y_p * z_p + mixed * (y_p * e_p + d_p * z_p) + 2.0 * own * d_p * e_p
+                    slope, mixed = integral * steep, by_y * steep
+                    pp = yy * e * y_p * z_p + mixed * (y_p * e_p + d_p * z_p) + 2.0 * integral * d_p * e_p
                     pp += 2.0 * slope * flat
-                    pw = yy * e * y_p * z_w + mixed * (y_p * e_w + d_p * z_w) + 2.0 * own * d_p * e_w
+                    pw = yy * e * y_p * z_w + mixed * (y_p * e_w + d_p * z_w) + 2.0 * integral * d_p * e_w
                     pw += (-mm * e * y_p + by_m * steep * d_p) * unit[j] + by_y * e * short * flat
                     pw -= 2.0 * slope * (unit[i] * short * d[j] + part * flat)
-                    ww = yy * e * y_w * z_w + mixed * (y_w * e_w + d_w * z_w) + 2.0 * own * d_w * e_w
+                    ww = yy * e * y_w * z_w + mixed * (y_w * e_w + d_w * z_w) + 2.0 * integral * d_w * e_w
                     ww += mm * e * (unit[i] * unit[j] - y_w * unit[j] - unit[i] * z_w)
                     ww += by_m * (steep * (d_w * unit[j] + unit[i] * e_w) + e * short * flat)
                     bent = (unit[i] * d[j] + d[i] * unit[j]) * short

@@ -72,13 +72,13 @@ def place_of(x, cells, data, c):
 
 
 @kernel(forceinline=True)
-def apart(place, touch):
+def apart(geometry, touch):
     """Tell if a pair does certainly not touch: by its middles, then by the planes that both lines are parallel to.
 
     Of lines parallel to rounding u × w is what rounding leaves, in any direction. An error of `ROUNDING` |u||w|
     is allowed for, by (a + b)² ≤ 1.01 a² + 101 b².
     """
-    p, u, w = place
+    p, u, w = geometry
     uu, ww = dot(u, u), dot(w, w)
     m = p[0] + 0.5 * (u[0] - w[0]), p[1] + 0.5 * (u[1] - w[1]), p[2] + 0.5 * (u[2] - w[2])
     # within √2 touch of each other, and (a + b + c)² ≤ 3 (a² + b² + c²)

@@ -35,14 +35,14 @@ HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
 
 def pressed(system):
     """Number of the family of lines against lines of a system, None where there is none."""
-    found = (i for i, family in enumerate(system.families) if family.crossing is not None)
-    return next(found, None)
+    numbers = (i for i, family in enumerate(system.families) if family.crossing is not None)
+    return next(numbers, None)
 
 
 def lines_of(net, nodes):
     """ "lines 1 and 2", those of two elements by the nodes of both, shape (4,)."""
-    one, other = (net.line_between(pair) for pair in np.reshape(nodes, (2, 2)))
-    return f"lines {one} and {other}"
+    first, second = (net.line_between(pair) for pair in np.reshape(nodes, (2, 2)))
+    return f"lines {first} and {second}"
 
 
 def holding(energy, radius):
@@ -56,12 +56,12 @@ def would_pass(system, v, nodes):
     It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v. A node that a body
     carries comes with the mass of the body.
     """
-    held, pairs = system.held.all(axis=1), np.reshape(nodes, (2, 2))
+    fixed, pairs = system.held.all(axis=1), np.reshape(nodes, (2, 2))
     crossing = system.families[pressed(system)].crossing
     given = f"{lines_of(system.net, nodes)} would pass through each other"
     heavy = []
     for pair in pairs:
-        free = pair[~held[pair]].tolist()
+        free = pair[~fixed[pair]].tolist()
         rows = list(set(system.carriers.moving(free) if system.carriers else free))
         heavy.append(system.net.mass[rows].sum() if free else np.inf)
     mass = 1.0 / (1.0 / heavy[0] + 1.0 / heavy[1]) if np.isfinite(heavy).any() else np.inf
@@ -122,8 +122,8 @@ class Passage:
 
     def plain(self):
         """Overlap, radius and stiffness as ``run.json`` has them."""
-        own = {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
-        return {**own, "chosen": self._chosen}
+        values = {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
+        return {**values, "chosen": self._chosen}
 
     def told(self):
         """True if nothing can have passed, as ``run.json`` has it."""
@@ -141,10 +141,10 @@ class Passage:
 
     def remarks(self):
         """Remarks for a reader of the results."""
-        if (told := self.told()) != "certified":
-            yield f"lines may have passed through lines, {told}"
+        if (status := self.told()) != "certified":
+            yield f"lines may have passed through lines, {status}"
 
-    def _enough(self, overlap, own, v):
+    def _enough(self, overlap, elements, v):
         """Stiffness that may hold what overlaps so far [N/m].
 
         Above the top of the push what comes is hardly braked, and the overlap tells nothing of its energy: it is at
@@ -156,8 +156,8 @@ class Passage:
         if v is None:
             return enough
         mass, cells = self._system.net.mass, self._system.net.cells
-        nodes = cells[own].ravel() if own.ndim else np.unique(cells)
-        heavy = mass[cells[own if own.ndim else slice(None)]].sum(axis=1).max()
+        nodes = cells[elements].ravel() if elements.ndim else np.unique(cells)
+        heavy = mass[cells[elements if elements.ndim else slice(None)]].sum(axis=1).max()
         moving = 0.25 * heavy * float((np.ptp(v[nodes], axis=0) ** 2).sum())
         stored = self._stiffness * min(overlap / (AIM * radius), 1.0) ** POWER
         return max(enough, stored + holding(moving, radius))
@@ -175,14 +175,16 @@ class Passage:
         radius = 0.5 * self.touch
         if not overlap > radius:
             return
-        own = self._elements[cell]
-        names = " and ".join(str(n) for n in self._system.net.line[own].ravel().tolist()) if own.ndim else None
-        names = f"lines {names}" if names else f"line {self._system.net.line[own]} and another"
-        if own.ndim and self._system.held[self._system.net.cells[own]].all():
+        elements = self._elements[cell]
+        names = (
+            " and ".join(str(n) for n in self._system.net.line[elements].ravel().tolist()) if elements.ndim else None
+        )
+        names = f"lines {names}" if names else f"line {self._system.net.line[elements]} and another"
+        if elements.ndim and self._system.held[self._system.net.cells[elements]].all():
             raise SolverError(
                 f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}: {PRESCRIBED}"
             )
-        enough = float(f"{self._enough(overlap, own, v):.2g}")
+        enough = float(f"{self._enough(overlap, elements, v):.2g}")
         if self._chosen:
             enough = max(enough, STIFFER * self._stiffness)
             raise PenetrationError(

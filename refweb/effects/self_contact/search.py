@@ -37,27 +37,27 @@ BOXES = 4
 
 
 @kernel()
-def middles(x, cells, data, room):
-    """Write middle, half vector and half length of each element to ``room (elements, 7)``; the largest half length."""
-    most = 0.0
+def middles(x, cells, data, buffer):
+    """Write middle, half vector and half length of elements to ``buffer (elements, 7)``; the largest half length."""
+    widest = 0.0
     for c in range(cells.shape[0]):
         i, j, square = cells[c, 0], cells[c, 1], 0.0
         for k in range(3):
             a, b = data[c, ENDS + k] + x[i, k], data[c, ENDS + 3 + k] + x[j, k]
-            room[c, k], room[c, 3 + k] = 0.5 * (a + b), 0.5 * (b - a)
+            buffer[c, k], buffer[c, 3 + k] = 0.5 * (a + b), 0.5 * (b - a)
             square += (b - a) * (b - a)
-        room[c, 6] = 0.5 * math.sqrt(square)
-        most = max(most, room[c, 6])
-    return most
+        buffer[c, 6] = 0.5 * math.sqrt(square)
+        widest = max(widest, buffer[c, 6])
+    return widest
 
 
 @kernel()
-def boxes_of(width, room):
+def boxes_of(width, buffer):
     """(least place, width of the cells of a grid, numbers along the axes); no cells where places are not finite."""
     low, high, count = np.full(3, math.inf), np.full(3, -math.inf), np.ones(3, dtype=np.int64)
-    for c in range(room.shape[0]):
+    for c in range(buffer.shape[0]):
         for k in range(3):
-            low[k], high[k] = min(low[k], room[c, k]), max(high[k], room[c, k])
+            low[k], high[k] = min(low[k], buffer[c, k]), max(high[k], buffer[c, k])
     size = (high - low).max()
     if not (math.isfinite(size) and math.isfinite(width) and width > 0.0):
         count[0] = 0
@@ -68,30 +68,30 @@ def boxes_of(width, room):
         for k in range(3):
             count[k] = int((high[k] - low[k]) / width) + 1
             total *= count[k]
-        if total <= BOXES * room.shape[0] + 64:
+        if total <= BOXES * buffer.shape[0] + 64:
             return low, width, count
         width *= 1.3
 
 
 @kernel()
-def sorted_by_box(low, width, count, room):
-    """(elements in the order of boxes, where each box begins among them, and their rows of ``room``)."""
-    own, start = np.empty(room.shape[0], dtype=np.int64), np.zeros(count.prod() + 1, dtype=np.int64)
-    for c in range(room.shape[0]):
+def sorted_by_box(low, width, count, buffer):
+    """(elements in the order of boxes, where each box begins among them, and their rows of ``buffer``)."""
+    sorted_elements, start = np.empty(buffer.shape[0], dtype=np.int64), np.zeros(count.prod() + 1, dtype=np.int64)
+    for c in range(buffer.shape[0]):
         at = 0
         for k in range(3):
-            at = at * count[k] + min(int((room[c, k] - low[k]) / width), count[k] - 1)
-        own[c] = at
+            at = at * count[k] + min(int((buffer[c, k] - low[k]) / width), count[k] - 1)
+        sorted_elements[c] = at
         start[at + 1] += 1
     for b in range(1, start.size):
         start[b] += start[b - 1]
-    order, filled, rows = np.empty(room.shape[0], dtype=np.int64), start[:-1].copy(), np.empty(room.shape)
-    for c in range(room.shape[0]):
-        at = filled[own[c]]
+    order, filled, rows = np.empty(buffer.shape[0], dtype=np.int64), start[:-1].copy(), np.empty(buffer.shape)
+    for c in range(buffer.shape[0]):
+        at = filled[sorted_elements[c]]
         order[at] = c
-        filled[own[c]] += 1
-        for k in range(room.shape[1]):
-            rows[at, k] = room[c, k]
+        filled[sorted_elements[c]] += 1
+        for k in range(buffer.shape[1]):
+            rows[at, k] = buffer[c, k]
     return order, start, rows
 
 
@@ -138,15 +138,15 @@ def set_ranges(box, count, start, ranges):
     for n in range(4):
         i, j = (1, n - 1) if n < 3 else (0, 1)
         if q + i < count[0] and 0 <= y + j < count[1]:
-            other = box + (i * count[1] + j) * count[2]
-            ranges[amount, 0], ranges[amount, 1] = start[other - before], start[other + behind + 1]
+            neighbour = box + (i * count[1] + j) * count[2]
+            ranges[amount, 0], ranges[amount, 1] = start[neighbour - before], start[neighbour + behind + 1]
             amount += 1
     return amount
 
 
 @kernel()
-def fill(reach, count, start, order, rows, cells, data, found):
-    """Write all pairs of elements nearer than a reach to ``found``, as far as it has room; their number."""
+def fill(reach, count, start, order, rows, cells, data, pairs):
+    """Write all pairs of elements nearer than a reach to ``pairs``, as far as it has room; their number."""
     ranges, amount = np.empty((5, 2), dtype=np.int64), 0
     for box in range(start.size - 1):
         if start[box] == start[box + 1]:
@@ -160,8 +160,8 @@ def fill(reach, count, start, order, rows, cells, data, found):
                         continue
                     a, b = min(order[m], order[n]), max(order[m], order[n])
                     if nonadjacent(a, b, cells, data) and segments_meet(reach, m, n, rows):
-                        if amount < found.shape[0]:
-                            found[amount, 0], found[amount, 1] = a, b
+                        if amount < pairs.shape[0]:
+                            pairs[amount, 0], pairs[amount, 1] = a, b
                         amount += 1
     return amount
 
@@ -169,19 +169,19 @@ def fill(reach, count, start, order, rows, cells, data, found):
 @kernel()
 def pairs_within(skin, x, cells, data):
     """Numbers of all pairs of elements that may push each other when they come nearer by ``skin`` [m], shape (., 2)."""
-    found, room = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
+    pairs, buffer = np.empty((cells.shape[0] + 64, 2), dtype=np.int64), np.empty((cells.shape[0], 7))
     if cells.shape[0] < 2:
-        return found[:0]
+        return pairs[:0]
     reach = REACH * data[0, TOUCH] + skin
-    low, width, count = boxes_of(2.0 * middles(x, cells, data, room) + reach, room)
+    low, width, count = boxes_of(2.0 * middles(x, cells, data, buffer) + reach, buffer)
     if count[0] == 0:
-        return found[:0]
-    order, start, rows = sorted_by_box(low, width, count, room)
-    amount = fill(reach, count, start, order, rows, cells, data, found)
-    if amount > found.shape[0]:
-        found = np.empty((amount, 2), dtype=np.int64)
-        fill(reach, count, start, order, rows, cells, data, found)
-    return found[:amount]
+        return pairs[:0]
+    order, start, rows = sorted_by_box(low, width, count, buffer)
+    amount = fill(reach, count, start, order, rows, cells, data, pairs)
+    if amount > pairs.shape[0]:
+        pairs = np.empty((amount, 2), dtype=np.int64)
+        fill(reach, count, start, order, rows, cells, data, pairs)
+    return pairs[:amount]
 
 
 @kernel()

@@ -142,17 +142,17 @@ class SelfContact(Table):
         if self.friction > 0.0:
             from . import line_line_friction
 
-            own = dict(rubbing=line_line_friction.KICKS, twists=not self.rolling)
-            families.append(self._lossy(line_line_friction, all_listed, **own, **common))
+            friction_terms = dict(rubbing=line_line_friction.KICKS, twists=not self.rolling)
+            families.append(self._lossy(line_line_friction, all_listed, **friction_terms, **common))
         return families if len(families) > 1 else push
 
     @staticmethod
-    def _lossy(kernels, all_listed, **own):
+    def _lossy(kernels, all_listed, **arguments):
         """The family of damping or of friction, by the module of its kernels."""
         return Family(
             name="self_contact", force=kernels.force, bound=kernels.bound,
             stiffness=kernels.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
-            damping=kernels.damping, symmetric=False, at_rest=False, **own,
+            damping=kernels.damping, symmetric=False, at_rest=False, **arguments,
         )  # fmt: skip
 
     def stiffness_on(self, net):
@@ -185,13 +185,15 @@ class SelfContact(Table):
         if touch < FAR * net.natural_length.max():
             return
         cells, data = self._elements(net, np.zeros((len(net.cells), 0)))
-        graph, most = _graph(net), 0
-        for one in np.linspace(0, len(cells) - 1, SOME).astype(np.int64):
-            beside = _reached(graph, cells[one], touch).any(axis=0)[cells].any(axis=1)
-            most = max(most, int(beside.sum()))
-            chosen = np.column_stack([np.full((~beside).sum(), one), np.flatnonzero(~beside)])
+        graph, largest = _graph(net), 0
+        for element in np.linspace(0, len(cells) - 1, SOME).astype(np.int64):
+            beside = _reached(graph, cells[element], touch).any(axis=0)[cells].any(axis=1)
+            largest = max(largest, int(beside.sum()))
+            chosen = np.column_stack([np.full((~beside).sum(), element), np.flatnonzero(~beside)])
             self._refuse_overlap(net, chosen, *paired(chosen, cells, data))
-        memory.check(8.0 * SOME * most * len(cells), f"radius = {self.radius:g}: neighbours of {len(cells)} elements")
+        memory.check(
+            8.0 * SOME * largest * len(cells), f"radius = {self.radius:g}: neighbours of {len(cells)} elements"
+        )
 
     def _refuse_overlap(self, net, chosen, rows, numbers):
         """Refuse pairs of lines that overlap in the web's position."""
@@ -202,9 +204,9 @@ class SelfContact(Table):
         deep = 2.0 * self.radius - apart[worst]
         if deep <= ROUNDING * self.radius:
             return
-        one, other = net.line[chosen[worst]]
+        first, second = net.line[chosen[worst]]
         raise InputError(
-            f"radius = {self.radius:g}: lines {one} and {other} overlap by {deep:.3g} m in the web's "
+            f"radius = {self.radius:g}: lines {first} and {second} overlap by {deep:.3g} m in the web's "
             f"position, without being neighbours: it must be ≤ {0.5 * apart[worst]:.4g} [m], "
             "or the lines further apart"
         )
@@ -216,11 +218,11 @@ class SelfContact(Table):
 
 def listed(cells, data):
     """All pairs of elements that may touch, shape (pairs, 2)."""
-    one, other = np.triu_indices(len(cells), 1)
-    first, last = cells[one], cells[other]
+    first_element, second_element = np.triu_indices(len(cells), 1)
+    first, last = cells[first_element], cells[second_element]
     shared = (first[:, :, None] == last[:, None, :]).any(axis=(1, 2))
-    shared |= (data[one, APART:] == other[:, None]).any(axis=1)
-    return np.column_stack([one, other])[~shared].astype(np.int64)
+    shared |= (data[first_element, APART:] == second_element[:, None]).any(axis=1)
+    return np.column_stack([first_element, second_element])[~shared].astype(np.int64)
 
 
 def _graph(net):
@@ -255,17 +257,17 @@ def near_along(net, distance):
     reached = []
     for begin in range(0, count, 1000):
         nodes = np.arange(begin, min(begin + 1000, count))
-        one, other = np.nonzero(_reached(graph, nodes, distance))
-        reached.append(np.column_stack([nodes[one], other]))
-    one, other = np.concatenate(reached).T
-    close = csr_array((np.ones(len(one)), (one, other)), shape=(count, count))
+        first_row, second_row = np.nonzero(_reached(graph, nodes, distance))
+        reached.append(np.column_stack([nodes[first_row], second_row]))
+    first_row, second_row = np.concatenate(reached).T
+    close = csr_array((np.ones(len(first_row)), (first_row, second_row)), shape=(count, count))
     pairs = (meets.T @ close[: meets.shape[0], : meets.shape[0]] @ meets).tocoo()
     first, last = pairs.coords
     apart = (cells[first][:, :, None] != cells[last][:, None, :]).all(axis=(1, 2))
     first, last = first[apart], last[apart]
     order = np.lexsort((last, first))
     first, last = first[order], last[order]
-    place = np.arange(len(first)) - np.searchsorted(first, first)
-    beside = np.full((len(cells), place.max(initial=-1) + 1), -1.0)
-    beside[first, place] = last
+    column = np.arange(len(first)) - np.searchsorted(first, first)
+    beside = np.full((len(cells), column.max(initial=-1) + 1), -1.0)
+    beside[first, column] = last
     return beside

@@ -93,19 +93,19 @@ def closed(points, triangles):
     inward = _inward(points, triangles, piece, THIN * size**3)
     triangles = np.where(inward[piece][:, None], triangles[:, ::-1], triangles)
     used, number = np.unique(triangles, return_inverse=True)
-    own = Closed(points[used], number.reshape(-1, 3), int((turned ^ inward[piece]).sum()), count - len(triangles))
-    _refuse_crossings(own)
-    return own
+    solid = Closed(points[used], number.reshape(-1, 3), int((turned ^ inward[piece]).sum()), count - len(triangles))
+    _refuse_crossings(solid)
+    return solid
 
 
 def moments(points, triangles):
     """The `Moments` of the solid that a surface bounds."""
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     a, b, c = ((points - middle)[triangles[:, k]] for k in range(3))
-    own, s = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, a + b + c
-    volume = own.sum()
-    centre = (own[:, None] * s).sum(axis=0) / (4.0 * volume)
-    second = sum(np.einsum("i,ij,ik->jk", own, q, q) for q in (s, a, b, c)) / 20.0
+    tetrahedra, s = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, a + b + c
+    volume = tetrahedra.sum()
+    centre = (tetrahedra[:, None] * s).sum(axis=0) / (4.0 * volume)
+    second = sum(np.einsum("i,ij,ik->jk", tetrahedra, q, q) for q in (s, a, b, c)) / 20.0
     second -= volume * np.outer(centre, centre)
     return Moments(float(volume), middle + centre, np.trace(second) * np.eye(3) - second)
 
@@ -122,14 +122,14 @@ def _joined(points, triangles):
     near = SAME * max(np.abs(points[triangles]).max(), np.finfo(float).tiny)
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points), len(points)))
-    _, place = connected_components(graph, directed=False)
-    _, first = np.unique(place, return_index=True)
-    return points[first], place[triangles].astype(np.int64)
+    _, part = connected_components(graph, directed=False)
+    _, first = np.unique(part, return_index=True)
+    return points[first], part[triangles].astype(np.int64)
 
 
-def _edge(points, one, other):
-    one, other = (", ".join(f"{x:.6g}" for x in points[i]) for i in (one, other))
-    return f"from ({one}) to ({other})"
+def _edge(points, text_a, text_b):
+    text_a, text_b = (", ".join(f"{x:.6g}" for x in points[i]) for i in (text_a, text_b))
+    return f"from ({text_a}) to ({text_b})"
 
 
 def _neighbours(points, triangles):
@@ -170,19 +170,19 @@ def _oriented(points, triangles, pairs, along):
             turned[t] = turned[before[t]] ^ flip
     wrong = np.flatnonzero(turned[pairs[:, 0]] ^ turned[pairs[:, 1]] ^ along)
     if len(wrong):
-        one, other = pairs[wrong[0]]
-        edge = np.intersect1d(triangles[one], triangles[other])[:2]
+        first_piece, second = pairs[wrong[0]]
+        edge = np.intersect1d(triangles[first_piece], triangles[second])[:2]
         raise InputError(f"the surface has one side only, as a Möbius band, seen at the edge {_edge(points, *edge)}")
     return piece, turned
 
 
-def _inward(points, triangles, piece, least):
+def _inward(points, triangles, piece, smallest):
     """Mask of pieces to turn round: a piece inside another one bounds a hollow."""
     volume = np.array([
         moments(points, triangles[piece == i]).volume if _is_thick(points, triangles[piece == i]) else 0.0
         for i in range(piece.max() + 1)
     ])  # fmt: skip
-    if np.abs(volume).max() <= least:
+    if np.abs(volume).max() <= smallest:
         raise InputError(f"the surface is flat: its volume is {np.abs(volume).max():.3g}, a body has one")
     hollow = np.zeros(len(volume), dtype=bool)
     for i in range(len(volume) if len(volume) > 1 else 0):
@@ -209,12 +209,12 @@ def _refuse_crossings(surface):
     """Refuse a surface that crosses itself."""
     from .crossings import crossing
 
-    one, other = crossing(surface.points, surface.triangles)
-    if one < 0:
+    first, second = crossing(surface.points, surface.triangles)
+    if first < 0:
         return
-    where = surface.points[surface.triangles[one]].mean(axis=0)
-    place = ", ".join(f"{x:.6g}" for x in where)
+    where = surface.points[surface.triangles[first]].mean(axis=0)
+    coordinates = ", ".join(f"{x:.6g}" for x in where)
     raise InputError(
-        f"the surface crosses itself: triangle {one} about ({place}) and triangle {other} pass through each other; "
-        "join the solids to one (a boolean union) where the surface is made"
+        f"the surface crosses itself: triangle {first} about ({coordinates}) and triangle {second} pass through "
+        "each other; join the solids to one (a boolean union) where the surface is made"
     )

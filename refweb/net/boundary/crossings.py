@@ -22,9 +22,9 @@ def _volume(points, a, b, c, d):
     u0, u1, u2 = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
     v0, v1, v2 = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
     w0, w1, w2 = points[d, 0] - points[a, 0], points[d, 1] - points[a, 1], points[d, 2] - points[a, 2]
-    whole = u0 * (v1 * w2 - v2 * w1) + u1 * (v2 * w0 - v0 * w2) + u2 * (v0 * w1 - v1 * w0)
+    determinant = u0 * (v1 * w2 - v2 * w1) + u1 * (v2 * w0 - v0 * w2) + u2 * (v0 * w1 - v1 * w0)
     size = (u0 * u0 + u1 * u1 + u2 * u2) * (v0 * v0 + v1 * v1 + v2 * v2) * (w0 * w0 + w1 * w1 + w2 * w2)
-    return 0.0 if whole * whole <= ROUNDING * ROUNDING * size else whole
+    return 0.0 if determinant * determinant <= ROUNDING * ROUNDING * size else determinant
 
 
 @kernel()
@@ -35,19 +35,19 @@ def _passes(points, a, b, triangles, t):
         return False
     if not _volume(points, i, j, k, a) * _volume(points, i, j, k, b) < 0.0:
         return False
-    one, two, three = _volume(points, a, b, i, j), _volume(points, a, b, j, k), _volume(points, a, b, k, i)
-    return (one >= 0.0 and two >= 0.0 and three >= 0.0) or (one <= 0.0 and two <= 0.0 and three <= 0.0)
+    first, two, three = _volume(points, a, b, i, j), _volume(points, a, b, j, k), _volume(points, a, b, k, i)
+    return (first >= 0.0 and two >= 0.0 and three >= 0.0) or (first <= 0.0 and two <= 0.0 and three <= 0.0)
 
 
 @kernel()
 def _cells_of(points, corners, low, h, n, span):
     """Write the first and the last cell of the grid that some corners reach."""
     for k in range(3):
-        least, most = points[corners[0], k], points[corners[0], k]
+        lower, upper = points[corners[0], k], points[corners[0], k]
         for c in corners:
-            least, most = min(least, points[c, k]), max(most, points[c, k])
-        span[0, k] = min(max(int((least - low[k]) / h), 0), n[k] - 1)
-        span[1, k] = min(max(int((most - low[k]) / h), 0), n[k] - 1)
+            lower, upper = min(lower, points[c, k]), max(upper, points[c, k])
+        span[0, k] = min(max(int((lower - low[k]) / h), 0), n[k] - 1)
+        span[1, k] = min(max(int((upper - low[k]) / h), 0), n[k] - 1)
 
 
 @kernel()

@@ -60,9 +60,9 @@ def _near(points, triangles, origin, h, squares, nearest):
     low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for t in range(triangles.shape[0]):
         for k in range(3):
-            one, two, three = points[triangles[t, 0], k], points[triangles[t, 1], k], points[triangles[t, 2], k]
-            low[k] = max(int(math.floor((min(one, two, three) - origin[k]) / h)) - 1, 0)
-            high[k] = min(int(math.ceil((max(one, two, three) - origin[k]) / h)) + 1, squares.shape[k] - 1)
+            first, two, three = points[triangles[t, 0], k], points[triangles[t, 1], k], points[triangles[t, 2], k]
+            low[k] = max(int(math.floor((min(first, two, three) - origin[k]) / h)) - 1, 0)
+            high[k] = min(int(math.ceil((max(first, two, three) - origin[k]) / h)) + 1, squares.shape[k] - 1)
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
@@ -120,11 +120,11 @@ def _meets(points, triangle, x, y):
     x0, y0 = points[triangle[0], 0] - x, points[triangle[0], 1] - y
     x1, y1 = points[triangle[1], 0] - x, points[triangle[1], 1] - y
     x2, y2 = points[triangle[2], 0] - x, points[triangle[2], 1] - y
-    one, a = _side(x1, y1, x2, y2)
+    first, a = _side(x1, y1, x2, y2)
     two, b = _side(x2, y2, x0, y0)
     three, c = _side(x0, y0, x1, y1)
     total = a + b + c
-    if one == 0 or one != two or one != three or total == 0.0:
+    if first == 0 or first != two or first != three or total == 0.0:
         return False, 0.0
     z0, z1, z2 = points[triangle[0], 2], points[triangle[1], 2], points[triangle[2], 2]
     return True, (a * z0 + b * z1 + c * z2) / total

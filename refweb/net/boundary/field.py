@@ -117,11 +117,11 @@ depth.convex = False
 
 
 @kernel()
-def depths(places, address, found):
-    """Write the depth of places (n, 3) and its gradient to ``found (n, 4)``."""
+def depths(places, address, result):
+    """Write the depth of places (n, 3) and its gradient to ``result (n, 4)``."""
     for i in range(places.shape[0]):
         deep, g, _ = depth_at((places[i, 0], places[i, 1], places[i, 2]), address)
-        found[i, 0], found[i, 1], found[i, 2], found[i, 3] = deep, g[0], g[1], g[2]
+        result[i, 0], result[i, 1], result[i, 2], result[i, 3] = deep, g[0], g[1], g[2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,9 +161,9 @@ class Field:
 
     def at(self, places):
         """(depth (n,) [m], gradient (n, 3)) at places (n, 3)."""
-        found = np.empty((len(places), 4))
-        depths(np.ascontiguousarray(places), self.address, found)
-        return found[:, 0], found[:, 1:]
+        result = np.empty((len(places), 4))
+        depths(np.ascontiguousarray(places), self.address, result)
+        return result[:, 0], result[:, 1:]
 
 
 def field_of(points, triangles, cells, around=AROUND, known=None):
@@ -227,15 +227,15 @@ def _thickness(field, points, triangles):
     fold = u + v > 1.0
     u, v = np.where(fold, 1.0 - u, u)[:, None], np.where(fold, 1.0 - v, v)[:, None]
     places, inward = a[t] + u * (b[t] - a[t]) + v * (c[t] - a[t]), -normal[t] / area[t][:, None]
-    deepest, walls, way = 0.0, np.full(LOOKS, np.inf), 0.5 * field.spacing
-    look = np.arange(LOOKS)
-    while len(look):
-        deep, gradient = field.at(places[look] + way * inward[look])
+    deepest, walls, height = 0.0, np.full(LOOKS, np.inf), 0.5 * field.spacing
+    numbers = np.arange(LOOKS)
+    while len(numbers):
+        deep, gradient = field.at(places[numbers] + height * inward[numbers])
         deepest = max(deepest, float(deep.max()))
-        past = (gradient * inward[look]).sum(axis=1) < 0.5
-        over = look[past]
-        _, beyond = field.at(places[over] + (way + BEYOND * field.spacing) * inward[over])
+        past = (gradient * inward[numbers]).sum(axis=1) < 0.5
+        over = numbers[past]
+        _, beyond = field.at(places[over] + (height + BEYOND * field.spacing) * inward[over])
         wall = over[(beyond * inward[over]).sum(axis=1) < OPPOSITE]
-        walls[wall] = way
-        look, way = look[~past], way + 0.5 * field.spacing
+        walls[wall] = height
+        numbers, height = numbers[~past], height + 0.5 * field.spacing
     return float(min(np.sort(walls)[int(THINNER * LOOKS)], deepest))

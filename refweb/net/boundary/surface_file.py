@@ -38,14 +38,14 @@ def read(path):
         points, cells = _of_vtk(path)  # OBJ counts backwards with negative numbers
         if _strays(points, cells):
             raise InputError(f"its triangles name corners that are not among its {len(points)}")
-    triangles = [one for own in cells for one in _triangles(points, own)]
+    triangles = [triangle for cell_set in cells for triangle in _triangles(points, cell_set)]
     if not len(points) or not triangles:
         raise InputError("it holds no triangles: a body needs a closed surface")
     return points, np.ascontiguousarray(np.vstack(triangles), dtype=np.int64)
 
 
 def _strays(points, cells):
-    return any(own.min() < 0 or own.max() >= len(points) for own in cells)
+    return any(cell_set.min() < 0 or cell_set.max() >= len(points) for cell_set in cells)
 
 
 def _of_meshio(path, kind):
@@ -74,8 +74,8 @@ def _triangles(points, cells):
     fan = [cells[:, [0, k, k + 1]] for k in range(1, corners - 1)]
     if corners > 4:
         normals = [np.cross(points[f[:, 1]] - points[f[:, 0]], points[f[:, 2]] - points[f[:, 0]]) for f in fan]
-        whole = sum(normals)
-        bad = np.any([(own * whole).sum(axis=1) < 0.0 for own in normals], axis=0)
+        total = sum(normals)
+        bad = np.any([(normal * total).sum(axis=1) < 0.0 for normal in normals], axis=0)
         if bad.any():
             raise InputError(f"a face of {corners} corners is not convex: triangulate the surface where it is made")
     return fan

@@ -221,15 +221,22 @@ def _solid(path, content, scale, grid):
             "the metres a unit of the file"
         )
     volume, centre, inertia = moments(surface.points, surface.triangles)
-    own = surface._replace(points=surface.points - centre)
+    centred = surface._replace(points=surface.points - centre)
     mended = []
     if surface.turned:
-        mended.append(f"{surface.turned} of {len(own.triangles)} triangles faced inward and were turned")
+        mended.append(f"{surface.turned} of {len(centred.triangles)} triangles faced inward and were turned")
     if surface.dropped:
         mended.append(f"{surface.dropped} triangles of two corners were dropped")
-    field = _field(own, grid)
+    field = _field(centred, grid)
     return Solid(
-        own.points, own.triangles, centre, volume, inertia, field, is_convex(own.points, volume), tuple(mended)
+        centred.points,
+        centred.triangles,
+        centre,
+        volume,
+        inertia,
+        field,
+        is_convex(centred.points, volume),
+        tuple(mended),
     )
 
 

@@ -39,9 +39,9 @@ class TotalAngularMomentum(Nodal):
         """Compute it by sums over rows."""
         numbers, counted, spins = self._parts(state.system)
         mass, linear = numbers[:, :1], len(numbers)
-        place, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
+        position, speed = (all_of[:linear] - (mass * all_of[:linear]).sum(axis=0) / mass.sum() for all_of in (
             state.position, state.v))  # fmt: skip
-        total = np.cross(place, mass * speed)[counted].sum(axis=0)
+        total = np.cross(position, mass * speed)[counted].sum(axis=0)
         total += sum((moment * state.v[row] for row, moment in spins), np.zeros(3))
         return Value(float(self.sizes(total[None])[0]), None)
 
@@ -73,8 +73,8 @@ def angular_momentum(t, x, v, f, lines, rows, data, where):
         r = rows[3 + n]
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
-            one = (data[r, 1 + i] + x[r, i] - c[i] / total) * (v[r, j] - w[j] / total)
-            a[k] += data[r, 0] * (one - (data[r, 1 + j] + x[r, j] - c[j] / total) * (v[r, i] - w[i] / total))
+            term = (data[r, 1 + i] + x[r, i] - c[i] / total) * (v[r, j] - w[j] / total)
+            a[k] += data[r, 0] * (term - (data[r, 1 + j] + x[r, j] - c[j] / total) * (v[r, i] - w[i] / total))
     for n in range(3 + count, rows.size):
         for k in range(3):
             a[k] += data[linear + n - 3 - count, 0] * v[rows[n], k]

@@ -12,9 +12,12 @@ def weights(system, column):
     """Weights of (energy of each family, kinetic energy, work, step size) that make a column of the whole net."""
     total, books = column == "total_energy", [f.book for f in system.families]
     stored = [book not in ("work", "dissipated_energy") for book in books]
-    found = [(total and own) or (book != "work" and book == column) for own, book in zip(stored, books, strict=True)]
-    found += [total or column == "kinetic_energy", column == "work", column == "step_size"]
-    return np.array(found, dtype=float)
+    weights_found = [
+        (total and family_weight) or (book != "work" and book == column)
+        for family_weight, book in zip(stored, books, strict=True)
+    ]
+    weights_found += [total or column == "kinetic_energy", column == "work", column == "step_size"]
+    return np.array(weights_found, dtype=float)
 
 
 class Booked(Observable):

@@ -53,16 +53,16 @@ class Distance(Between):
 
     def rows(self, system):
         """The two."""
-        observe, found = self.observe, []
+        observe, numbers = self.observe, []
         if observe.node is not None:
-            found += system.net.find(observe.node).tolist()
-        found += [self._number_of(system, name) for name in (observe.body, observe.to) if name is not None]
-        if len(found) != 2:
+            numbers += system.net.find(observe.node).tolist()
+        numbers += [self._number_of(system, name) for name in (observe.body, observe.to) if name is not None]
+        if len(numbers) != 2:
             raise InputError(
-                f'quantity = "distance" is of {len(found)} places, must be 2: node = [i, j], a node and to = a body, '
+                f'quantity = "distance" is of {len(numbers)} places, must be 2: node = [i, j], a node and to = a body, '
                 "or a body and to = another"
             )
-        return np.array(found)
+        return np.array(numbers)
 
     def probe(self, system):
         """Make the probe of x and the reference position."""
@@ -77,13 +77,13 @@ class Mouth(Between):
 
     def rows(self, system):
         """The nodes."""
-        found = np.zeros(0) if self.observe.node is None else system.net.web.find_around(self.observe.node)
-        if len(found) < 3:
+        numbers = np.zeros(0) if self.observe.node is None else system.net.web.find_around(self.observe.node)
+        if len(numbers) < 3:
             raise InputError(
-                f'quantity = "{self.observe.quantity}" is of {len(found)} nodes, must be at least 3: name those of the '
-                "mouth in their order around, node = [i, j, k, ...]"
+                f'quantity = "{self.observe.quantity}" is of {len(numbers)} nodes, must be at least 3: name those of '
+                "the mouth in their order around, node = [i, j, k, ...]"
             )
-        return found
+        return numbers
 
 
 class MouthPerimeter(Mouth):

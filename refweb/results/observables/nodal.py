@@ -77,9 +77,11 @@ class Place(Nodal):
         sizes = self.sizes(self.vectors(state)[rows])
         if open_[np.argmax(sizes)] or floating.parts is None:
             return True
-        least, largest = floating.parts.reach[:, rows] + (self.vectors(state) - state.position)[rows]
-        most = np.linalg.norm(np.maximum(-least, largest), axis=1) if component is None else largest[:, component]
-        return bool((most[open_] > sizes.max()).any())
+        smallest, largest = floating.parts.reach[:, rows] + (self.vectors(state) - state.position)[rows]
+        largest_move = (
+            np.linalg.norm(np.maximum(-smallest, largest), axis=1) if component is None else largest[:, component]
+        )
+        return bool((largest_move[open_] > sizes.max()).any())
 
     def interval(self, state, equilibrium):
         """Range of one row along one axis, see `refweb.statics.floating.Parts.limits`."""

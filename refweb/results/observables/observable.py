@@ -103,8 +103,8 @@ class Observable:
         if size == 0.0:
             return 0.0
         share = SHARE * state.system.natural_length(state.time).min() / size
-        there = type(state)(state.system, state.time, state.x + share * move)
-        return abs(self.of(there).value - self.of(state).value) / share
+        moved = type(state)(state.system, state.time, state.x + share * move)
+        return abs(self.of(moved).value - self.of(state).value) / share
 
     def of_held_lines(self, state):
         """Effect on the value of rounding the strains, by `ROUNDING`, of lines that both ends hold.
@@ -113,15 +113,15 @@ class Observable:
         """
         system = state.system.at(state.time)
         net = system.net
-        held = system.supported[: net.nodes].all(axis=1)[net.cells].all(axis=1)
-        if not held.any():
+        fixed = system.supported[: net.nodes].all(axis=1)[net.cells].all(axis=1)
+        if not fixed.any():
             return 0.0
         changes, value = [], self.of(state).value
         for share in (SHARE, -SHARE):  # of a line that is neither slack nor taut, the side where it is taut
             numbers = net.line_data.copy()
-            numbers[held, LENGTH] *= 1.0 + share
-            there = type(state)(system.with_line_data(numbers), state.time, state.x)
-            changes.append(abs(self.of(there).value - value))
+            numbers[fixed, LENGTH] *= 1.0 + share
+            moved = type(state)(system.with_line_data(numbers), state.time, state.x)
+            changes.append(abs(self.of(moved).value - value))
         return max(changes) / SHARE * ROUNDING
 
     def floats(self, state, equilibrium):

@@ -74,7 +74,7 @@ class Observe(Table):
         reduce = "max"
     """
 
-    name: str = text(most=80)
+    name: str = text(limit=80)
     quantity: str = field(_quantity)
     node: Several = nodes(default=None)
     body: str | None = text(default=None)

@@ -57,14 +57,16 @@ def _deepest_of(rows):
 
 def probes_between(system):
     """Probes of the deepest contact of each pair of bodies, by name."""
-    pairs = [system.contact_forces.pair_rows(one, [other]) for one, other in pairs_of(system)]
+    pairs = [system.contact_forces.pair_rows(body_a, [body_b]) for body_a, body_b in pairs_of(system)]
     return {("between", k): _deepest_of(rows)._replace(sign=1.0) for k, rows in enumerate(pairs)}
 
 
-def probe_of_touch(system, body, other):
+def probe_of_touch(system, body, body_b):
     """The probe of the deepest contact of a body, None for any, with the web, or with another body."""
     bodies, forces = system.net.bodies if body is None else [body], system.contact_forces
-    return _deepest_of([forces.row(one) for one in bodies] if other is None else forces.pair_rows(other, bodies))
+    return _deepest_of(
+        [forces.row(body_a) for body_a in bodies] if body_b is None else forces.pair_rows(body_b, bodies)
+    )
 
 
 def probe_of_speed(system):
