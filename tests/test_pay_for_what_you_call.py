@@ -89,7 +89,7 @@ def roots(given, method):
     if len(bodies) > 1 and not (contact or {}).get("between_bodies"):
         yield "effects.contact.undetected_overlap"  # bodies that overlap in silence
     if "self_contact" in given:
-        yield from (f"effects.self_contact.{name}" for name in ("crossing", "passage", "press"))
+        yield from (f"effects.self_contact.{name}" for name in ("line_line_ccd", "penetration", "line_line_penalty"))
     if not static and given.get("accuracy", {}).get("error") != "none":
         yield "dynamics.twin_error"
     if contact is not None:

@@ -289,11 +289,13 @@ def test_friction_on_a_mesh_takes_energy(files):
 
 def test_scenes_without_a_mesh_do_not_import_it():
     code = """
-import sys, refweb body = refweb.Body(name="it", shape="box", size=(1, 1, 1), position=(0, 0, -0.6), fixed=True) web =
-refweb.Window(mesh="square", rows=2, columns=2, side=0.5) cable = refweb.Cable(law="linear", modulus=1e6, area=1e-5,
-density=1000.0) refweb.Scene(web=web, cable=cable, effects=[body, refweb.Contact(stiffness=1e3)]).build() found = [name
-for name in sys.modules if "boundary" in name or "shapes.mesh" in name or "contact.nonconvex_contacts" in name] assert
-not found and "pyvista" not in sys.modules and "meshio" not in sys.modules, found
+import sys, refweb
+body = refweb.Body(name="it", shape="box", size=(1, 1, 1), position=(0, 0, -0.6), fixed=True)
+web = refweb.Window(mesh="square", rows=2, columns=2, side=0.5)
+cable = refweb.Cable(law="linear", modulus=1e6, area=1e-5, density=1000.0)
+refweb.Scene(web=web, cable=cable, effects=[body, refweb.Contact(stiffness=1e3)]).build()
+loaded = [name for name in sys.modules if "boundary" in name or "shapes.mesh" in name or "nonconvex_contacts" in name]
+assert not loaded and "pyvista" not in sys.modules and "meshio" not in sys.modules, loaded
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
