@@ -9,11 +9,11 @@ def accepts(schema):
     A class of tables may stand where a schema does: it stands for that of its keys.
     """
 
-    def told(read):
+    def attach(read):
         read.accepts = schema
         return read
 
-    return told
+    return attach
 
 
 def limits(kind, above=None, at_least=None, below=None, at_most=None):

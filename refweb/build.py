@@ -13,7 +13,7 @@ from . import memory
 from .effects.base import refuse_found
 from .effects.elasticity import Elasticity
 from .errors import InputError, refused_at
-from .messages import nearest, shown
+from .messages import nearest, quote
 from .net import discretisation
 from .net.web import Web
 from .registry import EFFECTS, INTEGRATORS, load, name_of
@@ -89,7 +89,7 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
         refuse_found(system.families, 'start = "equilibrium"')
     system.initial_velocity()
     if system.laid is not None and solve.start != "web":
-        raise InputError(f'[solve] start = {shown(solve.start)} must be "web" with [fold], which is a start of its own')
+        raise InputError(f'[solve] start = {quote(solve.start)} must be "web" with [fold], which is a start of its own')
     _check_observables(observables, system, solve)
     _check_names(events, system)
     for i, event in enumerate(events):
@@ -106,7 +106,7 @@ def _web(web, folder):
         with refused_at("[web]"):
             return web.web(folder)
     except OSError as error:
-        path = shown(getattr(web, "path", ""))
+        path = quote(getattr(web, "path", ""))
         raise InputError(f"[web] path = {path}: cannot be read: {error.strerror or error}") from None
 
 
@@ -156,13 +156,13 @@ class _Placed:
     """An effect whose refusals begin with its table."""
 
     def __init__(self, key, effect):
-        self.place, self.effect = key, effect
+        self.key, self.effect = key, effect
 
     def __getattr__(self, name):
         method = getattr(self.effect, name)
 
         def call(*arguments):
-            with refused_at(self.place):
+            with refused_at(self.key):
                 return method(*arguments)
 
         return call
@@ -228,7 +228,7 @@ def _check_start(solve, accuracy):
     """Refuse finer elements where the state to start from is that of these."""
     if solve.kind == "dynamic" and solve.start not in START_STATES and accuracy.refine:
         raise InputError(
-            f"[accuracy] refine = true must be false with [solve] start = {shown(solve.start)}: the state "
+            f"[accuracy] refine = true must be false with [solve] start = {quote(solve.start)}: the state "
             "in that folder is of these elements, and finer ones have other nodes"
         )
 
@@ -241,7 +241,7 @@ def _check_observables(observables, system, solve):
             observable.on(system)
             _check_average(observable.average, solve)
             if (stands := columns.get(observable.name)) is not None:
-                name = shown(observable.name)
+                name = quote(observable.name)
                 raise InputError(f"name = {name} is {stands} of history.csv: names are unique")
         columns[observable.name] = f"the name of [[observe]] {i + 1} and a column"
 
@@ -259,7 +259,7 @@ def _check_names(events, system):
     named += [*(("[web] group ", group) for group in web.groups), *(("[web] node ", node) for node in web.names)]
     for key, name in named:
         if name in columns:
-            raise InputError(f"{key}{shown(name)} is {columns[name]} of history.csv: names are unique")
+            raise InputError(f"{key}{quote(name)} is {columns[name]} of history.csv: names are unique")
 
 
 def _check_average(average, solve):
@@ -278,7 +278,7 @@ def _check_average(average, solve):
 def _check_event(event, earlier, observables, system):
     """Refuse an event of what the system does not have, and one with the name of an ``earlier`` one."""
     if event.name in earlier:
-        raise InputError(f"name = {shown(event.name)} is already used by [[event]] {earlier.index(event.name) + 1}")
+        raise InputError(f"name = {quote(event.name)} is already used by [[event]] {earlier.index(event.name) + 1}")
     if event.kind == "contact":
         if not system.contact:
             raise InputError('kind = "contact" needs a [contact] in the scene')
@@ -286,10 +286,10 @@ def _check_event(event, earlier, observables, system):
     if event.kind == "taut":
         _check_taut(event, system.net)
     if event.kind == "threshold" and event.observe not in (names := [o.name for o in observables]):
-        raise InputError(f"observe = {shown(event.observe)} is not an observable, {nearest(event.observe, names)}")
+        raise InputError(f"observe = {quote(event.observe)} is not an observable, {nearest(event.observe, names)}")
     if event.kind == "threshold" and (average := observables[names.index(event.observe)].average) is not None:
         raise InputError(
-            f"observe = {shown(event.observe)} is a mean, average = {average:g}, and events are found by values of an "
+            f"observe = {quote(event.observe)} is a mean, average = {average:g}, and events are found by values of an "
             "instant: name an observable without average"
         )
 
@@ -298,18 +298,18 @@ def _check_touch(event, system):
     """Refuse bodies that the scene does not have, and such as do not touch each other."""
     bodies = {body.name: body for body in system.net.bodies}
     if event.body is not None and event.body not in bodies:
-        raise InputError(f"body = {shown(event.body)} is not a body, {nearest(event.body, bodies)}")
+        raise InputError(f"body = {quote(event.body)} is not a body, {nearest(event.body, bodies)}")
     if event.with_ in (None, "web"):
         return
     if event.with_ not in bodies:
         raise InputError(
-            f"with = {shown(event.with_)} is not a body or the web, {nearest(event.with_, ['web', *bodies])}"
+            f"with = {quote(event.with_)} is not a body or the web, {nearest(event.with_, ['web', *bodies])}"
         )
     others = [bodies[event.body]] if event.body else list(bodies.values())
     if not system.contact_forces.pair_rows(bodies[event.with_], others):
-        what = "another body" if event.body is None else f"body {shown(event.body)}"
+        what = "another body" if event.body is None else f"body {quote(event.body)}"
         raise InputError(
-            f"with = {shown(event.with_)} does not touch {what}: it takes two bodies, one of them free, and "
+            f"with = {quote(event.with_)} does not touch {what}: it takes two bodies, one of them free, and "
             "between_bodies = true in [contact]"
         )
 
@@ -319,6 +319,6 @@ def _check_taut(event, net):
     slackness = net.slackness[np.isin(net.line, net.web.find_lines(event.line, "line"))]
     if np.ptp(slackness) > 0.0:
         raise InputError(
-            f"line = {shown(event.line)}: these lines have slackness {slackness.min():g} … {slackness.max():g}, and "
+            f"line = {quote(event.line)}: these lines have slackness {slackness.min():g} … {slackness.max():g}, and "
             "snap taut at different strains: name lines of one slackness"
         )

@@ -15,7 +15,7 @@ def short(text):
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def shown(value):
+def quote(value):
     """A value as a message shows it: short, on one line, texts in quotes."""
     if isinstance(value, str):
         return f'"{short(value)}"'

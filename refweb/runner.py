@@ -239,7 +239,7 @@ def _idle(system, times):
         between = [0.5 * (before + after) for before, after in itertools.pairwise(times)]
         felt = [system.force_of(family, t, np.zeros((system.rows, 3))) != 0.0 for t in (*times, *between)[:MOST_TIMES]]
         acts = np.any(felt, axis=0)
-        if acts.any() and not (acts & ~system.held).any():  # a node that a free body carries moves with it
+        if acts.any() and not (acts & ~system.fixed).any():  # a node that a free body carries moves with it
             rows = np.flatnonzero(acts.any(axis=1))
             names = ", ".join(map(system.row_name, rows[:4])) + (", ..." if len(rows) > 4 else "")
             yield f"the {family.name} on {names} acts only on supports, which carry it: it moves nothing"

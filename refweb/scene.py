@@ -14,7 +14,7 @@ from dataclasses import field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from .errors import InputError, in_file, refused_at
-from .messages import nearest, short, shown
+from .messages import nearest, quote, short
 from .registry import EFFECTS, LISTS, PARTS, SOLVES, WEBS, load, name_of, with_files, with_fold
 from .settings import START_STATES, Accuracy, Dynamic, Head, Output, Static, Supports
 from .tables import Several, Table, table
@@ -106,7 +106,7 @@ class Scene:
             object.__setattr__(self, key, getattr(head, key))
         for key in ("effects", "support", "observe", "event"):
             if not isinstance(getattr(self, key), (list, tuple)):
-                raise InputError(f"{key} = {shown(getattr(self, key))} must be a list")
+                raise InputError(f"{key} = {quote(getattr(self, key))} must be a list")
             object.__setattr__(self, key, tuple(getattr(self, key)))
         for effect in self.effects:
             if name_of(EFFECTS, effect) is None:
@@ -118,9 +118,9 @@ class Scene:
                 if type(item).__name__ not in kinds:
                     names = " or ".join(f"refweb.{kind}" for kind in kinds if kind != "NoneType")
                     several = f"{names}: a list of them is support" if key == "supports" else names
-                    raise InputError(f"{key} = {shown(item)} must be {several}")
+                    raise InputError(f"{key} = {quote(item)} must be {several}")
         if type(self.web).__name__ != "Web" and not (isinstance(self.web, Table) and hasattr(self.web, "web")):
-            raise InputError(f"web = {shown(self.web)} must be a refweb.Web, or one of the tables that make one")
+            raise InputError(f"web = {quote(self.web)} must be a refweb.Web, or one of the tables that make one")
         self._fill()
 
     def _fill(self):
@@ -131,9 +131,9 @@ class Scene:
             raise InputError(f"[output] interval = {output.interval:g} has no meaning in statics: leave it out")
         for key in ("digits", "horizon") if not dynamic and self.accuracy is not None else ():
             if value := getattr(self.accuracy, key):
-                raise InputError(f"[accuracy] {key} = {shown(value)} has no meaning in statics: leave it out")
+                raise InputError(f"[accuracy] {key} = {quote(value)} has no meaning in statics: leave it out")
         if not dynamic and self.event:
-            raise InputError(f"[[event]] {shown(self.event[0].name)} has no meaning in statics: leave it out")
+            raise InputError(f"[[event]] {quote(self.event[0].name)} has no meaning in statics: leave it out")
         interval = (output.interval or min(1e-3, solve.duration)) if dynamic else None
         frames = output.frames or (10 if dynamic else 1)
         object.__setattr__(self, "output", Output(interval=interval, frames=frames))
@@ -177,7 +177,7 @@ class Scene:
             with in_file(name):
                 for key, value in values.items():
                     given = with_value(given, key, value)
-            name += " with " + ", ".join(f"{short(key)} = {shown(value)}" for key, value in values.items())
+            name += " with " + ", ".join(f"{short(key)} = {quote(value)}" for key, value in values.items())
         with in_file(name):
             return Scene.from_dict(given, path.resolve().parent, name)
 
@@ -343,7 +343,7 @@ class Scene:
 def file_of(source):
     """Path of a scene file, or of a scene shipped with refweb by its name; refused where there is neither."""
     if not isinstance(source, (str, os.PathLike)):
-        raise InputError(f"scene = {shown(source)} must be a Scene, a scene file or the name of a shipped scene")
+        raise InputError(f"scene = {quote(source)} must be a Scene, a scene file or the name of a shipped scene")
     path, known = pathlib.Path(source), shipped()
     if os.path.isfile(path):
         return path
@@ -372,12 +372,12 @@ def _as_given(key, value):
         return f"[{name}]"
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return f"[[{name}]]"
-    return f"{name} = {shown(value)}"
+    return f"{name} = {quote(value)}"
 
 
 def _each(key, table, given):
     if not isinstance(given, (list, tuple)):
-        raise InputError(f"[{key}] = {shown(given)} must be a list of tables: write [[{key}]]")
+        raise InputError(f"[{key}] = {quote(given)} must be a list of tables: write [[{key}]]")
     if not given:
         raise InputError(f"{key} = [] must hold at least one table: write [[{key}]] or leave it out")
     return tuple(table.read(f"[[{key}]] {i + 1}", entry) for i, entry in enumerate(given))
@@ -385,12 +385,12 @@ def _each(key, table, given):
 
 def _by_kind(key, given, kinds):
     if not isinstance(given, dict):
-        raise InputError(f"{key} = {shown(given)} must be a table: write [{key}]")
+        raise InputError(f"{key} = {quote(given)} must be a table: write [{key}]")
     kind = given.get("kind")
     if kind is None:
         raise InputError(f"[{key}] kind is missing: one of {', '.join(kinds)}")
     if not isinstance(kind, str) or kind not in kinds:
-        raise InputError(f"[{key}] kind = {shown(kind)}: unknown kind, {nearest(kind, kinds)}")
+        raise InputError(f"[{key}] kind = {quote(kind)}: unknown kind, {nearest(kind, kinds)}")
     return load(kinds[kind]).read(f"[{key}]", given)
 
 

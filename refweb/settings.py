@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from .errors import InputError
-from .messages import shown
+from .messages import quote
 from .registry import FACTORIZATIONS, INTEGRATORS, STATICS
 from .tables import Several, Table, boolean, choice, components, integer, nodes, numbers_list, real, table, text
 
@@ -181,7 +181,7 @@ class Dynamic(Table):
         for key in dict.fromkeys(key for method in INTEGRATORS.values() for key in method.keys):
             if getattr(self, key) is not None and key not in keys:
                 methods = " or ".join(f'"{name}"' for name, method in INTEGRATORS.items() if key in method.keys)
-                value = shown(getattr(self, key))
+                value = quote(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning with method = "{self.method}", only with {methods}')
         if self.order == 5:
             raise InputError("order = 5 must be 4 or 6")
@@ -254,7 +254,7 @@ class Event(Table):
             if value is None and key in needs:
                 raise InputError(f'{key} is missing: kind = "{self.kind}" needs {key} = ...')
             if value is not None and key not in may:
-                raise InputError(f'{key} = {shown(value)} has no meaning for kind = "{self.kind}": leave it out')
+                raise InputError(f'{key} = {quote(value)} has no meaning for kind = "{self.kind}": leave it out')
 
 
 @table

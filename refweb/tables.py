@@ -17,7 +17,7 @@ from typing import Any, ClassVar, dataclass_transform
 
 from .accepted import accepts, any_of, array, by_name, limits
 from .errors import InputError, refused_at
-from .messages import closest, nearest, short, shown
+from .messages import closest, nearest, quote, short
 
 LARGEST = 1e100
 """Largest value of a number with a unit: products of three stay finite."""
@@ -29,7 +29,7 @@ Several = Any
 
 
 def _refuse(name, value, limit):
-    raise InputError(f"{name} = {shown(value)} must be {limit}")
+    raise InputError(f"{name} = {quote(value)} must be {limit}")
 
 
 @accepts(limits("number", at_least=-LARGEST, at_most=LARGEST))
@@ -48,7 +48,7 @@ def _number(name, value, unit=""):
     return number
 
 
-def _whole(name, value, what="a whole number"):
+def _integer(name, value, what="a whole number"):
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
         _refuse(name, value, what)
     number = int(value)
@@ -106,7 +106,7 @@ def integer(default=MISSING, *, at_least=None, at_most=None) -> Any:
 
     @accepts(limits("integer", at_least=at_least, at_most=at_most))
     def read(name, value):
-        return _bounded(name, _whole(name, value), "", None, at_least, None, at_most)
+        return _bounded(name, _integer(name, value), "", None, at_least, None, at_most)
 
     return field(read, default=default)
 
@@ -124,7 +124,7 @@ def choice(*names, default=MISSING) -> Any:
                 return known
         close = closest(value, [n for n in valid() if isinstance(n, str)]) if isinstance(value, str) else None
         hint = f' — did you mean "{close}"?' if close else ""
-        _refuse(name, value, ("one of " if len(valid()) > 1 else "") + ", ".join(map(shown, valid())) + hint)
+        _refuse(name, value, ("one of " if len(valid()) > 1 else "") + ", ".join(map(quote, valid())) + hint)
 
     return field(read, default=default)
 
@@ -194,7 +194,7 @@ def rows(width, default=MISSING, *, unit="", increasing=False, number=_number) -
 @accepts({"type": "integer", "minimum": 0})
 def node_number(name, value):
     """Read one whole number ≥ 0."""
-    return _bounded(name, _whole(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
+    return _bounded(name, _integer(name, value, "a whole number ≥ 0"), "", None, 0, None, None)
 
 
 def numbers_list(default=MISSING, *, number=_number, empty=False) -> Any:
@@ -236,13 +236,13 @@ def nodes(default=MISSING, *, empty=False, what="node") -> Any:
         if isinstance(value, (list, tuple)):
             if not value and not empty:
                 _refuse(name, value, f"at least one {what}")
-            return tuple(one(f"{name}[{i}]", x) for i, x in enumerate(value))
-        return one(name, value)
+            return tuple(find(f"{name}[{i}]", x) for i, x in enumerate(value))
+        return find(name, value)
 
-    def one(name, value):
+    def find(name, value):
         if isinstance(value, str):
             return value
-        return _bounded(name, _whole(name, value, f"a {what} number or a name"), "", None, 0, None, None)
+        return _bounded(name, _integer(name, value, f"a {what} number or a name"), "", None, 0, None, None)
 
     return field(read, default=default)
 
@@ -256,7 +256,7 @@ def component(default=MISSING, *, axes="xyz") -> Any:
         if isinstance(value, str) and value in known:
             return axes.index(value)
         if isinstance(value, bool) or not isinstance(value, numbers.Integral) or int(value) not in known:
-            _refuse(name, value, "one of " + ", ".join(map(shown, known)))
+            _refuse(name, value, "one of " + ", ".join(map(quote, known)))
         return int(value)
 
     return field(read, default=default)
@@ -281,7 +281,7 @@ def by_group(kind, where, *, default_factory=dict) -> Any:
     @accepts(by_name(kind))
     def read(name, value):
         if not isinstance(value, dict):
-            raise InputError(f"{name} = {shown(value)} must be a table of groups, [{where}.groups.NAME]")
+            raise InputError(f"{name} = {quote(value)} must be a table of groups, [{where}.groups.NAME]")
         return {
             key: group if isinstance(group, kind) else kind.read(f"{name}.{short(key)}", group)
             for key, group in value.items()
@@ -300,7 +300,7 @@ def refuse_keys(cls, given):
     known = cls.keys(given) if issubclass(cls, Table) else [key_of(f) for f in dataclasses.fields(cls)]
     for key in given:
         if key not in known:
-            raise InputError(f"{short(key)} = {shown(given[key])}: unknown key, {nearest(key, known)}")
+            raise InputError(f"{short(key)} = {quote(given[key])}: unknown key, {nearest(key, known)}")
     for f in dataclasses.fields(cls):
         if f.default is MISSING and f.default_factory is MISSING and key_of(f) not in given:
             unit = f" [{f.metadata['unit']}]" if f.metadata.get("unit") else ""
@@ -381,7 +381,7 @@ class Table:
     def read(cls, where, given):
         """The table from a dict; ``where`` (such as ``[gravity]``) begins every message."""
         if not isinstance(given, dict):
-            raise InputError(f"{where} = {shown(given)} must be a table")
+            raise InputError(f"{where} = {quote(given)} must be a table")
         with refused_at(where):
             return cls(**given)
 

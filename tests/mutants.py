@@ -445,7 +445,7 @@ MUTANTS = [
     Mutant("results/solution", "max(self.value - lower, upper - self.value, 0.0)", "np.inf"),
     Mutant("results/columns", ", *dynamic_energies(system), *components(VECTORS)]", ", *dynamic_energies(system)]"),
     Mutant("build", 'named += [("[[body]] name = ", body.name) for body in system.net.bodies]', "pass"),
-    Mutant("runner", "acts & ~system.held", "acts & ~system.supported"),
+    Mutant("runner", "acts & ~system.fixed", "acts & ~system.supported"),
     Mutant("effects/self_contact/table", "self._refuse_too_large(net)", "pass"),
     Mutant(
         "dynamics/simulation",

@@ -11,7 +11,7 @@ from rich.table import Table as Grid
 from rich.text import Text
 
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..registry import EFFECTS, INTEGRATORS, name_of
 from ..results.provenance import web_of
 from ..results.summary_text import (
@@ -86,7 +86,7 @@ def print_scene(scene, system):
             ("", sizes),
             ("cable", f"{law}; E = {cable.modulus:g} Pa, A = {cable.area:g} m², ρ = {cable.density:g} kg/m³{groups}"),
             ("effects", ", ".join(counted) or "none"),
-            *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.told()),
+            *((f'body "{body.name}"', text) for body in system.net.bodies for text in body.shape.texts()),
             *_stiffness(scene, system),
             ("solve", how),
             *steps,
@@ -225,7 +225,7 @@ def print_comparison(comparison):
         for name in ("key", *folders):
             grid.add_column(Text(name))
         for row in comparison["scene"]:
-            grid.add_row(Text(row["path"]), *(Text("" if value is None else shown(value)) for value in row["values"]))
+            grid.add_row(Text(row["path"]), *(Text("" if value is None else quote(value)) for value in row["values"]))
         rows.append(("scenes", grid))
     else:
         rows.append(("scenes", "are the same"))

@@ -30,11 +30,11 @@ class _Words(argparse.Action):
 
     def __init__(self, *args, maximum, folder, **options):
         super().__init__(*args, **options)
-        self._most, self._folder = maximum, folder
+        self._maximum, self._folder = maximum, folder
 
     def __call__(self, parser, namespace, values, option_string=None):
         words = list(values or ())
-        count = self._most if _number(words[0]) else 1
+        count = self._maximum if _number(words[0]) else 1
         setattr(namespace, self.dest, words[:count])
         if words[count:] and namespace.folder is None:
             namespace.folder, self._folder.required = words[count], False

@@ -172,22 +172,22 @@ class Slot:
     """
 
     def __init__(self, symbol, key):
-        self.symbol, self.key, self._place = symbol, key, ctypes.c_void_p()
-        llvm.add_symbol(symbol, ctypes.addressof(self._place))
+        self.symbol, self.key, self._cell = symbol, key, ctypes.c_void_p()
+        llvm.add_symbol(symbol, ctypes.addressof(self._cell))
 
     @property
     def filled(self):
         """True if the address is known."""
-        return bool(self._place.value)
+        return bool(self._cell.value)
 
     @property
     def address(self):
         """The address, 0 where it is not known."""
-        return self._place.value or 0
+        return self._cell.value or 0
 
     def fill(self, address):
         """Write the address."""
-        self._place.value = address
+        self._cell.value = address
 
 
 _slots: dict[str, Slot] = {}

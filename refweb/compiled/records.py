@@ -41,7 +41,7 @@ class Reference(Pointer):
         made = keys.digest(*(f"{name} {kind}" for name, kind in self.fields.items()))
         super().__init__(name=f"{of.__name__}-{made[:12]}")
 
-    def place(self, name):
+    def position(self, name):
         """Number of the first word of a field, and its type."""
         at = 0
         for field, kind in self.fields.items():
@@ -70,7 +70,7 @@ class _Fields(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _read_field(context, builder, kind, value, name):
-    at, field = kind.place(name)
+    at, field = kind.position(name)
     word = load(builder, value, at)
     if isinstance(field, types.Array):
         return array_at(context, builder, field, word, [load(builder, value, at + 1 + n) for n in range(field.ndim)])

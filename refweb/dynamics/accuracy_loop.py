@@ -134,7 +134,7 @@ def _throw(simulation, run, ended, rows, known):
 
         twin = ended.rows, watch.state(ended.course)
         factor = SPREAD / (1.0 - simulation.integrator.error_share(run.course, ended.course))
-    return scene.throw.found(scene.observables, rows, state, twin, factor, known)
+    return scene.throw.results(scene.observables, rows, state, twin, factor, known)
 
 
 def _twin_of(simulation):
@@ -167,7 +167,7 @@ def reach_digits(simulation, digits, folder, tell):
             break
         reached, price = standing.knob, budget.price_of(simulation.integrator, max(falling), CLIMBS - climb)
         knob = reached * simulation.integrator.next_knob(max(falling))
-        if (expected := budget.expected(simulation.integrator, knob)) > budget.whole - budget.spent:
+        if (expected := budget.expected(simulation.integrator, knob)) > budget.total - budget.spent:
             why = f"the next run would take some {expected:.2g} s"
             solution.warnings.append(_over(simulation, digits, knob, why, price))
             break
@@ -198,6 +198,6 @@ def _over(simulation, digits, knob, why, price):
     """Text that accuracy is raised no further, and the cost of doing so."""
     budget, name = simulation.budget, simulation.integrator.knob
     return (
-        f"with {name} = {knob:.3g} {why}, more than what was left of the budget of {budget.whole:.3g} s of CPU time: "
+        f"with {name} = {knob:.3g} {why}, more than what was left of the budget of {budget.total:.3g} s of CPU time: "
         f"digits = {digits} would take some {price:.2g} s more; raise [accuracy] budget, or ask for fewer digits"
     )

@@ -56,7 +56,7 @@ class Budget:
         self.kept = True
 
     @property
-    def whole(self):
+    def total(self):
         """All of it [s]."""
         first = self.runs[0].price if self.runs else 0.0
         return max(LEAST, RUNS * first) if self._given is None else self._given
@@ -68,7 +68,7 @@ class Budget:
 
     def begin(self):
         """Note that a run begins."""
-        self._begun = clock(), self.whole - self.spent
+        self._begun = clock(), self.total - self.spent
 
     def end(self, knob, steps):
         """Note that it has come to its end, with a knob and so many steps."""
@@ -112,7 +112,7 @@ def steps_with_twin(scene):
     return 1.0 + math.sqrt(2.0) if scene.accuracy.error == "twin" else 1.0
 
 
-def look(simulation, share, twin=False):
+def check_budget(simulation, share, twin=False):
     """End a run of which a share is done, or its twin, where both would cost too much; `Spent`."""
     if not simulation.integrator.beside:  # the twin comes after the run
         both = steps_with_twin(simulation.scene)

@@ -195,7 +195,9 @@ class Watch:
                     value, when = float(extremes.values[slot]), float(extremes.times[slot])
             if o in self._probed and o.average is None:
                 final = o.reduce == "final"
-                where = o.value(state).where if final else o.observable.place(self.system, int(extremes.places[slot]))
+                where = (
+                    o.value(state).where if final else o.observable.position(self.system, int(extremes.places[slot]))
+                )
             at = None if where is None else o.observable.at
             left_out = None if neglected is None else abs(value) * neglected
             results[o.name] = Result(value, None, o.unit, when, where, neglected=left_out, at=at)
@@ -313,12 +315,12 @@ class Watch:
             at = self._of_warning(("overlap", body.name))
             value, index = float(extremes.values[at]), int(extremes.places[at])
             if value > 0.0:
-                overlaps.note(i, value, float(extremes.times[at]), int(self.system.net.line[index]))
+                overlaps.record(i, value, float(extremes.times[at]), int(self.system.net.line[index]))
 
         if overlaps.pairs is not None:
-            for i in range(len(overlaps.pairs.found)):
+            for i in range(len(overlaps.pairs.deepest)):
                 at = self._of_warning(("between", i))
-                overlaps.pairs.note(i, float(extremes.values[at]), float(extremes.times[at]))
+                overlaps.pairs.record(i, float(extremes.values[at]), float(extremes.times[at]))
 
     def note_way(self, course, pairs, integrator):
         """Note what has met in `refweb.effects.contact.pair_overlap.PairOverlaps`, or what bounds the way in a step."""

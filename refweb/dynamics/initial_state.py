@@ -64,7 +64,7 @@ def remarks_on(start, system):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
         yield f"{by} has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    off = np.linalg.norm(np.where(system.held, refined, 0.0)[: system.net.nodes], axis=1)
+    off = np.linalg.norm(np.where(system.fixed, refined, 0.0)[: system.net.nodes], axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
         worst = int(off.argmax())

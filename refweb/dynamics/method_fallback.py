@@ -61,7 +61,7 @@ class MethodFallback:
         """The scene with the method it is given to."""
         return self._scene.replace(solve=self.choice.solve)
 
-    def told(self):
+    def record(self):
         """Record of the choice for ``run.json``."""
         refused = {"refused": [refusal._asdict() for refusal in self.refused]} if self.refused else {}
         return {"choice": self.choice.reason, **refused}

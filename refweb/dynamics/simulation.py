@@ -12,7 +12,7 @@ from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
 from .accuracy_loop import AccuracyState, follow
-from .budget import Budget, look
+from .budget import Budget, check_budget
 from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
 from .integrators.crossings import APART, BESIDE, THROUGH
@@ -175,7 +175,7 @@ class Simulation:
             from ..statics.body_penetration import Passage
 
             passage = Passage(self.scene, self.system)
-            passage.note(State(self.system, 0.0, equilibrium_.x))
+            passage.record(State(self.system, 0.0, equilibrium_.x))
             passage.overlaps.refuse()
 
     def run(self, folder, tell):
@@ -185,11 +185,11 @@ class Simulation:
         self._refuse_overlap(course)
         tell(ahead / len(times))
 
-        def told(share):
+        def report(share):
             tell(share)
-            look(self, share)
+            check_budget(self, share)
 
-        integrator.on_progress = lambda t: told(t / times[-1])
+        integrator.on_progress = lambda t: report(t / times[-1])
         try:
             for first, history, compared in blocks(integrator, course, self.schedule, ahead):
                 table = self.watch.table(history)
@@ -197,7 +197,7 @@ class Simulation:
                     self._compared += self.watch.compared(self.watch.table(compared)).tolist()
                 self._refuse_overlap(course)
                 if self._silent is not None:
-                    self._silent.look(course.time, course.x)
+                    self._silent.inspect(course.time, course.x)
                 last = first + len(table) - 1
                 if folder is None:
                     self._tables.append(table)
@@ -207,12 +207,12 @@ class Simulation:
                         folder.row(row)
                 if last in self.schedule.frames or course.stopped:
                     self._frame(last, folder, course)
-                told((last + 1) / len(times))
+                report((last + 1) / len(times))
         except SolverError:
             self._refuse_overlap(course)  # whatever stopped it: what comes of a line within a body is nonsense
             raise
         finally:
-            self._note(course)
+            self._record(course)
         relative = self.standing.knob if integrator.knob == "rtol" else 0.0
         corrections = self.watch.corrections(course, relative, getattr(integrator, "tolerances", {}))
         return RunResult(self.watch.results(course, self._tables[-1][-1]), corrections, course)
@@ -240,7 +240,7 @@ class Simulation:
         course, row = self.integrator.load(fields_of(self._kept["run"])), int(self._kept["row"])
         self._compared = self._kept.get("compared", np.zeros((0, 0))).tolist()
         if self._silent is not None:
-            self._silent.take(self._kept.get("silent", np.zeros((0, 3))))
+            self._silent.restore(self._kept.get("silent", np.zeros((0, 3))))
         self._kept, self._tables = None, [np.array([folder.last_row()])]
         times, frames = self.schedule.times, self.schedule.frames
         folder.listed([*((n, times[n]) for n in frames[frames < row]), (row, course.time)], self.system.net.bodies)
@@ -257,7 +257,7 @@ class Simulation:
 
                 chosen = self.scene.settled().chosen
                 self._lines = Passage(self.system, self._unfollowed(), "self_contact" in chosen)
-            self._lines.note(deepest[0], course.crossings[[APART, BESIDE]])
+            self._lines.record(deepest[0], course.crossings[[APART, BESIDE]])
             overlap, time, cell = deepest
             self._lines.refuse(overlap, f"t = {time:.6g} s", cell, course.v)
 
@@ -270,7 +270,7 @@ class Simulation:
             return "nodes that turn with a body by [[attach]] do not move in straight lines"
         return None
 
-    def _note(self, course):
+    def _record(self, course):
         """Take the state of a run over into the solution."""
         solution, watch = self.solution, self.watch
         self._largest_stress, self._unfilled = watch.largest_stress(course), watch.unfilled(course)
@@ -283,10 +283,10 @@ class Simulation:
                 watch.note_way(course, pairs, self.integrator)
                 solution.pairs, solution.passage = pairs.plain(), {"pairs": pairs.passage()}
         if self._through is not None:
-            self._through.note(course.crossings[THROUGH])
-            solution.passage = {**solution.passage, "bodies": self._through.told()}
+            self._through.record(course.crossings[THROUGH])
+            solution.passage = {**solution.passage, "bodies": self._through.status()}
         if self._lines is not None:
-            solution.passage, solution.lines = {**solution.passage, "lines": self._lines.told()}, self._lines.plain()
+            solution.passage, solution.lines = {**solution.passage, "lines": self._lines.status()}, self._lines.plain()
         if np.isfinite(course.x).all():
             solution.state = self._state(course)
         if course.breaks is not None:
@@ -299,7 +299,7 @@ class Simulation:
         outer = (f for f in self.system.families if not f.internal and f.impulse is None)
         if integrated := sorted({family.name for family in outer}):
             spent["integrated_impulses"] = integrated
-        choice = {} if self._ways is None else self._ways.told()
+        choice = {} if self._ways is None else self._ways.record()
         solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}
         solution.solver["slack_nodes"] = len(solution.state.slack_nodes) if solution.state else None
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..results.solution import Result
-from .budget import look
+from .budget import check_budget
 from .history import SPREAD
 from .integrators.integrator import IntegratorState
 from .schedule import blocks
@@ -83,7 +83,7 @@ class Twin:
     def _breathe(self, t):
         if self._stop.is_set():
             raise InterruptedError(f"the twin run was ended at t = {t:g} s")
-        look(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
+        check_budget(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
 
     def _run(self, made):
         simulation, rows = self._simulation, []

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import FORCE, kernel
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 from ..tables import Several, Table, nodes, table, text, vector
 from .base import PrescribedMotion, column
 
@@ -78,12 +78,12 @@ class Attach(Table):
         """The net with the nodes on the body."""
         names = [body.name for body in net.bodies]
         if self.body not in names:
-            raise InputError(f"body = {shown(self.body)} is not a [[body]], {nearest(self.body, names)}")
+            raise InputError(f"body = {quote(self.body)} is not a [[body]], {nearest(self.body, names)}")
         number = names.index(self.body)
         body = net.bodies[number]
         if body.shape.planar and not body.fixed:
             raise InputError(
-                f"body = {shown(self.body)} is a {type(body.shape).__name__.lower()}, which keeps its plane: give it "
+                f"body = {quote(self.body)} is a {type(body.shape).__name__.lower()}, which keeps its plane: give it "
                 "another shape, such as a cylinder, or fixed = true"
             )
         nodes_found = np.unique(net.web.find(self.node))

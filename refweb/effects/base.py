@@ -46,7 +46,7 @@ class ImplicitContactKernels(NamedTuple):
 
     Attributes
     ----------
-    meet, recall, sweep, give : kernel
+    detect, recall, sweep, commit : kernel
         What touches, its forces in the step before, one sweep over it, and its power; signatures are in
         `refweb.kernels`. Families that stand together and have the same ``sweep`` are swept together.
     width : int
@@ -57,10 +57,10 @@ class ImplicitContactKernels(NamedTuple):
         Whether they know of nodes that bodies carry; to others these stand still.
     """
 
-    meet: Callable
+    detect: Callable
     recall: Callable
     sweep: Callable
-    give: Callable
+    commit: Callable
     width: int
     memory: int
     carried: bool = False

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..accepted import accepts, any_of, array, limits
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..net.rigid_body import RigidBody, Shape, matrix_of
 from ..registry import SHAPES, load
 from ..tables import (
@@ -52,21 +52,21 @@ def _inertia(name, value):
     if not isinstance(value, (list, tuple)):
         return checked(name, value, _moment)
     if len(value) != 3:
-        raise InputError(f"{name} = {shown(value)} must be a number, three, or 3 rows of 3 [kg m²]")
+        raise InputError(f"{name} = {quote(value)} must be a number, three, or 3 rows of 3 [kg m²]")
     if not isinstance(value[0], (list, tuple)):
         tensor = np.diag(checked(name, value, numbers_list()))
     else:
         tensor = np.array(checked(name, value, rows(3)))
     if not np.abs(tensor - tensor.T).max() <= EVEN * np.abs(tensor).max():
-        raise InputError(f"{name} = {shown(value)} must be symmetric")
+        raise InputError(f"{name} = {quote(value)} must be symmetric")
     smallest, middle, largest = np.linalg.eigvalsh(tensor)
     if not smallest > 0.0:
         raise InputError(
-            f"{name} = {shown(value)} must be positive definite: its principal moments begin at {smallest:g}"
+            f"{name} = {quote(value)} must be positive definite: its principal moments begin at {smallest:g}"
         )
     if not largest <= (1.0 + EVEN) * (smallest + middle):
         raise InputError(
-            f"{name} = {shown(value)} is no body's: the largest principal moment {largest:g} must be ≤ "
+            f"{name} = {quote(value)} is no body's: the largest principal moment {largest:g} must be ≤ "
             f"{smallest + middle:g} [kg m²], the sum of the others"
         )
     return tuple(tuple(row) for row in (0.5 * (tensor + tensor.T)).tolist())
@@ -77,9 +77,9 @@ def _quaternion(name, value):
     """Read a quaternion that is not zero."""
     quaternion = checked(name, value, numbers_list())
     if len(quaternion) != 4:
-        raise InputError(f"{name} = {shown(value)} must be a quaternion [w, x, y, z], not {len(quaternion)} numbers")
+        raise InputError(f"{name} = {quote(value)} must be a quaternion [w, x, y, z], not {len(quaternion)} numbers")
     if not any(quaternion):
-        raise InputError(f"{name} = {shown(value)} must not be zero")
+        raise InputError(f"{name} = {quote(value)} must not be zero")
     return quaternion
 
 
@@ -238,9 +238,9 @@ class Body(Table):
         if self.orientation is None:
             self.form.frame()
         elif given:
-            raise InputError(f"orientation = {shown(self.orientation)} and {given[0]} exclude each other: give one")
+            raise InputError(f"orientation = {quote(self.orientation)} and {given[0]} exclude each other: give one")
         if self.form.planar and isinstance(self.inertia, tuple):
-            raise InputError(f'inertia = {shown(self.inertia)} must be a number for shape = "{self.shape}"')
+            raise InputError(f'inertia = {quote(self.inertia)} must be a number for shape = "{self.shape}"')
 
     def _form(self):
         """The table of the shape, from what is given of its keys."""
@@ -250,7 +250,7 @@ class Body(Table):
             if f.default is MISSING and f.name not in given:
                 raise InputError(f'{f.name} is missing: shape = "{self.shape}" needs {f.name} = ...')
         for key in given.keys() - _keys(self.shape):
-            raise InputError(f'{key} = {shown(given[key])} has no meaning for shape = "{self.shape}"')
+            raise InputError(f'{key} = {quote(given[key])} has no meaning for shape = "{self.shape}"')
         return kind(**given)
 
     def extend(self, net):

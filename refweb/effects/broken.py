@@ -35,7 +35,7 @@ def kernels(column):
     return force, energy
 
 
-def held(net):
+def held_energy(net):
     """The `Family` of what broken elements held, and of their tension and strain, which are 0.
 
     Raises

@@ -190,7 +190,7 @@ def warm_start(along, apply_force):
                 apply_force(touches, n, force[0], force[1], force[2], f)
 
     @kernel(COMMIT)
-    def give(number, memory, v, touches, begin, end, out):
+    def commit(number, memory, v, touches, begin, end, out):
         """Write the power of each cell at the velocities v, with the force that a body feels; remember forces."""
         out[:] = 0.0
         for n in range(begin, end):
@@ -205,4 +205,4 @@ def warm_start(along, apply_force):
             for i in range(3):
                 out[c, 0] += touches[n, FORCES + i] * along(touches, n, i, v)
 
-    return recall, give
+    return recall, commit

@@ -50,7 +50,7 @@ def kernels(law, gradients, weights):
         return p0, p1, p2, weights[q] * tension * inverse, tension, e
 
     @kernel()
-    def give(f, cells, c, pull, out):
+    def add_pull(f, cells, c, pull, out):
         """Add the forces of an element of one point, and write what it shows."""
         p0, p1, p2, scale, tension, e = pull
         pull_together(f, cells, c, 0, nodes, flat, scale, p0, p1, p2)
@@ -76,12 +76,12 @@ def kernels(law, gradients, weights):
             i, j, k, m = np.uint64(n), np.uint64(n + 1), np.uint64(n + 2), np.uint64(n + 3)
             first, second = pull_at(x, cells, data, i, 0), pull_at(x, cells, data, j, 0)
             third, fourth = pull_at(x, cells, data, k, 0), pull_at(x, cells, data, m, 0)
-            give(f, cells, i, first, out)
-            give(f, cells, j, second, out)
-            give(f, cells, k, third, out)
-            give(f, cells, m, fourth, out)
+            add_pull(f, cells, i, first, out)
+            add_pull(f, cells, j, second, out)
+            add_pull(f, cells, k, third, out)
+            add_pull(f, cells, m, fourth, out)
         for n in range(fours, cells.shape[0]):
-            give(f, cells, np.uint64(n), pull_at(x, cells, data, np.uint64(n), 0), out)
+            add_pull(f, cells, np.uint64(n), pull_at(x, cells, data, np.uint64(n), 0), out)
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):

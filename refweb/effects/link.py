@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..tables import Several, Table, nodes, table
 from .base import Constraint
 
@@ -40,11 +40,11 @@ class Link(Table):
     def check(self):
         """Refuse fewer than two nodes."""
         if not isinstance(self.nodes, tuple) or len(self.nodes) < 2:
-            raise InputError(f"nodes = {shown(self.nodes)} must be a list of two nodes or more")
+            raise InputError(f"nodes = {quote(self.nodes)} must be a list of two nodes or more")
 
     def on(self, net):
         """The pairs of rows, and their distances."""
-        ends = [self._one(net, i, node) for i, node in enumerate(self.nodes)]
+        ends = [self._node(net, i, node) for i, node in enumerate(self.nodes)]
         cells = np.column_stack([ends[:-1], ends[1:]]).astype(np.int32)
         apart = net.points[cells[:, 1]] - net.points[cells[:, 0]]
         length = np.linalg.norm(apart, axis=1)
@@ -52,8 +52,8 @@ class Link(Table):
             raise InputError(f"nodes[{i}] = {ends[i]} and nodes[{i + 1}] = {ends[i + 1]} must not be at one place")
         return Constraint(cells=cells, data=np.column_stack([apart, length]))
 
-    def _one(self, net, i, node):
+    def _node(self, net, i, node):
         nodes_found = net.web.find(node, f"nodes[{i}]")
         if len(nodes_found) != 1:
-            raise InputError(f"nodes[{i}] = {shown(node)} is {len(nodes_found)} nodes, must be one")
+            raise InputError(f"nodes[{i}] = {quote(node)} is {len(nodes_found)} nodes, must be one")
         return int(nodes_found[0])

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, real, rows, table
 from .base import BreakLimits
-from .broken import HELD, held
+from .broken import HELD, held_energy
 
 
 @table
@@ -116,4 +116,4 @@ class Rupture(Table):
         weakness = BreakLimits(limits, tuple(sorted(middles)))
         if net.quasi_static:
             return weakness
-        return [held(net), weakness]
+        return [held_energy(net), weakness]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from ..messages import shown
+from ..messages import quote
 from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table
 from .base import without
@@ -110,7 +110,7 @@ class Thrust(Table):
         """The family of one element; ``out`` is the power [W]."""
         nodes_found = net.web.find(self.node)
         if len(nodes_found) != 1:
-            raise InputError(f"node = {shown(self.node)} is {len(nodes_found)} nodes, must be one")
+            raise InputError(f"node = {quote(self.node)} is {len(nodes_found)} nodes, must be one")
         line = self._line(net.web, nodes_found[0])
         second = int(nodes_found[0] == net.web.lines[line, 1])
         cell = np.flatnonzero(net.line == line)[-second]
@@ -134,5 +134,5 @@ class Thrust(Table):
             return int(lines_here[0])
         if len(lines) == 1:
             ends = web.lines[lines[0]]
-            raise InputError(f"node = {shown(self.node)} must be an end of line {lines[0]}, {ends[0]} or {ends[1]}")
-        raise InputError(f"line = {shown(self.line)}: {len(lines_here)} of its lines end at node {node}, must be one")
+            raise InputError(f"node = {quote(self.node)} must be an end of line {lines[0]}, {ends[0]} or {ends[1]}")
+        raise InputError(f"line = {quote(self.line)}: {len(lines_here)} of its lines end at node {node}, must be one")

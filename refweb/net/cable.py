@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..tables import LARGEST, Table, by_group, choice, integer, real, table
 from .groups import givers
 from .tension_laws import NAMES, SMOOTH
@@ -182,7 +182,7 @@ class Cable(Table):
             for line in np.flatnonzero(plain & (given.get(key, np.full(len(plain), -1)) >= 0))[:1]:
                 group, law = list(self.groups)[given[key][line]], list(NAMES)[values["law"][line]]
                 raise InputError(
-                    f"[cable.groups] {shown(group)} gives {key} to line {line}, where it has no meaning with law = "
+                    f"[cable.groups] {quote(group)} gives {key} to line {line}, where it has no meaning with law = "
                     f'"{law}"'
                 )
             values[key][plain] = 0.0

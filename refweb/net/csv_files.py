@@ -7,7 +7,7 @@ import csv
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 from .web import Web
 
 POINTS = {"x": True, "y": True, "z": True, "name": False, "support": False}
@@ -58,7 +58,7 @@ class _Columns:
                 values.append(empty if not text and empty is not None else int(text) if integer else float(text))
             except ValueError:
                 kind = "a whole number" if integer else "a number"
-                raise InputError(f"{self.at(number)}: {key} = {shown(text)} must be {kind}") from None
+                raise InputError(f"{self.at(number)}: {key} = {quote(text)} must be {kind}") from None
         return np.array(values, dtype=np.int64 if integer else np.float64)
 
 
@@ -75,12 +75,12 @@ def _table(path, known):
     head = [name.lower() for name in rows[0][1]] if rows else []
     for name in head:
         if name not in known:
-            raise InputError(f"{path.name}: column {shown(name)} is unknown, {nearest(name, known)}")
+            raise InputError(f"{path.name}: column {quote(name)} is unknown, {nearest(name, known)}")
     for name, needed in known.items():
         if needed and name not in head:
-            raise InputError(f"{path.name}: column {name} is missing, the first row has {shown(','.join(head))}")
+            raise InputError(f"{path.name}: column {name} is missing, the first row has {quote(','.join(head))}")
     if len(set(head)) < len(head):
-        raise InputError(f"{path.name}: a column is listed twice in {shown(','.join(head))}")
+        raise InputError(f"{path.name}: a column is listed twice in {quote(','.join(head))}")
     for number, row in rows[1:]:
         if len(row) != len(head):
             raise InputError(f"{path.name}, line {number} has {len(row)} cells, the first row {len(head)}")

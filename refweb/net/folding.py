@@ -53,18 +53,18 @@ def distances(starts, ends, pairs):
     ua, va = (u * a).sum(axis=1), (v * a).sum(axis=1)
     square = np.full(len(pairs), np.inf)
 
-    def look(s, t):
+    def compare(s, t):
         apart = a + s[:, None] * u - t[:, None] * v
         np.minimum(square, (apart * apart).sum(axis=1), out=square)
 
     for end in (0.0, 1.0):
         s = np.full(len(pairs), end)
-        look(s, np.clip((va + s * uv) / np.maximum(vv, tiny), 0.0, 1.0))
-        look(np.clip((s * uv - ua) / np.maximum(uu, tiny), 0.0, 1.0), s)
+        compare(s, np.clip((va + s * uv) / np.maximum(vv, tiny), 0.0, 1.0))
+        compare(np.clip((s * uv - ua) / np.maximum(uu, tiny), 0.0, 1.0), s)
     deep = uu * vv - uv * uv
     s, t = ((first / np.maximum(deep, tiny)) for first in (uv * va - vv * ua, uu * va - uv * ua))
     inside = (deep > 1e-14 * uu * vv) & (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
-    look(np.where(inside, s, 0.0), np.where(inside, t, np.clip(va / np.maximum(vv, tiny), 0.0, 1.0)))
+    compare(np.where(inside, s, 0.0), np.where(inside, t, np.clip(va / np.maximum(vv, tiny), 0.0, 1.0)))
     return np.sqrt(square)
 
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 
 PLACES = ("inner", "anchors", "rim")
 """Groups by the number of a line's ends that are in the rim."""
@@ -51,7 +51,7 @@ def members(given, count):
 def _numbers(name, lines, count):
     lines = np.asarray(lines)
     if lines.ndim != 1 or lines.dtype.kind not in "iu":
-        raise InputError(f"groups.{name} = {shown(lines.tolist())} must be line numbers")
+        raise InputError(f"groups.{name} = {quote(lines.tolist())} must be line numbers")
     for line in lines[(lines < 0) | (lines >= count)][:1]:
         raise InputError(f"groups.{name} has line {line}, must be 0 … {count - 1}")
     return np.unique(lines).astype(np.int64)
@@ -94,12 +94,12 @@ def givers(groups, tables, count, where="groups"):
     for number, (name, table) in enumerate(tables.items()):
         if name not in groups:
             hint = nearest(name, groups) if groups else "this web has no groups"
-            raise InputError(f"{where} {shown(name)} is not a group of lines, {hint}")
+            raise InputError(f"{where} {quote(name)} is not a group of lines, {hint}")
         for key in table.to_dict():
             by = owners.setdefault(key, np.full(count, -1))
             for line in groups[name][by[groups[name]] >= 0][:1]:
                 raise InputError(
-                    f"{where} {shown(names[by[line]])} and {shown(name)} both give {key} to line {line}: give it in "
+                    f"{where} {quote(names[by[line]])} and {quote(name)} both give {key} to line {line}: give it in "
                     "one of them"
                 )
             by[groups[name]] = number

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..tables import Several, Table, checked, choice, field, node_number, numbers_list, real, rows, table, texts
 from .web import Web, in_range
 
@@ -17,7 +17,7 @@ LENGTH = real(above=0, unit="m")
 def _lengths(name, value):
     if isinstance(value, str):
         if value != "distance":
-            raise InputError(f'{name} = {shown(value)} must be "distance", one number or one for each line [m]')
+            raise InputError(f'{name} = {quote(value)} must be "distance", one number or one for each line [m]')
         return value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, (list, tuple)):
@@ -28,7 +28,7 @@ def _lengths(name, value):
 @accepts(by_name(any_of(node_number.accepts, array(node_number.accepts, 1))))
 def _names(name, value):
     if not isinstance(value, dict):
-        raise InputError(f"{name} = {shown(value)} must be a table of node numbers, such as {{tip = 3}}")
+        raise InputError(f"{name} = {quote(value)} must be a table of node numbers, such as {{tip = 3}}")
     result = {}
     for key, numbers in value.items():
         listed = numbers if isinstance(numbers, (list, tuple)) else [numbers]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..tables import Table, choice, table, text
 from .groups import members
 from .web import Web
@@ -70,8 +70,8 @@ class File(Table):
         """The `Web`; ``base`` is the folder that a relative path starts from."""
         folder, csv = Path(base or "."), Path(self.path).suffix.lower() == ".csv"
         if csv != (self.lines is not None):
-            has = f"lines = {shown(self.lines)} has no meaning with" if self.lines else "lines is missing beside"
-            raise InputError(f"{has} path = {shown(self.path)}: CSV has points and lines in two files")
+            has = f"lines = {quote(self.lines)} has no meaning with" if self.lines else "lines is missing beside"
+            raise InputError(f"{has} path = {quote(self.path)}: CSV has points and lines in two files")
         try:
             if self.lines is not None:
                 from .csv_files import web_of
@@ -81,7 +81,7 @@ class File(Table):
 
             return _web_of(read(folder / self.path))
         except InputError as error:
-            raise InputError(f"path = {shown(self.path)}: {error}") from None
+            raise InputError(f"path = {quote(self.path)}: {error}") from None
 
 
 def remarks(web):

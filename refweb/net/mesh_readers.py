@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import memory
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 
 FORMATS = {".vtu": "vtu", ".vtk": "vtk", ".vtp": None, ".msh": "gmsh"}
 """Formats of meshes by the end of their name, as meshio calls them; None for what VTK alone reads."""
@@ -90,7 +90,7 @@ def read(path):
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         known = ", ".join([*FORMATS, ".csv"])
-        raise InputError(f"format {shown(path.suffix)} must be one of {known}: use meshio convert")
+        raise InputError(f"format {quote(path.suffix)} must be one of {known}: use meshio convert")
     memory.check(memory.READING * path.stat().st_size, f"the {path.stat().st_size / 1e6:.3g} MB of {path.name}")
     if FORMATS[suffix] is None or _asks_for_vtk(path, suffix):
         return by_vtk(path)

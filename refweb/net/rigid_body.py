@@ -51,7 +51,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..messages import shown
+from ..messages import quote
 from ..tables import Table
 
 
@@ -127,7 +127,7 @@ class Shape(Table):
         """Warnings of what it was made of, each a text."""
         return ()
 
-    def told(self):
+    def texts(self):
         """Texts on it for the box of a scene."""
         return ()
 
@@ -360,9 +360,9 @@ def axes_of(axes):
     if axes is None:
         return np.eye(3)
     if len(axes) != 2:
-        raise InputError(f"axes = {shown(axes)} must be two vectors, not {len(axes)}")
+        raise InputError(f"axes = {quote(axes)} must be two vectors, not {len(axes)}")
     first, second = (unit(f"axes[{i}]", axis) for i, axis in enumerate(axes))
     if abs(first @ second) > 1e-6:
-        raise InputError(f"axes = {shown(axes)} must be at right angles")
+        raise InputError(f"axes = {quote(axes)} must be at right angles")
     second = unit("axes", second - (first @ second) * first)
     return np.array([first, second, np.cross(first, second)])

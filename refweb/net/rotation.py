@@ -115,7 +115,7 @@ class RigidRotations(Record):
         Largest distance of a point of a body from each of these axes, at most [m].
     before : ndarray, shape (bodies, 4)
         Space for quaternions.
-    room : ndarray, shape (TERMS + 1, 10)
+    terms_space : ndarray, shape (TERMS + 1, 10)
         Space for the terms of a series: of q, of L/I and of ω along the axes of the body.
     carried : ndarray of int, shape (carried, 2)
         Nodes that bodies carry, and the number of the body of each.
@@ -134,7 +134,7 @@ class RigidRotations(Record):
     faster: Matrix
     reach: Matrix
     before: Matrix
-    room: Matrix
+    terms_space: Matrix
     carried: IntegerMatrix
     arms: Matrix
     ahead: Matrix
@@ -159,7 +159,7 @@ class RigidRotations(Record):
             faster=faster,
             reach=np.array([_reach(b, axes) for b, axes in zip(bodies, principal, strict=True)]).reshape(count, 3),
             before=np.zeros((count, 4)),
-            room=np.zeros((TERMS + 1, 10)),
+            terms_space=np.zeros((TERMS + 1, 10)),
             carried=np.array(carried, dtype=np.int64).reshape(-1, 2),
             arms=arms,
             ahead=_exact(np.array(ahead).reshape(-1, 3), arms),
@@ -235,7 +235,7 @@ def note_turns(x, turns):
 @kernel(leaf=True)
 def series(h, n, v, turns, q):
     """Take the quaternion ``q (4,)`` of a free body on by a time h, by one series."""
-    terms_space, w, s = turns.room, turns.mobility[n], turns.rows[n, 1]
+    terms_space, w, s = turns.terms_space, turns.mobility[n], turns.rows[n, 1]
     start = times_transposed(matrix_of(q[0], q[1], q[2], q[3]), (v[s, 0], v[s, 1], v[s, 2]))
     for k in range(4):
         terms_space[0, k] = q[k]

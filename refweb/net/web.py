@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 from ..tables import Several, node_number
 from .groups import by_place, members
 
@@ -238,7 +238,7 @@ class Web:
             return np.arange(len(self.lines))
         if part == "rim":
             raise InputError(f'{name} = "rim": no line of this web joins two nodes of its rim, give line numbers')
-        raise InputError(f"{name} = {shown(part)} names no line, {nearest(part, ('all', *self.groups))}")
+        raise InputError(f"{name} = {quote(part)} names no line, {nearest(part, ('all', *self.groups))}")
 
     def _find_one(self, name, part):
         if not isinstance(part, str):
@@ -253,7 +253,7 @@ class Web:
             raise InputError(f'{name} = "rim": this web has no supports of its own, give node numbers')
         if part in SELECTIONS:
             return np.atleast_1d(getattr(self, part)).tolist()
-        raise InputError(f"{name} = {shown(part)} names no node, {nearest(part, (*SELECTIONS, *self.names))}")
+        raise InputError(f"{name} = {quote(part)} names no node, {nearest(part, (*SELECTIONS, *self.names))}")
 
 
 def _first(bad):
@@ -265,7 +265,7 @@ def in_range(name, numbers, count):
     """Numbers as int64; refuse those that are not 0 … count − 1."""
     numbers = np.asarray(numbers)
     if numbers.size and numbers.dtype.kind not in "iu":
-        raise InputError(f"{name} = {shown(numbers.tolist())} must be node numbers")
+        raise InputError(f"{name} = {quote(numbers.tolist())} must be node numbers")
     for i in _first((numbers < 0) | (numbers >= count)):
         raise InputError(f"{name}[{i}] = {numbers[i]} must be 0 … {count - 1}")
     return numbers.astype(np.int64)
@@ -273,7 +273,7 @@ def in_range(name, numbers, count):
 
 def _named(name, numbers, count):
     if name in SELECTIONS:
-        raise InputError(f"names.{name} = {shown(numbers)}: {', '.join(SELECTIONS)} have a meaning of their own")
+        raise InputError(f"names.{name} = {quote(numbers)}: {', '.join(SELECTIONS)} have a meaning of their own")
     return tuple(in_range(f"names.{name}", np.atleast_1d(numbers), count).tolist())
 
 

@@ -29,8 +29,8 @@ def space(record, drawn):
     if drawn is None:
         return section("space", "In space", tag("p", "No frame of this run can be drawn."))
     head, peak = drawn.head, record.chosen()
-    head["labels"] = [record.clock(number) for number in drawn.shown]
-    head["peak"] = drawn.shown.index(peak) if peak in drawn.shown else len(drawn.shown) - 1
+    head["labels"] = [record.clock(number) for number in drawn.numbers]
+    head["peak"] = drawn.numbers.index(peak) if peak in drawn.numbers else len(drawn.numbers) - 1
     for field in head["fields"]:
         ends = [abs(end) for pair in field["taut"] if pair for end in pair]
         field["factor"], field["shown"] = scaled_unit(field["name"], max(ends, default=0.0))
@@ -40,11 +40,11 @@ def space(record, drawn):
 
 def _on_frames(record, drawn, peak):
     """Sentence on the frames that are shown, and on their accuracy."""
-    count, total = len(drawn.shown), len(record.times)
+    count, total = len(drawn.numbers), len(record.times)
     words = [f"{count} of {total} frames." if count < total else f"All {total} frames." if total > 1 else "One frame."]
     left = total - count - len(drawn.missing)
     if left:
-        kept = f"the first, the last and {PEAK} are here" if peak in drawn.shown else ""
+        kept = f"the first, the last and {PEAK} are here" if peak in drawn.numbers else ""
         words.append(
             f"{left} are left out to keep the page small{'; ' + kept if kept else ''}; "
             "refweb report --frames N shows more."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..messages import shown
+from ..messages import quote
 from ..registry import EFFECTS
 from ..results.files import as_toml
 from ..results.summary_text import (
@@ -144,7 +144,7 @@ def _value(value):
         return f"{value:.6g}"
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }"
-    return shown(value)
+    return quote(value)
 
 
 def _sizes(web):

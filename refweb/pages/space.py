@@ -48,7 +48,7 @@ class Space(NamedTuple):
     text: str
     error: float
     extent: float
-    shown: list
+    numbers: list
     missing: list
 
 

@@ -27,7 +27,7 @@ class EnergyBalance(NamedTuple):
     ----------
     parts : dict of str to ndarray
         What is stacked, by name: energies [J], shape (rows,), where they have no zero above their least.
-    least : dict of str to float
+    smallest : dict of str to float
         What has been subtracted of each of them [J].
     top : ndarray
         Their sum [J].
@@ -36,7 +36,7 @@ class EnergyBalance(NamedTuple):
     """
 
     parts: dict
-    least: dict
+    smallest: dict
     top: np.ndarray
     given: np.ndarray
 
@@ -86,10 +86,10 @@ def energy(runs):
             area = axes.fill_between(at, below, above, hatch=HATCHES[number % len(HATCHES)], **fill)
             if len(mask) == 1:  # an instant has no breadth
                 axes.vlines(at, below, above, color=COLOURS[number % 7], linewidth=12.0)
-            entries.append((area, _called(name, book.least[name])))
+            entries.append((area, _called(name, book.smallest[name])))
             below = above
         (line,) = axes.plot(at, below, color=DARK, linewidth=1.6, marker=dot(mask))
-        entries.append((line, _called("sum", sum(book.least.values()))))
+        entries.append((line, _called("sum", sum(book.smallest.values()))))
         if dynamic:
             start = "at the start" + (" + work" if GIVEN in s.energies else "")
             (line,) = axes.plot(at, book.given[mask] / factor, color="white", linestyle=(0, (2, 2)), linewidth=1.6)

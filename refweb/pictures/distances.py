@@ -35,7 +35,7 @@ class Spread(NamedTuple):
         Slack lines.
     origin : str
         The place in words.
-    note : str
+    remark : str
         Which instant it is, where the largest value is that of another one; empty where it is of this.
     """
 
@@ -44,7 +44,7 @@ class Spread(NamedTuple):
     distance: np.ndarray
     slack: np.ndarray
     origin: str
-    note: str
+    remark: str
 
 
 def spread(record, field):
@@ -56,7 +56,7 @@ def spread(record, field):
     if field not in frame.fields:
         raise InputError(f"{record.name}: its frames hold no {field}")
     values, middles = np.asarray(frame.fields[field]), frame.origin.mean(axis=1)
-    origin_point, words = _place(record, frame, middles, values, field)
+    origin_point, words = _origin(record, frame, middles, values, field)
     remark = f"The frame at {at(record, frame.time)} is nearest to {name}, which is of {at(record, when)}."
     remark = "" if frame.time == when or not name else remark
     return Spread(frame, values, np.linalg.norm(middles - origin_point, axis=1), frame.slack, words, remark)
@@ -74,7 +74,7 @@ def largest(record, field):
     return name, max(steps or [results[name]], key=lambda entry: abs(entry["value"] or 0.0))["time"]
 
 
-def _place(record, frame, middles, values, field):
+def _origin(record, frame, middles, values, field):
     """Position of the hit or load [m], else of the largest value, its centre if all is slack; and its words."""
     numbers = np.asarray(frame.fields.get("line", np.arange(len(values))))
     touched = {
@@ -144,7 +144,9 @@ def distances(runs, field):
     places = dict.fromkeys(item.origin for item in spreads)
     origin_text = f"\nfrom {next(iter(places))}" if len(places) == 1 else ""
     return [
-        Panel(draw, f"distance in the undeformed web [{unit}]{origin_text}", 3.4, tuple(item.note for item in spreads))
+        Panel(
+            draw, f"distance in the undeformed web [{unit}]{origin_text}", 3.4, tuple(item.remark for item in spreads)
+        )
     ]
 
 

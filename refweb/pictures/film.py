@@ -93,7 +93,7 @@ class _Film:
     """The images of a film, and how they are written."""
 
     def __init__(self, record, poses, options, fps):
-        self._record, self._poses, self._look = record, poses, options
+        self._record, self._poses, self._options = record, poses, options
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
         self._read = functools.lru_cache(WARM_START)(record.frame)
@@ -124,7 +124,7 @@ class _Film:
                 raise
 
     def _frame(self, pose):
-        return self._read(pose.number).held_as(self._last).posed(self._look.scale, pose.phase)
+        return self._read(pose.number).held_as(self._last).posed(self._options.scale, pose.phase)
 
     def _survey(self, progress):
         """The stage that shows all images; of a swing its two ends and its middle do."""
@@ -133,9 +133,9 @@ class _Film:
         limits = None
         for pose in poses:
             progress("reading frames", 0.0)
-            limits_here = Seen.of(self._frame(pose), self._look.field).spanned()
+            limits_here = Seen.of(self._frame(pose), self._options.field).spanned()
             limits = limits_here if limits is None else limits.joined(limits_here)
-        return Stage.of(limits, self._look, SIZE[0] / SIZE[1])
+        return Stage.of(limits, self._options, SIZE[0] / SIZE[1])
 
     def _page(self):
         """Image of everything around the web, with transparency, RGBA."""
@@ -160,7 +160,7 @@ class _Film:
         if not beneath:
             page.paste(self._around, mask=self._around)
         pen = ImageDraw.Draw(page)
-        clock = clock_line(self._record, pose.number, self._look, self._decimals)
+        clock = clock_line(self._record, pose.number, self._options, self._decimals)
         pen.text((0.03 * SIZE[0], 0.095 * SIZE[1]), clock, DARK, _letters(16), "ls")
         pen.text((0.985 * SIZE[0], 0.985 * SIZE[1]), f"frame {pose.number}", PALE, _letters(11), "rs")
         return page

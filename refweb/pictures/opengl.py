@@ -152,7 +152,7 @@ class _Mesh:
         from vtkmodules.vtkCommonDataModel import vtkPolyData
         from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
-        self.data, self.actor, self._mapper, self._held = vtkPolyData(), vtkActor(), vtkPolyDataMapper(), {}
+        self.data, self.actor, self._mapper, self._buffers = vtkPolyData(), vtkActor(), vtkPolyDataMapper(), {}
         self._mapper.SetInputData(self.data)
         self.actor.SetMapper(self._mapper)
         properties = self.actor.GetProperty()
@@ -185,8 +185,8 @@ class _Mesh:
     def _array(self, name, values, kind):
         from vtkmodules.util.numpy_support import numpy_to_vtk
 
-        self._held[name] = np.ascontiguousarray(values, dtype=kind)
-        return numpy_to_vtk(self._held[name], deep=False)
+        self._buffers[name] = np.ascontiguousarray(values, dtype=kind)
+        return numpy_to_vtk(self._buffers[name], deep=False)
 
 
 class _TubeMesh(_Mesh):

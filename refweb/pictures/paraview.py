@@ -47,7 +47,7 @@ def script(folder, field=None, out=None):
     number = record.chosen()
     frame = record.frame(number)
     stage = stage_of(record, frame, field, SIZE)
-    options = stage.look
+    options = stage.options
     factor, unit = scaled_unit(options.field, max(map(abs, options.limits)))
     points, cells = _arrays(folder, number)
     given = {

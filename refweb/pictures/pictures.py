@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 from ..results.files import write_atomically
 from ..results.solution import SolutionData
 from . import render
@@ -106,7 +106,7 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
 def record_of(source):
     """The record of a solution or a folder."""
     if not isinstance(source, str | os.PathLike | SolutionData):
-        raise InputError(f"source = {shown(source)} must be a Solution or a result folder")
+        raise InputError(f"source = {quote(source)} must be a Solution or a result folder")
     return of_folder(source) if isinstance(source, str | os.PathLike) else of_solution(source)
 
 
@@ -114,7 +114,7 @@ def look_of(record, frame, field, limits, scale, view):
     """Check the options and make a `Look`; without limits [SI] they are those of all frames."""
     field = _field(frame, field)
     if not isinstance(scale, int | float) or not 0.0 < scale <= MOST_SCALED:
-        raise InputError(f"scale = {shown(scale)} must be a number > 0 and ≤ {MOST_SCALED:g}")
+        raise InputError(f"scale = {quote(scale)} must be a number > 0 and ≤ {MOST_SCALED:g}")
     return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
 
 
@@ -218,7 +218,7 @@ def _limits(record, frame, field, limits):
     try:
         low, high = (float(limit) for limit in limits)
     except (TypeError, ValueError):
-        raise InputError(f'range = {shown(limits)} must be two numbers [SI], low and high, or "auto"') from None
+        raise InputError(f'range = {quote(limits)} must be two numbers [SI], low and high, or "auto"') from None
     if not (np.isfinite([low, high]).all() and low < high):
         raise InputError(f"range = {low:g} {high:g}: low must be less than high")
     return low, high
@@ -231,7 +231,7 @@ def _view(view):
     try:
         direction = np.array(view, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(f"view = {shown(view)}: is no view, {nearest(str(view), VIEWS)}") from None
+        raise InputError(f"view = {quote(view)}: is no view, {nearest(str(view), VIEWS)}") from None
     if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
-        raise InputError(f"view = {shown(view)} must be one of {', '.join(VIEWS)}, or three numbers, not all 0")
+        raise InputError(f"view = {quote(view)} must be one of {', '.join(VIEWS)}, or three numbers, not all 0")
     return direction / np.abs(direction).max()

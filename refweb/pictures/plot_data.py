@@ -132,7 +132,7 @@ def bar(result: Result, factor=1.0):
     return None if result.error is None else np.full((2, 1), result.error / factor)
 
 
-def told(result: Result):
+def text_of(result: Result):
     """A result in words, with its ±."""
     words = readable(result.value, result.error, result.unit, result.within)
     if result.interval is not None:

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ..errors import InputError
 from ..messages import nearest
-from ..messages import shown as as_shown
+from ..messages import quote as as_shown
 from ..results.files import write_atomically
 from . import balances, distances, histories, spectra
 from .pictures import shows_itself, target

@@ -66,7 +66,7 @@ class Seen(NamedTuple):
         Whether some line is drawn as slack.
     broken : bool
         Whether some line is broken.
-    least, most : float
+    lower, upper : float
         Values of lines that are not [SI].
     """
 
@@ -78,8 +78,8 @@ class Seen(NamedTuple):
     tree: bool
     slack: bool
     broken: bool
-    least: float
-    most: float
+    lower: float
+    upper: float
 
     @classmethod
     def of(cls, frame, field):
@@ -127,8 +127,8 @@ class Seen(NamedTuple):
             moved=max(self.moved, second.moved),
             slack=self.slack or second.slack,
             broken=self.broken or second.broken,
-            least=min(self.least, second.least),
-            most=max(self.most, second.most),
+            lower=min(self.lower, second.lower),
+            upper=max(self.upper, second.upper),
         )
 
 
@@ -136,18 +136,18 @@ class Seen(NamedTuple):
 class Stage:
     """Common parts of all pages.
 
-    The `look`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
+    The `inspect`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
     (lines, points, 3), empty where nothing has moved, and the `middle` of the web, shape (3,) [m]; what has been
     `seen`.
     """
 
-    look: Look
+    options: Look
     views: list
     rectangles: list
     radius: float
     origin: np.ndarray
     middle: np.ndarray
-    seen: Seen
+    limits: Seen
 
     @classmethod
     def of(cls, limits, options, aspect):
@@ -166,7 +166,7 @@ class Stage:
     @property
     def beneath(self):
         """True if the undeformed web lies below the web: seen from above it would cover it."""
-        return self.look.view is not None
+        return self.options.view is not None
 
     def pixels(self, size):
         """(width, height) of each view on a page of this size [pixel]."""
@@ -174,12 +174,12 @@ class Stage:
 
     def model(self, frame):
         """The tubes, surfaces and markers of a frame."""
-        if self.look.field == "slack":
+        if self.options.field == "slack":
             taut, slack = np.array(list(TWO.values()))
             colours, grey = np.where(frame.slack[:, None], slack, taut), np.zeros(len(frame.slack), dtype=bool)
         else:
-            grey, (low, high) = _grey(frame, self.look.field), self.look.limits
-            colours = colour_map()(np.clip((frame.fields[self.look.field] - low) / (high - low), 0, 1))[:, :3]
+            grey, (low, high) = _grey(frame, self.options.field), self.options.limits
+            colours = colour_map()(np.clip((frame.fields[self.options.field] - low) / (high - low), 0, 1))[:, :3]
         colours[grey], colours[frame.broken] = SLACK, BROKEN
         radius = np.where(frame.broken, THIN, np.where(grey, 0.8, 1.0)) * self.radius
         model: list[Tubes | Surface | Balls] = [Tubes(frame.paths, colours, radius)]
@@ -216,18 +216,18 @@ class Stage:
         from matplotlib.lines import Line2D
 
         parallel = [view for view in self.views if not view.perspective]
-        marks = [Line2D([], [], color=SLACK, lw=4, label="slack")] if self.seen.slack else []
-        if self.look.field == "slack":
+        marks = [Line2D([], [], color=SLACK, lw=4, label="slack")] if self.limits.slack else []
+        if self.options.field == "slack":
             marks = [Line2D([], [], color=colour, lw=4, label=name) for name, colour in TWO.items()]
         else:
             self._bar(figure)
-        if self.seen.broken:
+        if self.limits.broken:
             marks.append(Line2D([], [], color=BROKEN, lw=2, label="broken"))
-        if self._seen_in(self.views, self.seen.supports):
+        if self._seen_in(self.views, self.limits.supports):
             marks.append(Line2D([], [], color=SUPPORT, marker="o", ls="", ms=7, label="support"))
         if self._seen_in(parallel, self.origin.reshape(-1, 3)):
             marks.append(Line2D([], [], color=BEFORE, lw=0.8, label="undeformed"))
-        for i, (name, points) in enumerate(self.seen.bodies.items()):
+        for i, (name, points) in enumerate(self.limits.bodies.items()):
             if self._seen_in(self.views, points):
                 marks.append(Line2D([], [], color=BODIES[i % len(BODIES)], marker="o", ls="", ms=13, label=_cut(name)))
         style = {"frameon": False, "fontsize": 13, "labelcolor": DARK, "handlelength": 1.6}
@@ -241,16 +241,16 @@ class Stage:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
-        low, high = self.look.limits
-        factor, unit = scaled_unit(self.look.field, max(abs(low), abs(high)))
+        low, high = self.options.limits
+        factor, unit = scaled_unit(self.options.field, max(abs(low), abs(high)))
         slip = 1e-9 * (high - low)
         beyond = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}
-        beyond = beyond[int(self.seen.least < low - slip), int(self.seen.most > high + slip)]
+        beyond = beyond[int(self.limits.lower < low - slip), int(self.limits.upper > high + slip)]
         scale = ScalarMappable(Normalize(factor * low, factor * high), colour_map())
         bar = figure.colorbar(scale, cax=figure.add_axes((0.905, 0.36, 0.014, 0.48)), extend=beyond)
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=13, colors=DARK)
-        name = _cut(self.look.field.replace("_", " "))
+        name = _cut(self.options.field.replace("_", " "))
         bar.ax.set_title(name + (f" [{unit}]" if unit else ""), size=15, pad=14, color=DARK)
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..messages import short, shown
+from ..messages import quote, short
 from ..results.case_rows import NAME, read, results_among
 from ..results.folder import read_summary
 from ..results.units import scale_of
@@ -62,7 +62,7 @@ def _is_named(values):
 
 
 def _word(value):
-    return value if isinstance(value, str) else shown(value)
+    return value if isinstance(value, str) else quote(value)
 
 
 def of_folder(folder):

@@ -88,7 +88,7 @@ def prepared(record, field=None, off_screen=False):
 
 def _draw(plotter, frame, stage):
     """Put a frame in the place of another."""
-    field, (low, high) = stage.look.field, stage.look.limits
+    field, (low, high) = stage.options.field, stage.options.limits
     factor, unit = scaled_unit(field, max(abs(low), abs(high)))
     values = factor * frame.fields[field]
     broken = frame.broken

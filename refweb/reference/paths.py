@@ -13,7 +13,7 @@ import tomllib
 from typing import Any
 
 from ..errors import InputError, refused_at
-from ..messages import nearest, one_line, short, shown
+from ..messages import nearest, one_line, quote, short
 from ..registry import EFFECTS
 
 LONGEST = 1000
@@ -77,7 +77,7 @@ def with_value(given, path, value) -> dict:
     keys = _keys(path)
     if value is False and len(keys) == 1 and keys[0] in EFFECTS:
         return {key: table for key, table in given.items() if key != keys[0]}
-    with refused_at(f"{short(path)} = {shown(value)}:"):
+    with refused_at(f"{short(path)} = {quote(value)}:"):
         return _put(given, keys, (), value)
 
 
@@ -93,7 +93,7 @@ def _keys(path):
         keys = []
     if not keys:
         wanted = 'must be keys and numbers with dots between, such as body.0.mass; other names stand in quotes, "a b"'
-        raise InputError(f"path {shown(str(path))} {wanted}")
+        raise InputError(f"path {quote(str(path))} {wanted}")
     return keys
 
 
@@ -112,7 +112,7 @@ def _put(value_here, keys, above, value) -> Any:
         number, changed = _number(value_here, key, at), list(value_here)
         changed[number : number + 1] = [_put(value_here[number] if number < len(value_here) else None, rest, at, value)]
         return changed
-    raise InputError(f"{short('.'.join(above))} = {shown(value_here)} has no keys")
+    raise InputError(f"{short('.'.join(above))} = {quote(value_here)} has no keys")
 
 
 def _number(entries, key, at):
@@ -131,4 +131,4 @@ def _number(entries, key, at):
         return names.index(key)
     known = [name for name in names if isinstance(name, str)]
     hint = f" or its name, {nearest(key, known)}" if known else ""
-    raise InputError(f"{parent} is a list: {shown(key)} must be a number, 0 … {last},{hint}".removesuffix(","))
+    raise InputError(f"{parent} is a list: {quote(key)} must be a number, 0 … {last},{hint}".removesuffix(","))

@@ -44,7 +44,7 @@ def results_among(columns):
     return [Named(name, unit[:-1]) for name, _, unit in named if f"{name} ±" in columns]
 
 
-def own(row):
+def result_cells(row):
     """The cells of a row that its case alone determines: without parameters, whose names may be others by now."""
     names = {result.name for result in results_among(row)}
     ends = (" ±", " least", " most", " mean", " deviation")

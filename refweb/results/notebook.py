@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from .units import other_errors, place, readable
+from .units import other_errors, position_text, readable
 
 
 def of_solution(solution):
@@ -19,7 +19,7 @@ def of_solution(solution):
                 name,
                 readable(result.value, result.error, result.unit, result.within),
                 *time,
-                place(result.where, result.at),
+                position_text(result.where, result.at),
             ]
         )
     remarks = other_errors(solution.summary()["results"])

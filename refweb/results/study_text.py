@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..messages import shown
+from ..messages import quote
 from .summary_text import Rows
 from .units import readable, scale_of
 
@@ -42,7 +42,7 @@ def _varied(values):
 
 def of_group(of):
     """The values that a group of cases has in common, in words."""
-    return ", ".join(f"{path.rpartition('.')[2]} = {shown(value)}" for path, value in of.items())
+    return ", ".join(f"{path.rpartition('.')[2]} = {quote(value)}" for path, value in of.items())
 
 
 def rows_of_spread(entry):

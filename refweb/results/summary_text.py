@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .units import larger, other_errors, place, readable, scale_of, with_error
+from .units import larger, other_errors, position_text, readable, scale_of, with_error
 
 FEW_BREAKS = 5
 """Number of breaks that are told one by one."""
@@ -27,7 +27,7 @@ def rows_of_results(results, dynamic):
     for name, result in results.items():
         value = readable(result["value"], result["error"], result["unit"], result.get("within"))
         time = [f"t = {result['time']:.6g} s"] if dynamic else []
-        rows.append([name, value, *time, f"at {where}" if (where := _place(result)) else ""])
+        rows.append([name, value, *time, f"at {where}" if (where := _position(result)) else ""])
     return Rows(["result", "value", *(["time"] if dynamic else []), "place"], rows, [])
 
 
@@ -48,7 +48,7 @@ def rows_of_steps(steps):
             value, error = column[n]["value"], column[n]["error"]
             row.append(with_error(value / factors[name], error and error / factors[name]))
         rows.append(row)
-    where = [_place(column[-1]) for column in columns.values()]
+    where = [_position(column[-1]) for column in columns.values()]
     last = ["", *[""] * loads, *(f"at {text}" if text else "" for text in where)] if any(where) else []
     return Rows(names, rows, last)
 
@@ -157,8 +157,8 @@ def between(interval, unit):
     return f"from {lower:.6g} to {upper:.6g} {unit}"
 
 
-def _place(result):
-    return place(result["where"], result.get("at") or "number")
+def _position(result):
+    return position_text(result["where"], result.get("at") or "number")
 
 
 def _breaks(breaks):

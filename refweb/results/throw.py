@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 from ..tables import Table, real, table, text
 
 UNITS = {"largest_area": "m²", "deployment_time": "s", "travelled": "m", "effective_period": "s", "covered": "1"}
@@ -79,24 +79,24 @@ class Throw(Table):
         for key in ("area", "travel"):
             name = getattr(self, key)
             if name is not None and name not in names:
-                raise InputError(f"{key} = {shown(name)} is not an observable, {nearest(name, names)}")
+                raise InputError(f"{key} = {quote(name)} is not an observable, {nearest(name, names)}")
         for name in names:
             if name in self.numbers:
-                raise InputError(f"[[observe]] name = {shown(name)} is a result of [throw]: names are unique")
+                raise InputError(f"[[observe]] name = {quote(name)} is a result of [throw]: names are unique")
         mouth = observables[names.index(self.area)]
         if mouth.quantity != "mouth_area" or mouth.component is not None or mouth.average is not None:
             raise InputError(
-                f'area = {shown(self.area)} must be an observable of quantity = "mouth_area", without component and '
+                f'area = {quote(self.area)} must be an observable of quantity = "mouth_area", without component and '
                 "average"
             )
         if self.travel is not None and (unit := observables[names.index(self.travel)].unit) != "m":
-            raise InputError(f"travel = {shown(self.travel)} must be an observable in m, not {unit}")
+            raise InputError(f"travel = {quote(self.travel)} must be an observable in m, not {unit}")
         bodies = [body.name for body in system.net.bodies]
         if self.target is not None and self.target not in bodies:
             hint = nearest(self.target, bodies) if bodies else "the scene has no [[body]]"
-            raise InputError(f"target = {shown(self.target)} is not a body, {hint}")
+            raise InputError(f"target = {quote(self.target)} is not a body, {hint}")
 
-    def found(self, observables, rows, state, twin=None, factor=0.0, known=np.inf):
+    def results(self, observables, rows, state, twin=None, factor=0.0, known=np.inf):
         """Results of a throw, a dict of dicts for ``run.json``.
 
         Parameters
@@ -126,7 +126,7 @@ class Throw(Table):
         for name, value in values.items():
             if name != "bounds":
                 compared = refined_values if settled.get(name, end) < known else None
-                record[name] = _told(name, value, half, compared, factor, values, known)
+                record[name] = _entry(name, value, half, compared, factor, values, known)
         return record
 
     def _of(self, rows, names):
@@ -168,7 +168,7 @@ class Throw(Table):
         }
 
 
-def _told(name, value, half, refined, factor, own_value, known):
+def _entry(name, value, half, refined, factor, own_value, known):
     """A number with its ±, or whether something is so, for ``run.json``."""
     if isinstance(value, bool):
         same = known == np.inf if refined is None else refined[name] == value

@@ -67,7 +67,7 @@ def other_errors(results):
             yield f"{words} {', '.join(parts)}"
 
 
-def place(where, at):
+def position_text(where, at):
     """Position of a result, in words: ``node 1757``; empty where it has none."""
     return "" if where is None else f"{at} {where}"
 

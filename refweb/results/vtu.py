@@ -70,7 +70,7 @@ def frame_data(state, shape=None):
     fields = (state.position, *(getattr(state, name) for name in ("x", "v", "reaction")), net.mass)
     points, *point_data = (values[: net.nodes].copy() for values in fields)
     curved = [points, *point_data[:2]]
-    point_data.append(state.system.held[: net.nodes].all(axis=1).astype(float))
+    point_data.append(state.system.fixed[: net.nodes].all(axis=1).astype(float))
     if shape is not None:
         large = SHAPE_SIZE * np.linalg.norm(np.ptp(points, axis=0))
         for values in curved[:2]:

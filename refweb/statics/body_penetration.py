@@ -42,7 +42,7 @@ class Passage:
         self._system, self.overlaps = system, Overlaps(scene.settled(), system, moving=False)
         self._x = np.zeros((system.rows, 3)) if x is None else x
 
-    def note(self, state):
+    def record(self, state):
         """Note an equilibrium, a `refweb.results.state.State`.
 
         Raises
@@ -55,7 +55,7 @@ class Passage:
             if body.fixed:
                 deep = state.overlap(body)
                 at = int(deep.argmax())
-                self.overlaps.note(i, float(deep[at]), state.time, int(net.line[at]))
+                self.overlaps.record(i, float(deep[at]), state.time, int(net.line[at]))
                 self._look_back(body, deep, state)
         self._x = state.x
 

@@ -75,7 +75,7 @@ def duality_bound(system, equilibrium, factor=None):
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
     factor, bound = factor or Factor(system.pattern), None
     balance = _Balance(system, bars, x, outer)
-    if factor.held is not None:
+    if factor.values_held is not None:
         bound = balance.bound(*balance.by_tangent(factor))
     if bound is None or not bound.sharp:
         improved = balance.bound(*balance.by_laplacian(factor))
@@ -105,7 +105,7 @@ class _Balance:
         per_bar = 0.5 * bars.tension**2 / bars.stiffness + bars.tension * bars.length * np.finfo(float).eps
         self._rounding = np.finfo(float).eps * (per_bar.sum() + np.abs(outer * x).sum())
         # Sums of forces leave at least this of them.
-        self._least = self._rounding + np.finfo(np.longdouble).eps * bars.tension.sum() * self._reach
+        self._least_gap = self._rounding + np.finfo(np.longdouble).eps * bars.tension.sum() * self._reach
 
     def by_laplacian(self, factor):
         """Solution and weights of the bars' own stiffness in every direction, of slack ones nearly none."""
@@ -123,7 +123,7 @@ class _Balance:
         system, bars = self._system, self._bars
         across = bars.tension / np.where(bars.length > 0.0, bars.length, 1.0)
         along = np.where(bars.tension > 0.0, bars.stiffness - across, 0.0)[:, None] * bars.direction
-        across = (across + factor.held / bars.natural)[:, None]
+        across = (across + factor.values_held / bars.natural)[:, None]
         down = self._of_bars.T.tocsr()
 
         def weigh(change):
@@ -151,7 +151,7 @@ class _Balance:
                 break
             correction += weigh(self._of_bars @ self._rows(p))
             unbalanced = self._unbalanced(self._force + correction)
-            if np.abs(unbalanced).sum() * self._reach <= self._least:
+            if np.abs(unbalanced).sum() * self._reach <= self._least_gap:
                 break
         force = self._force + correction
         size = np.sqrt((force**2).sum(axis=1))
@@ -159,7 +159,7 @@ class _Balance:
         gap = float(_gaps(bars, force, size).sum() + rounding)
         strain_energy = float(0.5 * (bars.tension**2 / bars.stiffness).sum())
         tension = np.sqrt(2.0 * bars.stiffness * gap).reshape(-1, len(self._system.net.weights)).max(axis=1)
-        sharp = bool(gap <= SHARP * self._least)
+        sharp = bool(gap <= SHARP * self._least_gap)
         return DualityBound(gap, tension, 2.0 * np.sqrt(strain_energy * gap) + gap, sharp)
 
     def _rows(self, p):

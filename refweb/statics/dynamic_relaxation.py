@@ -101,7 +101,7 @@ class Relaxation:
 
     def __init__(self, system, progress=None, limit=10_000_000, tolerance=TOLERANCE):
         self.system, self.progress = system, progress or (lambda text: None)
-        self.most, self.tolerance, self.scale = limit, tolerance, 0.0
+        self.limit, self.tolerance, self.scale = limit, tolerance, 0.0
         self._stalled = TOUCHING if system.contact else STALLED
         self._kernels = Functions(FORCE, [f.force for f in system.families])
         self._cells = Arrays(INDICES, [f.cells for f in system.families])
@@ -123,7 +123,7 @@ class Relaxation:
                 break
             if error < 0.9 * best:
                 best, since = error, done
-            if done >= self.most or done - since >= self._stalled or not np.isfinite(error):
+            if done >= self.limit or done - since >= self._stalled or not np.isfinite(error):
                 failed = NotFound(
                     f"no equilibrium found at step {t:g} in {done} steps of relaxation: residual {error:.2e}, limit "
                     f'{LIMIT:g}; use method = "newton"',

@@ -40,7 +40,7 @@ class Stability(NamedTuple):
         rounding, 1 where the equilibrium is stable, None where that is not decided.
     why : str
         Of −1 what drives it away, of None what is missing, in words.
-    held : bool
+    gyroscopic : bool
         Whether Coriolis forces hold what the tangent does not, as long as nothing damps motion in the frame.
     loose : bool
         Whether some direction may have no stiffness.
@@ -48,7 +48,7 @@ class Stability(NamedTuple):
 
     sign: int | None
     why: str = ""
-    held: bool = False
+    gyroscopic: bool = False
     loose: bool = False
 
 
@@ -132,9 +132,9 @@ def carried_off(system, t, parts):
 
 def where_nothing_touches(system, t, error):
     """A `NotFound` with what is carried off where nothing touches anything, if anything is."""
-    from ..system.unsupported_parts import found
+    from ..system.unsupported_parts import find_parts
 
-    carried = carried_off(system, t, found(system, touching=False))
+    carried = carried_off(system, t, find_parts(system, touching=False))
     if carried is None:
         return error
     return NotFound(f"{error}; while it touches nothing, {carried}, or start where it touches", error.stats)

@@ -57,7 +57,7 @@ class Parts:
     ----------
     of : ndarray of int, shape (rows,)
         The part of each row.
-    held : ndarray of bool, shape (parts, 3)
+    fixed : ndarray of bool, shape (parts, 3)
         Axes along which a part has a support.
     position : ndarray, shape (rows, 3)
         Positions in the equilibrium [m].
@@ -70,7 +70,7 @@ class Parts:
     """
 
     of: np.ndarray
-    held: np.ndarray
+    fixed: np.ndarray
     position: np.ndarray
     pairs: np.ndarray
     longest: np.ndarray
@@ -85,7 +85,7 @@ class Parts:
         rows = len(self.of)
         limits = np.array([self.position, self.position])
         for axis in range(3):
-            fixed = np.flatnonzero(self.held[self.of, axis])
+            fixed = np.flatnonzero(self.fixed[self.of, axis])
             for side, sign in enumerate((-1.0, 1.0)):
                 if not len(fixed):
                     limits[side, :, axis] = sign * np.inf
@@ -99,7 +99,7 @@ class Parts:
                 graph = coo_array((np.append(length, self.longest), both), shape=(rows + 1, rows + 1))
                 smallest = _least_of_each(graph)
                 far = dijkstra(smallest, indices=rows)[:rows] + start
-                open_ = ~self.held[self.of, axis]
+                open_ = ~self.fixed[self.of, axis]
                 limits[side, open_, axis] = sign * far[open_]
         return limits
 

@@ -133,18 +133,18 @@ class InteriorPoint:
 
         ``limit`` bounds the iterations of this call; where they run out, or lead away, it ends at the best so far.
         """
-        best, nearest = np.inf, self._place()
+        best, nearest = np.inf, self._arrange()
         with np.errstate(all="ignore"):  # where rounding has come to the surface, steps may lead anywhere
             for _ in range(limit):
                 worst = self._worst()
                 if worst < best:
-                    best, nearest = worst, self._place()
+                    best, nearest = worst, self._arrange()
                 if worst < tolerance or not worst < FAR * best or not self._go_on():
                     break
         self.x, self._z, self._s, self._y = nearest
         return self.x.copy()
 
-    def _place(self):
+    def _arrange(self):
         return tuple(value.copy() for value in (self.x, self._z, self._s, self._y))
 
     def _open(self):

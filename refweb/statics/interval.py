@@ -37,7 +37,7 @@ class Interval:
 
     def __init__(self, parts, part, axis):
         ends = parts.of[parts.pairs]
-        moving = ~parts.held.all(axis=1)
+        moving = ~parts.fixed.all(axis=1)
         between = (ends[:, 0] != ends[:, 1]) & moving[ends].any(axis=1)
         near = between & moving[ends].all(axis=1)
         graph = coo_array((np.ones(near.sum()), tuple(ends[near].T)), shape=(len(moving), len(moving)))
@@ -45,13 +45,13 @@ class Interval:
         between &= (np.where(moving[ends], group[ends], -1) == group[part]).any(axis=1)
         ends, pairs = ends[between], parts.pairs[between]
         self._number = np.full((len(moving), 3), -1)
-        mask = (moving & (group == group[part]))[:, None] & ~parts.held
+        mask = (moving & (group == group[part]))[:, None] & ~parts.fixed
         touched = np.zeros_like(moving)
         touched[ends] = True
         # Along an axis that holds none of these parts all of them can go on together: one of them stays.
-        self.bounded = bool((parts.held[:, axis] & touched).any())
+        self.bounded = bool((parts.fixed[:, axis] & touched).any())
         for k in range(3):
-            if not (parts.held[:, k] & touched).any():
+            if not (parts.fixed[:, k] & touched).any():
                 mask[part, k] = False
         mask &= touched[:, None]
         self._number[mask] = np.arange(mask.sum())

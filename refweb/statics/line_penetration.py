@@ -36,7 +36,7 @@ class LinePassage:
         self._x = np.zeros((system.rows, 3)) if system.laid is None else system.laid
         self.deepest, self.why = Passage(system, UNFOLLOWED, chosen), UNFOLLOWED
 
-    def note(self, state):
+    def record(self, state):
         """Note an equilibrium, a `refweb.results.state.State`.
 
         Raises
@@ -51,7 +51,7 @@ class LinePassage:
         family.force(state.time, state.x, still, np.zeros_like(still), family.cells, family.data, depth)
         if len(depth):
             cell = int(depth.argmax())
-            self.deepest.note(float(depth[cell, 0]), None)
+            self.deepest.record(float(depth[cell, 0]), None)
             self.deepest.refuse(float(depth[cell, 0]), f"load step {state.time:g}", cell)
         met, path = np.zeros(4, dtype=np.int64), state.x - self._x
         numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, family.cells, family.data, met

@@ -96,7 +96,7 @@ class Newton:
     """
 
     def __init__(self, system, progress=None, first=None):
-        self.system, self._shown, self._blocks = system, system.per_cell(), system.blocks()
+        self.system, self._per_cell, self._blocks = system, system.per_cell(), system.blocks()
         self.progress = progress or (lambda text: None)
         net = system.net if first is None else system.at(first).net
         self.geometric = system.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
@@ -186,7 +186,7 @@ class Newton:
 
     def _evaluated(self, t, x, stats):
         """The `Iterate` at x."""
-        force, per_cell = self.system.forces(t, x, per_cell=self._shown)
+        force, per_cell = self.system.forces(t, x, per_cell=self._per_cell)
         stats["nfev"] += 1
         return Iterate(x, force, per_cell.tension.copy())
 
@@ -253,7 +253,7 @@ class Newton:
 
     def _can_use_again(self, tension):
         """Tell if a tangent is at hand, and that of lines in tension, without follower or centrifugal forces."""
-        return self.factor.held is not None and not (self.follows or self.turns or (tension < 0.0).any())
+        return self.factor.values_held is not None and not (self.follows or self.turns or (tension < 0.0).any())
 
     def _by_factor_at_hand(self, values, b, tolerance):
         """Solutions y of the matrix of ``values``, shape (n,) or (n, k), as conjugate gradients find them."""

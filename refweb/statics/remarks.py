@@ -14,7 +14,7 @@ class Remarks:
     def __init__(self):
         self._made, self._steps = {}, 0
 
-    def note(self, step, remarks):
+    def record(self, step, remarks):
         """Take the remarks of a load step, pairs of a kind and a text."""
         self._steps += 1
         for kind, text in remarks:
@@ -73,7 +73,7 @@ def _way_out(state, stability):
     """Consequence of a saddle, and the remedy."""
     system = state.system
     deflect = "start from a web that is deflected"
-    if stability.held:
+    if stability.gyroscopic:
         return (
             "the web would leave this state by itself as soon as anything damps its motion in these axes; until then "
             f"Coriolis forces hold it; {deflect}"

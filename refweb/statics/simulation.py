@@ -58,7 +58,7 @@ class Simulation:
         solution.solver = {**SOLVER, "method": scene.solve.method, **self._totals}
         try:
             for equilibrium in solve(self.system, steps, lambda text: tell(text, len(self.rows) / len(steps))):
-                row = self._take(equilibrium, smoothing)
+                row = self._accept(equilibrium, smoothing)
                 self.rows.append(row)
                 if folder is not None:
                     folder.row(row)
@@ -87,7 +87,7 @@ class Simulation:
 
         return Smoothing(scene)
 
-    def _take(self, equilibrium, smoothing):
+    def _accept(self, equilibrium, smoothing):
         """Write down an equilibrium; its history row."""
         scene, solution, state = self.scene, self.solution, State(self.system, equilibrium.step, equilibrium.x)
         rest = at_rest(self.system)
@@ -98,11 +98,11 @@ class Simulation:
         if self.system.weakness is not None:
             self._refuse_break(equilibrium)
         if self._passage is not None:
-            self._passage.note(state)
+            self._passage.record(state)
             solution.bodies = self._passage.overlaps.plain()
             self._passage.overlaps.refuse()
         if self._lines is not None:
-            self._lines.note(state)
+            self._lines.record(state)
             solution.passage = {**solution.passage, "lines": f"not certified: {self._lines.why}"}
             solution.lines = self._lines.deepest.plain()
         results = self._results(equilibrium, state, smoothing)
@@ -123,7 +123,7 @@ class Simulation:
         solution.state = state
         if (used := state.utilisation) is not None:
             solution.utilisation = float(used.max()), int(used.argmax())
-        self._remarks.note(equilibrium.step, remarks_on(state, stats, solution.utilisation, equilibrium))
+        self._remarks.record(equilibrium.step, remarks_on(state, stats, solution.utilisation, equilibrium))
         return row
 
     def _refuse_break(self, equilibrium):

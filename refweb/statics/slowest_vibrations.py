@@ -94,17 +94,17 @@ def slowest(solver, M, C=None):
         weighed.omega = 1.0 / np.sqrt(np.linalg.norm(start))
         by, transposed, factor, start = weighed.twice, weighed.twice_transposed, 2, np.tile(start, 2)
 
-    def found(matvec, close) -> Any:
+    def largest_pairs(matvec, close) -> Any:
         if len(start) <= 2 * factor * WARM_START:
             return np.linalg.eig(np.column_stack([matvec(e) for e in np.eye(len(start))]))
         operator = LinearOperator((len(start), len(start)), matvec=matvec, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
         return eigs(operator, factor * NUMBER, which="LM", v0=start, ncv=factor * WARM_START, tol=close)
 
-    mu, right = found(by, CLOSE)
+    mu, right = largest_pairs(by, CLOSE)
     suspect = (mu.imag != 0.0) | (mu.real < 0.0) if C is None else mu.real > -CLOSE * abs(mu)
     grows = np.zeros(len(mu), dtype=bool)
     if suspect.any():
-        (mu, right), (_, left) = found(by, 0.0), found(transposed, 0.0)
+        (mu, right), (_, left) = largest_pairs(by, 0.0), largest_pairs(transposed, 0.0)
         off = ROUNDING * abs(mu).max() * _conditions(right, left)
         grows = (abs(mu.imag) > off) | (mu.real < -off) if C is None else mu.real > off
     return Slowest(np.sqrt(-1.0 / mu + 0j) if C is None else weighed.omega / mu, grows, len(mu) < len(start))

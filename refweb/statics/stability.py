@@ -222,7 +222,7 @@ class Question:
             return Stability(-1, what if grows else f"{what}; whether Coriolis forces hold the web is not decided")
         K, C, _ = self._reduced()
         growth = _growth(K, C)
-        return Stability(-1, what) if growth > 0.0 else Stability(-1, what, held=True)
+        return Stability(-1, what) if growth > 0.0 else Stability(-1, what, gyroscopic=True)
 
     def _unsymmetric(self, solver):
         """Stability by a K that is not symmetric."""

@@ -65,7 +65,7 @@ class Dop853:
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
         self._start = np.concatenate([x.ravel()[system.free], v.ravel()[system.free]])
-        self._held, self._mass = np.where(system.supported, x, 0.0), np.repeat(system.net.mass, 3)[system.free]
+        self._supported, self._mass = np.where(system.supported, x, 0.0), np.repeat(system.net.mass, 3)[system.free]
         self._consistent = system.net.consistent_minus_lumped is not None
         self._breaks, self._rotations = system.corners, None
         if system.turning:
@@ -77,7 +77,7 @@ class Dop853:
     def _rows(self, t, y):
         """Displacement and velocity of all rows at a state of the unknowns."""
         system, n = self.system, self._unknowns
-        x, v = self._held.copy(), np.zeros((system.rows, 3))
+        x, v = self._supported.copy(), np.zeros((system.rows, 3))
         x.ravel()[system.free], v.ravel()[system.free] = y[:n], y[n:]
         system.drive(t, x, v)
         return x, v

@@ -187,7 +187,7 @@ def _follow(result, rest, number, tell):
         result.steps.append(
             {"step": spectrum_n.step, "results": _results(spectrum_n), "solver": stats, **_described(spectrum_n)}
         )
-        remarks.note(spectrum_n.step, remarks_on(spectrum_n, result.state, equilibrium))
+        remarks.record(spectrum_n.step, remarks_on(spectrum_n, result.state, equilibrium))
         result.warnings = [*remarks.texts(), *rest.remarks()]
 
 

@@ -91,7 +91,7 @@ class Gyroscopic:
     def __init__(self, pencil, G):
         self.pencil, self.G = pencil, G
         self.M = csc_array(pencil.M)[pencil.massive][:, pencil.massive]
-        self.own = G[pencil.massive][:, pencil.massive]
+        self.matrix = G[pencil.massive][:, pencil.massive]
         self._weigh = splu(csc_matrix(self.M))
 
     def stiffness(self):
@@ -103,7 +103,7 @@ class Gyroscopic:
             massive_stiffness -= across.T @ pencil.follow(across)
         return 0.5 * (massive_stiffness + massive_stiffness.T)
 
-    def whole(self, parts):
+    def all_rows(self, parts):
         """Vectors of all unknowns, shape (unknowns, modes)."""
         vectors = np.zeros((self.pencil.system.pattern.size, parts.shape[1]), dtype=complex)
         vectors[self.pencil.massive] = parts
@@ -177,7 +177,7 @@ def _definite(gyroscopic, number, lower):
         wanted = min(number + 1 + 20 * attempt, size)
         dense = size <= DENSE or 3 * wanted >= size
         inverse, parts = (_all if dense else _some)(gyroscopic, wanted, solve, attempt)
-        vectors = gyroscopic.whole(parts)
+        vectors = gyroscopic.all_rows(parts)
         stiff, turned = gyroscopic.forms(vectors)
         split = np.sqrt(turned**2 + 4.0 * stiff)
         omega = np.where(turned > 0.0, 0.5 * (turned + split), 2.0 * stiff / (split - np.minimum(turned, 0.0)))
@@ -199,7 +199,7 @@ def _definite(gyroscopic, number, lower):
 
 def _all(gyroscopic, wanted, solve, attempt):
     """The largest 1/ω, and φ of the unknowns with mass."""
-    M, G, K = gyroscopic.M.toarray(), gyroscopic.own.toarray(), gyroscopic.stiffness()
+    M, G, K = gyroscopic.M.toarray(), gyroscopic.matrix.toarray(), gyroscopic.stiffness()
     none = np.zeros_like(M)
     B, A = np.block([[-1j * G, M], [M, none]]), np.block([[K, none], [none, M]])
     inverse, vectors = scipy.linalg.eigh(B, A)
@@ -208,7 +208,7 @@ def _all(gyroscopic, wanted, solve, attempt):
 
 def _some(gyroscopic, wanted, solve, attempt):
     """Solve as `_all`, by Lanczos iteration."""
-    M, G, size = gyroscopic.M, gyroscopic.own, gyroscopic.M.shape[0]
+    M, G, size = gyroscopic.M, gyroscopic.matrix, gyroscopic.M.shape[0]
     pencil, weigh = gyroscopic.pencil, gyroscopic._weigh
 
     def times(u):
@@ -253,7 +253,7 @@ def _general(gyroscopic, number, lower):
         half = scipy.linalg.solve_triangular(root, matrix, lower=True)
         return scipy.linalg.solve_triangular(root, half.T, lower=True).T
 
-    K, G = scaled(gyroscopic.stiffness()), scaled(gyroscopic.own.toarray())
+    K, G = scaled(gyroscopic.stiffness()), scaled(gyroscopic.matrix.toarray())
     size = len(K)
     eigenvalues, parts = np.linalg.eig(np.block([[np.zeros_like(K), np.eye(size)], [-K, -G]]))
     none = SMALL * np.sqrt(abs(K).sum(axis=0).max())
@@ -265,7 +265,7 @@ def _general(gyroscopic, number, lower):
     kept = np.flatnonzero(grows | turns)
     kept = kept[np.argsort(np.where(grows, -growth, turn)[kept])][:number]
     rates, grown = eigenvalues[kept], grows[kept]
-    vectors = gyroscopic.whole(scipy.linalg.solve_triangular(root.T, parts[:size, kept]))
+    vectors = gyroscopic.all_rows(scipy.linalg.solve_triangular(root.T, parts[:size, kept]))
     stiff, turned = gyroscopic.forms(vectors)
     split = np.sqrt(abs(turned**2 + 4.0 * stiff))
     split = np.where(split**2 < 64.0 * np.finfo(float).eps * (turned**2 + 4.0 * abs(stiff)), 0.0, split)

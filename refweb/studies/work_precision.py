@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..errors import InputError, SolverError, in_file
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 from ..registry import OBSERVABLES, load
 from ..results.folder import check_folder
 from ..results.observables.observe import default
@@ -98,15 +98,15 @@ def _observable(scene, name):
         return next(o for o in (*scene.observables, *default()) if not (o.observable.booked or o.average))
     names = {o.name: o for o in scene.observables}
     if name not in names:
-        raise InputError(f"observe = {shown(name)} is not an observable of the scene, {nearest(name, names)}")
+        raise InputError(f"observe = {quote(name)} is not an observable of the scene, {nearest(name, names)}")
     if names[name].average is not None:
         raise InputError(
-            f"observe = {shown(name)} is a mean, average = {names[name].average:g}: methods are compared by values of "
+            f"observe = {quote(name)} is a mean, average = {names[name].average:g}: methods are compared by values of "
             "an instant; name an observable without average"
         )
     if names[name].observable.booked:
         known = [quantity for quantity, entry in OBSERVABLES.items() if not load(entry).booked]
         raise InputError(
-            f'observe = {shown(name)} is of quantity "{names[name].quantity}", must be one of {", ".join(known)}'
+            f'observe = {quote(name)} is of quantity "{names[name].quantity}", must be one of {", ".join(known)}'
         )
     return names[name]

@@ -48,7 +48,7 @@ class Job(NamedTuple):
     given: dict
     folder: str | None
     file: str
-    keep: str
+    keeps: str
     home: tuple
     files: dict
 
@@ -62,7 +62,7 @@ class Outcome(NamedTuple):
     archive: bytes | None = None
 
 
-def here():
+def machine():
     """This machine and process."""
     return socket.gethostname(), os.getpid()
 
@@ -71,24 +71,24 @@ def solve(job):
     """Run a case; whatever becomes of it is an `Outcome`."""
     from ..results.run_status import Clock
 
-    if job.home != here():
+    if job.home != machine():
         _settle()
     clock = Clock()
     try:
-        with warnings.catch_warnings() if job.home == here() else contextlib.nullcontext():
+        with warnings.catch_warnings() if job.home == machine() else contextlib.nullcontext():
             summary, archive = _run(job)
         cells = cells_of(summary)
     except InputError as error:
-        summary, archive, cells = None, None, {"status": "refused", "message": _told(job, error)}
+        summary, archive, cells = None, None, {"status": "refused", "message": _values_text(job, error)}
     except SolverError as error:
-        summary, archive, cells = None, None, {"status": "failed", "message": _told(job, error)}
+        summary, archive, cells = None, None, {"status": "failed", "message": _values_text(job, error)}
     except Exception as error:
         text = one_line(f"internal error, {type(error).__name__}: {error}")
         summary, archive, cells = None, None, {"status": "failed", "message": text}
-    return Outcome(job.key, cells | clock.spent(), summary if job.keep == "json" else None, archive)
+    return Outcome(job.key, cells | clock.spent(), summary if job.keeps == "json" else None, archive)
 
 
-def _told(job, error):
+def _values_text(job, error):
     """A message without the name of the file and the values, which the row has anyway."""
     text = one_line(str(error))
     head = f"{job.file}: " if job.file else ""
@@ -116,7 +116,7 @@ def _run(job):
             directory = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-")))
             given = _brought(job, directory)
         scene = Scene.from_dict(given, folder, job.file)
-        if job.keep != "all":
+        if job.keeps != "all":
             return run(scene, progress=False).summary(), None
         directory = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="refweb-"))) / "run"
         return run(scene, out=directory, progress=False).summary(), packed(directory)

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import InputError, in_file
-from ..messages import short, shown
+from ..messages import quote, short
 from ..reference.paths import with_value
 from ..registry import paths_of, with_files
 from ..scene import Scene
@@ -61,7 +61,7 @@ class Base(NamedTuple):
     def scene(self, case_values):
         """(What a file would say, scene) of some values by path."""
         given, name = self.given, self.file
-        text = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case_values.items())
+        text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case_values.items())
         with in_file(f"{name} with {text}" if text else name):
             for path, value in case_values.items():
                 given = with_value(given, path, value)

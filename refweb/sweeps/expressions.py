@@ -19,7 +19,7 @@ import re
 from typing import Any, NamedTuple
 
 from ..errors import InputError
-from ..messages import nearest, shown
+from ..messages import nearest, quote
 
 LONGEST = 2000
 """Largest number of characters of a condition."""
@@ -86,8 +86,8 @@ def _root(a):
 FUNCTIONS = {
     "abs": _absolute,
     "sqrt": _root,
-    "min": lambda *all: Interval(min(one.low for one in all), min(one.high for one in all)),
-    "max": lambda *all: Interval(max(one.low for one in all), max(one.high for one in all)),
+    "min": lambda *all: Interval(min(value.low for value in all), min(value.high for value in all)),
+    "max": lambda *all: Interval(max(value.low for value in all), max(value.high for value in all)),
 }
 """What a condition may call."""
 _SUMS = {
@@ -128,7 +128,7 @@ class Expression:
             if quoted or name in ("and", "or", "not", "true", "false", *FUNCTIONS):
                 return {"true": "True", "false": "False"}.get(name) or match.group()
             if name not in known:
-                raise InputError(f"{shown(text)}: {shown(name)} is not known here, {nearest(name, known)}")
+                raise InputError(f"{quote(text)}: {quote(name)} is not known here, {nearest(name, known)}")
             self.used.add(known[name])
             key = f"_{len(self._aliases)}"
             self._aliases[key] = known[name]
@@ -138,12 +138,12 @@ class Expression:
         try:
             self._tree = ast.parse(plain.strip(), mode="eval").body
         except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise InputError(f"{shown(text)}: is not a condition, such as max_stress > 2e8") from None
+            raise InputError(f"{quote(text)}: is not a condition, such as max_stress > 2e8") from None
         self._check(self._tree, 0)
         if not isinstance(self._tree, ast.Compare | ast.BoolOp) and not (
             isinstance(self._tree, ast.UnaryOp) and isinstance(self._tree.op, ast.Not)
         ):
-            raise InputError(f"{shown(text)}: compares nothing: a condition is such as max_stress > 2e8")
+            raise InputError(f"{quote(text)}: compares nothing: a condition is such as max_stress > 2e8")
 
     def _check(self, node: Any, depth):
         """Refuse what a condition must not hold."""
@@ -166,7 +166,7 @@ class Expression:
             fine = isinstance(node.value, ast.Name) and isinstance(at, ast.Constant) and isinstance(at.value, int)
         if not fine or depth > DEEPEST:
             words = f"arithmetic, comparisons, and, or, not, {', '.join(FUNCTIONS)}, numbers, texts and names"
-            raise InputError(f"{shown(self.text)}: a condition holds {words} alone")
+            raise InputError(f"{quote(self.text)}: a condition holds {words} alone")
         for child in ast.iter_child_nodes(node):
             if isinstance(child, ast.expr) and not (isinstance(node, ast.Call) and child is node.func):
                 self._check(child, depth + 1)
@@ -182,7 +182,7 @@ class Expression:
         try:
             return self._truth(self._tree, values)
         except (TypeError, AttributeError, ValueError, IndexError):
-            raise InputError(f"{shown(self.text)}: cannot be computed of {_told(values, self.used)}") from None
+            raise InputError(f"{quote(self.text)}: cannot be computed of {_values_text(values, self.used)}") from None
 
     def _truth(self, node, values):
         if isinstance(node, ast.BoolOp):
@@ -260,5 +260,5 @@ def _compared(op, a, b):
     return True if holds(a.high, b.low) else None if holds(a.low, b.high) else False
 
 
-def _told(values, used):
-    return ", ".join(f"{name} = {shown(values[name])}" for name in sorted(used) if name in values) or "these values"
+def _values_text(values, used):
+    return ", ".join(f"{name} = {quote(values[name])}" for name in sorted(used) if name in values) or "these values"

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from ..accepted import accepts, any_of, array, by_name
 from ..errors import InputError, in_file, refused_at
-from ..messages import nearest, short, shown
+from ..messages import nearest, quote, short
 from ..tables import Several, Table, boolean, checked, choice, field, integer, numbers_list, real, table, text
 
 SHIPPED_STUDIES = pathlib.Path(__file__).parent / "shipped"
@@ -64,7 +64,7 @@ class Distribution(NamedTuple):
 def read_parameters(name, given):
     """Parameters of a study by path: a list of cases, a `Range` or a `Distribution`."""
     if not isinstance(given, dict) or not given:
-        raise InputError(f'{name} = {shown(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
+        raise InputError(f'{name} = {quote(given)} must be a table of values by path, "solve.duration" = [0.1, 0.2]')
     return {path: _parameter(f"{name}: {short(path)}", value) for path, value in _flat(given)}
 
 
@@ -89,13 +89,13 @@ def _parameter(name, value):
     if isinstance(value, list | tuple):
         if not value:
             raise InputError(f"{name} = [] must hold at least one case")
-        texts = [shown(item) for item in value]
+        texts = [quote(item) for item in value]
         if twice := next((item for item in texts if texts.count(item) > 1 and len(item) < 60), None):
             raise InputError(f"{name}: {twice} stands there twice: each case is run once")
         return tuple(value)
     if not isinstance(value, dict):
         wanted = 'a list of cases, { from = 0, to = 1, count = 5 } or { distribution = "norm", loc = 0, scale = 1 }'
-        raise InputError(f"{name} = {shown(value)} must be {wanted}")
+        raise InputError(f"{name} = {quote(value)} must be {wanted}")
     with refused_at(f"{name}:"):
         if "distribution" in value:
             return _distribution(value)
@@ -107,7 +107,7 @@ def _range(value):
     for key in value:
         if key not in known:
             raise InputError(
-                f"{short(key)} = {shown(value[key])}: unknown key, {nearest(key, [*known, 'distribution'])}"
+                f"{short(key)} = {quote(value[key])}: unknown key, {nearest(key, [*known, 'distribution'])}"
             )
     for key in ("from", "to"):
         if key not in value:
@@ -128,13 +128,13 @@ def _distribution(value):
     known = [n for n in dir(stats) if isinstance(getattr(stats, n), stats.rv_continuous | stats.rv_discrete)]
     name = value["distribution"]
     if name not in known:
-        raise InputError(f"distribution = {shown(name)} is none of scipy.stats, {nearest(name, known)}")
+        raise InputError(f"distribution = {quote(name)} is none of scipy.stats, {nearest(name, known)}")
     kind = getattr(stats, name)
     shapes = [shape.strip() for shape in (kind.shapes or "").split(",") if shape.strip()]
     keys = [*shapes, "loc", *(["scale"] if isinstance(kind, stats.rv_continuous) else [])]
     for key in value:
         if key not in keys and key != "distribution":
-            raise InputError(f"{short(key)} = {shown(value[key])}: {name} has no such parameter, {nearest(key, keys)}")
+            raise InputError(f"{short(key)} = {quote(value[key])}: {name} has no such parameter, {nearest(key, keys)}")
     for key in shapes:
         if key not in value:
             raise InputError(f"{key} is missing: {name} needs {key} = ...")
@@ -162,10 +162,10 @@ def texts_by_name():
     @accepts(by_name({"type": "string"}))
     def read(name, value):
         if not isinstance(value, dict):
-            raise InputError(f'{name} = {shown(value)} must be a table of texts, safe = "max_stress < 2e8"')
+            raise InputError(f'{name} = {quote(value)} must be a table of texts, safe = "max_stress < 2e8"')
         for key, entry in value.items():
             if not isinstance(entry, str) or not entry.strip():
-                raise InputError(f'{name}: {short(key)} = {shown(entry)} must be a text, such as "max_stress < 2e8"')
+                raise InputError(f'{name}: {short(key)} = {quote(entry)} must be a text, such as "max_stress < 2e8"')
         return dict(value)
 
     return field(read, default_factory=dict)
@@ -269,11 +269,11 @@ class Study(Table):
         for path, parameter in self.drawn.items():
             if isinstance(parameter, Range) and parameter.count is not None:
                 raise InputError(
-                    f"parameters: {path}: count = {parameter.count} has no meaning with sample = {shown(self.sample)}, "
+                    f"parameters: {path}: count = {parameter.count} has no meaning with sample = {quote(self.sample)}, "
                     "whose count is that of all samples: leave it out"
                 )
         if self.indices and self.sample != "sobol":
-            raise InputError(f'indices = true needs sample = "sobol", not {shown(self.sample)}')
+            raise InputError(f'indices = true needs sample = "sobol", not {quote(self.sample)}')
         if self.indices and self.count & (self.count - 1):
             raise InputError(f"count = {self.count} must be a power of 2 for indices, such as 64")
 
@@ -286,7 +286,7 @@ class Study(Table):
                 raise InputError(f"parameters: {path}: count is missing: give the number of values, count = 5")
         for key, given in (("count", self.count), ("indices", self.indices)):
             if given:
-                raise InputError(f'{key} = {shown(given)} has no meaning with sample = "{self.sample}": leave it out')
+                raise InputError(f'{key} = {quote(given)} has no meaning with sample = "{self.sample}": leave it out')
         lengths = {path: len(values) for path, values in self.listed.items()}
         if self.sample == "zip" and len(set(lengths.values())) > 1:
             text = ", ".join(f"{path} has {number}" for path, number in lengths.items())
@@ -345,7 +345,7 @@ def load(source) -> Study:
         unknown = [key for key in given if key not in _study_keys()]
         if unknown:
             key = unknown[0]
-            raise InputError(f"{short(key)} = {shown(given[key])}: unknown table or key, {nearest(key, _study_keys())}")
+            raise InputError(f"{short(key)} = {quote(given[key])}: unknown table or key, {nearest(key, _study_keys())}")
         return Study(**{"title": path.stem, **given, "folder": path.resolve().parent})
 
 

@@ -89,12 +89,12 @@ class Sweep:
         import numpy as np
 
         from ..errors import InputError
-        from ..messages import nearest, shown
+        from ..messages import nearest
 
         known = {item.name: f"{item.name} [{item.unit}]" for item in results_among(self.columns)}
         known |= {path: path for path in self.study.parameters}
         if name not in known:
-            raise InputError(f"{shown(name)} is neither a result nor a parameter, {nearest(name, known)}")
+            raise InputError(f"{quote(name)} is neither a result nor a parameter, {nearest(name, known)}")
         cells = [row.get(known[name]) for row in self.rows]
         plain = all(cell is None or isinstance(cell, int | float) for cell in cells)
         return np.array([np.nan if cell is None else cell for cell in cells], dtype=float if plain else object)

@@ -17,14 +17,14 @@ from collections import Counter
 from collections.abc import Callable
 
 from ..errors import InputError, in_file
-from ..messages import short, shown
+from ..messages import quote, short
 from ..results import case_rows
 from ..results.files import as_toml, write_text
 from ..results.folder import check_folder, is_alive, read_summary
 from ..results.progress import followed
 from ..results.run_status import Clock, recorded
 from ..scene import Scene, file_of
-from .case import Job, here, keep_outcome, kept_files
+from .case import Job, keep_outcome, kept_files, machine
 from .design import Base, cases_of, files_of
 from .expressions import Expression
 from .study import Study, load
@@ -80,7 +80,7 @@ def sweep(
     if executor is not None and workers is not None:
         raise InputError(f"workers = {workers} has no meaning with an executor, which has its own: leave one out")
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
-        raise InputError(f"workers = {shown(workers)} must be a whole number ≥ 1")
+        raise InputError(f"workers = {quote(workers)} must be a whole number ≥ 1")
     study, base = _asked(scene, parameters, options)
     cases = cases_of(study, base)
     study_run = Sweep(study, cases, str(base.given.get("title", study.scene)))
@@ -146,7 +146,7 @@ def _check(study, base, cases):
     """Refuse what would leave no result: no case, a first case that does not fit together, unknown names."""
     first = next((case for case in cases if case.given is not None), None)
     if first is None:
-        raise InputError(f"skip = {shown(study.skip)} leaves no case of {len(cases)}")
+        raise InputError(f"skip = {quote(study.skip)} leaves no case of {len(cases)}")
     _, scene = base.scene(first.values)
     scene.build()
     of_throw = [] if scene.throw is None else scene.throw.numbers
@@ -187,8 +187,8 @@ def _job(study, base, case, workers):
         for path in files_of(scene.to_dict()):
             with contextlib.suppress(OSError):
                 files[path] = pathlib.Path(path).read_bytes()
-    text = ", ".join(f"{short(key)} = {shown(value)}" for key, value in case.values.items())
-    return Job(case.key, case.given, folder, f"{base.file} with {text}", study.keep, here(), files)
+    text = ", ".join(f"{short(key)} = {quote(value)}" for key, value in case.values.items())
+    return Job(case.key, case.given, folder, f"{base.file} with {text}", study.keep, machine(), files)
 
 
 def _span(seconds):
@@ -221,7 +221,7 @@ class Kept:
 
     def __init__(self, folder, study_run):
         self.path = None if folder is None else pathlib.Path(folder).absolute()
-        self.found, self.rows, self._aside, self._table = study_run, {}, [], None
+        self.study_run, self.rows, self._aside, self._table = study_run, {}, [], None
         if self.path is None:
             return
         full = _check_folder(folder)
@@ -229,7 +229,7 @@ class Kept:
         stored = [*case_rows.read(self.path / case_rows.ASIDE), *case_rows.read(self.path / case_rows.NAME)]
         for row in stored if full else ():
             if row["case"] in asked and row["status"] != "lost":
-                self.rows[row["case"]] = case_rows.own(row)
+                self.rows[row["case"]] = case_rows.result_cells(row)
         unasked = {row["case"]: row for row in stored if row["case"] and row["case"] not in asked}
         self._aside = list(unasked.values())
         before = (read_summary(self.path) or {}).get("versions", {}) if full and self.rows else study_run.versions
@@ -243,10 +243,10 @@ class Kept:
         row = self.rows.get(case.key)
         if row is None:
             return False
-        if self.path is None or self.found.study.keep == "none" or row["status"] != "solved":
+        if self.path is None or self.study_run.study.keep == "none" or row["status"] != "solved":
             return True
         as_json, archive = kept_files(self.path, case.key)
-        return as_json.is_file() if self.found.study.keep == "json" else (archive / "run.json").is_file()
+        return as_json.is_file() if self.study_run.study.keep == "json" else (archive / "run.json").is_file()
 
     def begin(self, scene=None):
         """Write what stands at the beginning; ``scene`` is one that is in no file."""
@@ -258,14 +258,14 @@ class Kept:
             self.summary()
             if scene is not None:
                 write_text(self.path / "scene.toml", as_toml(scene.to_dict()))
-            write_text(self.path / "study.toml", _as_toml(self.found.study))
+            write_text(self.path / "study.toml", _as_toml(self.study_run.study))
             if self._aside:
                 case_rows.write(self.path / case_rows.ASIDE, self._aside)
-        rows = [row for case in self.found.cases if case.key in self.rows for row in [self._row(case)]]
-        self._table = case_rows.CaseRows(self.path, rows, columns_of(self.found.study, rows))
+        rows = [row for case in self.study_run.cases if case.key in self.rows for row in [self._row(case)]]
+        self._table = case_rows.CaseRows(self.path, rows, columns_of(self.study_run.study, rows))
 
     def _row(self, case):
-        return row_of(self.found.study, case, self.rows)
+        return row_of(self.study_run.study, case, self.rows)
 
     def add(self, outcome, cases):
         """Keep what came of a case, its files before its row; ``cases`` are all that have this scene."""
@@ -278,16 +278,16 @@ class Kept:
 
     def end(self):
         """Put rows into their order, and say what they say together."""
-        self.found.gather(self.rows)
+        self.study_run.gather(self.rows)
         if self._table is not None:
-            rows_done = [row for row in self.found.rows if row["status"] != "waiting"]
+            rows_done = [row for row in self.study_run.rows if row["status"] != "waiting"]
             self._table.order(rows_done)
             self._table.close()
 
     def summary(self):
         """Write ``run.json``."""
         if self.path is not None:
-            text = json.dumps(self.found.summary(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+            text = json.dumps(self.study_run.summary(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             with case_rows.written(self.path):
                 write_text(self.path / "run.json", text)
 

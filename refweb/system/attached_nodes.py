@@ -24,7 +24,7 @@ class _Cell:
     ----------
     family, at : int
         Number of the family in the pattern, and of the cell in it.
-    own : list of int
+    own_rows : list of int
         Place among ``rows`` of each of its rows; −1 of one that is carried.
     parts : list of (int, int, int)
         Of those that are: which row it is, which node that is carried, and the place of the body's row among ``rows``,
@@ -38,7 +38,7 @@ class _Cell:
         for row in cell.tolist():
             rows += turns.rows[turns.carried[number[row], 1]].tolist() if row in number else [row]
         self.rows = list(dict.fromkeys(rows))
-        self.own = [-1 if row in number else self.rows.index(row) for row in cell.tolist()]
+        self.own_rows = [-1 if row in number else self.rows.index(row) for row in cell.tolist()]
         self.parts = [
             (i, number[row], [self.rows.index(r) for r in turns.rows[turns.carried[number[row], 1]].tolist()])
             for i, row in enumerate(cell.tolist())
@@ -47,8 +47,8 @@ class _Cell:
 
     def unmoved(self):
         """(T, L) of what is not carried, shapes (3 of the cell, 3 of its rows) and the other way round."""
-        T = np.zeros((3 * len(self.own), 3 * len(self.rows)))
-        for i, r in enumerate(self.own):
+        T = np.zeros((3 * len(self.own_rows), 3 * len(self.rows)))
+        for i, r in enumerate(self.own_rows):
             if r >= 0:
                 T[3 * i : 3 * i + 3, 3 * r : 3 * r + 3] = np.eye(3)
         return T, T.T.copy()

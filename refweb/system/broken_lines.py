@@ -77,12 +77,12 @@ def _breakable(system):
     if system.weakness is not None:
         return system
     from ..effects.base import BreakLimits
-    from ..effects.broken import HELD, held
+    from ..effects.broken import HELD, held_energy
 
     changed = copy.copy(system)
     changed.net = net = system.net.with_column(HELD, 0.0)
     changed.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
-    changed.families.append(held(net))
+    changed.families.append(held_energy(net))
     changed.weakness = BreakLimits(np.full(len(net.cells), np.inf))
     return changed
 

@@ -213,14 +213,14 @@ class Factor:
 
     Attributes
     ----------
-    held : object
+    values_held : object
         What its caller says of the matrix that it holds; None where nothing is said.
     solutions : int
         Number of solutions below which these cost clearly less than another factorization.
     """
 
     def __init__(self, pattern):
-        self.pattern, self.held = pattern, None
+        self.pattern, self.values_held = pattern, None
         self._made = {}
         self._by: Any = None
         self._values = np.zeros(0)
@@ -234,13 +234,13 @@ class Factor:
         self._values = values
         if not self.pattern.size:
             return
-        self.held = fixed
+        self.values_held = fixed
         try:
-            self._take(self.pattern.library.name)
+            self._adopt(self.pattern.library.name)
         except RuntimeError:  # singular, of which qdldl leaves what can be used
-            self._take("qdldl")
+            self._adopt("qdldl")
 
-    def _take(self, name):
+    def _adopt(self, name):
         """Factorize by a library."""
         if name not in self._made:
             self._made[name] = LIBRARIES[name](self.pattern)
@@ -260,7 +260,7 @@ class Factor:
             if not wrong and b @ y < -FINE * np.abs(b) @ np.abs(y) and self.negative_pivots() == 0:
                 wrong = "misses a negative pivot"  # of bᵀA⁻¹b < 0
             if wrong:
-                self._take("qdldl")
+                self._adopt("qdldl")
                 y, error = self._refined(b)
                 if error <= FINE:  # which is no fault of the matrix, then
                     self.pattern.library.fall_back(wrong)
@@ -289,7 +289,7 @@ class Factor:
         count = self._by.negative_pivots()
         if count is None:
             self.pattern.library.fall_back("does not say the signs of all pivots")
-            self._take("qdldl")
+            self._adopt("qdldl")
             count = self._by.negative_pivots()
         return count
 
@@ -323,7 +323,7 @@ def _not_positive(solver):
 class Lu:
     """LU of matrices of one `refweb.system.sparsity.Pattern`, with what a `Factor` has."""
 
-    held, solutions = None, 0
+    values_held, solutions = None, 0
 
     def __init__(self, pattern):
         self.pattern = pattern

@@ -50,8 +50,8 @@ class Links:
         self._unknown, self._sign = unknown[moving], 2.0 * end - 1.0
         opposite = np.full(unknown.shape, -1)
         opposite[moving] = np.arange(len(self._link))
-        self._other = opposite[:, ::-1][moving]
-        self._both = np.flatnonzero(self._other >= 0)
+        self._opposite = opposite[:, ::-1][moving]
+        self._both = np.flatnonzero(self._opposite >= 0)
         self._refuse_redundant(np.zeros((system.rows, 3)))
         self._arrange()
 
@@ -98,7 +98,7 @@ class Links:
         size = n + len(self)
         rows = np.concatenate([M.row, self._unknown, n + self._link])
         columns = np.concatenate([M.col, n + self._link, self._unknown])
-        keys, self._place = np.unique(columns.astype(np.int64) * size + rows, return_inverse=True)
+        keys, self._slots = np.unique(columns.astype(np.int64) * size + rows, return_inverse=True)
         indptr = np.searchsorted(keys, size * np.arange(size + 1)).astype(np.int32)
         self._pattern, self._lu = ((keys % size).astype(np.int32), indptr), None
 
@@ -118,7 +118,7 @@ class Links:
         """
         x, v, force = position[self._unknown], velocity[self._unknown], first + self._link
         rate, both = force + len(self), self._both
-        values, across = (v, x), (v[both], x[self._other[both]])
+        values, across = (v, x), (v[both], x[self._opposite[both]])
         return [(v, force), values, across, (x, rate), (force, x), (rate, v), (rate, x)]
 
     def values(self, x, v, multipliers):
@@ -133,7 +133,7 @@ class Links:
         from scipy.sparse import csc_array
 
         G, size = self._entries(x), len(self._pattern[1]) - 1
-        data = np.bincount(self._place, np.concatenate([self._M.data, G, G]))
+        data = np.bincount(self._slots, np.concatenate([self._M.data, G, G]))
         matrix, lu = csc_array((data, *self._pattern), shape=(size, size)), self._lu
         rest = wanted = np.concatenate([f, b])
         solution = np.zeros_like(wanted)

@@ -104,7 +104,7 @@ class System:
         return Library(self._factorization)
 
     @property
-    def held(self):
+    def fixed(self):
         """Components that supports hold, or prescribed motion, shape (rows, 3)."""
         return self.supported & ~self.carried[:, None]
 
@@ -169,9 +169,9 @@ class System:
     @cached_property
     def unsupported_parts(self):
         """Parts of the net that can be carried off, a list of `refweb.system.unsupported_parts.Part`."""
-        from .unsupported_parts import found
+        from .unsupported_parts import find_parts
 
-        return found(self)
+        return find_parts(self)
 
     def per_cell(self):
         """`PerCell` of new arrays; those of families over the lines are one."""

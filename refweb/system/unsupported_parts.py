@@ -15,7 +15,7 @@ class Part(NamedTuple):
     unknowns: np.ndarray
 
 
-def found(system, touching=True):
+def find_parts(system, touching=True):
     """Every `Part` of a system; unless ``touching``, as if nothing touched anything."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

@@ -370,7 +370,7 @@ def test_bodies_that_come_to_a_middle_are_seen():
 
     def met(at):
         course = SimpleNamespace(time=0.0, x=at(0.0), crossings=none_met())
-        followed.look(course, SimpleNamespace(middle=Place(0.5, at(0.5)), end=Place(1.0, at(1.0))), at)
+        followed.inspect(course, SimpleNamespace(middle=Place(0.5, at(0.5)), end=Place(1.0, at(1.0))), at)
         return np.isfinite(course.crossings[MET, 0])
 
     def there_and_back(t):

@@ -51,7 +51,7 @@ class Kick:
         self.own, self.touches = np.zeros_like(self.v), []
         for one in self.families:
             room, where = np.zeros((60, one.rubbing.width)), (one.cells, one.data)
-            count = one.rubbing.meet(self.h, self.x, self.v, self.inverse, *where, room, 0)
+            count = one.rubbing.detect(self.h, self.x, self.v, self.inverse, *where, room, 0)
             self.touches.append(room[:count])
         for self.sweeps in range(300):
             change = 0.0
@@ -66,7 +66,7 @@ class Kick:
         self.mean, self.power = 0.5 * (self.v + self.after), 0.0
         for one, touches in zip(self.families, self.touches, strict=True):
             out, room = np.zeros((len(one.cells), one.observed)), np.zeros((len(one.cells), one.rubbing.memory))
-            one.rubbing.give(1, room, self.mean, touches, 0, len(touches), out)
+            one.rubbing.commit(1, room, self.mean, touches, 0, len(touches), out)
             self.power += out[:, OWN].sum()
 
     def energy(self, v):

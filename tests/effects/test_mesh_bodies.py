@@ -260,7 +260,7 @@ def test_a_surface_is_drawn_as_it_is(files):
     corners, faces = solids.ell()
     expected = {tuple(sorted(map(tuple, face))) for face in corners[faces].round(6)}
     assert {tuple(sorted(map(tuple, face))) for face in (drawn[triangles] + 1e-9).round(6) + 0.0} == expected
-    assert any("centre of mass at" in text for text in body.shape.told())
+    assert any("centre of mass at" in text for text in body.shape.texts())
 
 
 def test_shares_of_losses_are_those_of_the_rise():

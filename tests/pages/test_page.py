@@ -180,9 +180,9 @@ def test_places_and_values_are_within_the_errors_it_states(hit):
     record = of_folder(hit)
     found = space.space_of(record)
     arrays = unpack(found.text, found.head["arrays"])
-    assert found.error < 1e-4 * found.extent and found.shown == list(record.times) and not found.missing
+    assert found.error < 1e-4 * found.extent and found.numbers == list(record.times) and not found.missing
     segments = arrays["segments"].reshape(-1, 2)
-    for i, number in enumerate(found.shown):
+    for i, number in enumerate(found.numbers):
         frame, points = record.frame(number), space.places(arrays, found.head, i)
         assert np.linalg.norm(points[segments] - frame.paths, axis=-1).max() <= found.error * (1 + 1e-6)
         for field in found.head["fields"]:
@@ -200,7 +200,7 @@ def test_a_body_is_where_it_was(hit):
     arrays = unpack(found.text, found.head["arrays"])
     (body,) = found.head["bodies"]
     surface = arrays["points of body 0"].reshape(-1, 3)
-    for i, number in enumerate(found.shown):
+    for i, number in enumerate(found.numbers):
         turn = np.reshape(body["turns"][i], (3, 3))
         there = surface @ turn.T + body["places"][i]
         assert np.abs(there - record.frame(number).bodies["ball"].points).max() < 1e-6 * 0.1
@@ -246,8 +246,8 @@ def test_a_page_that_would_be_heavy_has_fewer_frames(hit, monkeypatch):
     whole = space.space_of(record)
     monkeypatch.setattr(space, "LARGEST", 0.7 * len(whole.text))
     part = space.space_of(record, peak=15)
-    assert len(part.text) <= 0.7 * len(whole.text) and 3 <= len(part.shown) < len(whole.shown)
-    assert {0, 15, 50} <= set(part.shown)
+    assert len(part.text) <= 0.7 * len(whole.text) and 3 <= len(part.numbers) < len(whole.numbers)
+    assert {0, 15, 50} <= set(part.numbers)
 
 
 def test_what_users_write_is_text(hit, quick):

@@ -82,7 +82,7 @@ def probed(observe, state):
     where = np.array([-1, PLACE])
     data = np.ascontiguousarray(data, dtype=float)
     value = found.kernel(0.0, state.x, state.v, force, strained, rows, data, where)
-    return value, observe.observable.place(system, int(where[0]))
+    return value, observe.observable.position(system, int(where[0]))
 
 
 @pytest.mark.parametrize("name", PROBED)

@@ -159,11 +159,11 @@ def test_what_run_and_twin_disagree_on_is_not_known():
     observables = [refweb.Observe(name="mouth", quantity="mouth_area", node=[0, 1, 2])]
     throw = Twin(area="mouth", target="one")
     undecided = {"value": None, "drawn": True}
-    assert throw.found(observables, rows, True, (rows, False), 3.0)["inside"] == undecided
-    assert throw.found(observables, rows, True, (rows, True), 3.0, rows[-1, 0])["inside"] == undecided
-    assert throw.found(observables, rows, True, (rows, True), 3.0)["inside"] == {"value": True, "drawn": True}
+    assert throw.results(observables, rows, True, (rows, False), 3.0)["inside"] == undecided
+    assert throw.results(observables, rows, True, (rows, True), 3.0, rows[-1, 0])["inside"] == undecided
+    assert throw.results(observables, rows, True, (rows, True), 3.0)["inside"] == {"value": True, "drawn": True}
     for known, told in ((0.7, True), (0.5, False)):  # the largest area is at t = π/6, between rows at 0.4 and 0.6
-        found = throw.found(observables, rows, True, (rows, True), 3.0, known)
+        found = throw.results(observables, rows, True, (rows, True), 3.0, known)
         assert (found["deployment_time"]["error"] is not None) == told == (found["largest_area"]["error"] is not None)
 
 

@@ -41,12 +41,12 @@ class FollowedPairs(Followed):
                 time = min(time, max(TRAVEL * _thickness(pair), 0.5 * self._apart(pair, x)) / speed)
         return time
 
-    def look(self, course, piece, at):
+    def inspect(self, course, piece, at):
         """Note in a course the first pair that may have met in a piece of a step."""
         for family in self._families:
-            self._note(course, piece, at, PAIRS, family)
+            self._record(course, piece, at, PAIRS, family)
 
-    def _room(self, bend):
+    def _margin(self, bend):
         return bend
 
     def _met(self, looked_at, x, path, margin):

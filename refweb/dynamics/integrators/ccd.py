@@ -130,9 +130,9 @@ class BodyCcd(Record):
         As in `Ccd`.
     meets : table
         Kernels of `refweb.effects.contact.line_body_ccd`.
-    most : ndarray
+    limits : ndarray
         Depth that nothing comes to of each family, at least [m].
-    shown : ndarray
+    factors : ndarray
         Largest depth over what cells show, infinite where that is not known.
     met : ndarray of int, shape (4,)
         Nodes of the last line that would have come to the middle of a body, its row, and whether it was in the core.
@@ -143,8 +143,8 @@ class BodyCcd(Record):
     families: Integers
     places: Integers
     meets: MeetsTable
-    most: Vector
-    shown: Vector
+    limits: Vector
+    factors: Vector
     met: Integers
     left: Vector
 
@@ -161,8 +161,8 @@ class BodyCcd(Record):
             families=np.array(numbers, dtype=np.int64),
             places=np.array([near.index(i) for i in numbers], dtype=np.int64),
             meets=Functions(MEETS, [family.passing for family in passing]),
-            most=np.ascontiguousarray(limits[:, 0]),
-            shown=np.ascontiguousarray(limits[:, 1]),
+            limits=np.ascontiguousarray(limits[:, 0]),
+            factors=np.ascontiguousarray(limits[:, 1]),
             met=np.ones(4, dtype=np.int64),
             left=np.zeros(1 if numbers else 0),
         )
@@ -247,7 +247,7 @@ def calm(walls: BodyCcd, nearby: NeighbourList, families: Families) -> bool:
     skin, left = nearby.skin[0], math.inf
     for m in range(walls.families.size):
         deep = deepest_of(families.outs[walls.families[m]])
-        left = min(left, walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0))
+        left = min(left, walls.limits[m] - (walls.factors[m] * deep if deep > 0.0 else 0.0))
     walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
     return walls.left[0] > 0.0
 
@@ -310,7 +310,7 @@ def comes_through(time: float, kick: float, drift: float, then: int, model: Mode
     if model.walls.families.size:
         came = passes_bodies(time, path, kick, drift, then, model, running) or came
     if came:
-        running.clock[0].held, left[0] = 1, 0.0
+        running.clock[0].rejected, left[0] = 1, 0.0
     return came
 
 
@@ -355,7 +355,7 @@ def passes_bodies(
     for m in range(walls.families.size):
         i = walls.families[m]
         deep = deepest_of(families.outs[i])
-        left = walls.most[m] - (walls.shown[m] * deep if deep > 0.0 else 0.0) - path - margin
+        left = walls.limits[m] - (walls.factors[m] * deep if deep > 0.0 else 0.0) - path - margin
         if model.guard.families.size:
             model.guard.left[0] = 0.0 if model.inertia.turns.moment.size else min(model.guard.left[0], left)
         if left > 0.0:

@@ -107,7 +107,12 @@ class CentralDifference(Integrator):
         self._model = Model.of(system, outs)
         self._observed = Observed.of(probes, sums, outs, self._model.contacts)
         self._touches = Arrays(MATRIX, [np.empty((0, self._model.implicit_contacts.width))])
-        self._events, self._least, self._taken, self._prepared = event_rows(events), least_energy(net), None, False
+        self._events, self._least_energy, self._taken, self._prepared = (
+            event_rows(events),
+            least_energy(net),
+            None,
+            False,
+        )
         if step_size is not None and step_size > (limit := self.stretch * self.bound()):
             raise InputError(f"[solve] step_size = {step_size:g} must be ≤ {limit:.6g} [s], the bound of stability")
 
@@ -130,7 +135,9 @@ class CentralDifference(Integrator):
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""
         step = self.step_size or self.safety * self.stretch * self.bound()
-        return np.ceil(self.finer * np.ceil(np.maximum(np.asarray(spans) / step, self._scheme.least) * (1.0 - 1e-9)))
+        return np.ceil(
+            self.finer * np.ceil(np.maximum(np.asarray(spans) / step, self._scheme.least_steps) * (1.0 - 1e-9))
+        )
 
     def evaluations(self, duration):
         """Evaluations of forces that a duration [s] takes, by the bound of its start and by corners of tables."""
@@ -185,7 +192,7 @@ class CentralDifference(Integrator):
             ledger=ledger,
             averages=averages,
             energy=per_family.sum(),
-            largest=max(np.abs(per_family).sum(), self._least),
+            largest=max(np.abs(per_family).sum(), self._least_energy),
             force=force,
             power=np.zeros(len(system.families)),
         )
@@ -233,7 +240,7 @@ class CentralDifference(Integrator):
         clock = np.zeros(1, dtype=CLOCK)
         for name in SHARED:
             clock[name] = getattr(course, name)
-        clock["least"] = self._least
+        clock["least"] = self._least_energy
         changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = course.power, np.zeros((2, changing)), course.crossings, self._touches
@@ -280,7 +287,7 @@ class CentralDifference(Integrator):
             self._taken = id(course), int(clock[0]["nsteps"])
             nearby = self._model.nearby
             followed = len(nearby.families) and len(self.drifts) == 1 and not self.system.carried.any()
-            course.way = max(course.way, float(nearby.skin[0]["longest"]) if followed else math.inf)
+            course.longest = max(course.longest, float(nearby.skin[0]["longest"]) if followed else math.inf)
             nearby.skin["longest"] = 0.0
             for name in SHARED:
                 setattr(course, name, clock[name].item())

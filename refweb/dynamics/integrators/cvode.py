@@ -221,7 +221,7 @@ class Cvode(Sundials):
         from sksundae.cvode import CVODEJacTimes, CVODEPrecond
 
         if self.linear_solver in ("dense", "sparse"):
-            return self._whole(*self._whole_pattern(), 2 * self.unknowns)
+            return self._full_matrix(*self._whole_pattern(), 2 * self.unknowns)
         if self.linear_solver == "block":
             self._symmetric = Symmetric(self.system.pattern)
             precond = CVODEPrecond(self._set_up, self._precondition)
@@ -249,5 +249,5 @@ class Cvode(Sundials):
 
     def interpolated(self, t):
         """Unknown displacements and velocities at a time within the last step."""
-        y = self._found(t).y
+        y = self._solution(t).y
         return y[: self.unknowns], y[self.unknowns :]

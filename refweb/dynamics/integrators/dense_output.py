@@ -38,7 +38,7 @@ from .extremes import (
     begin_anew,
     correct_within,
     correction,
-    look,
+    inspect,
     look_at,
     look_at_sums,
     time_of_top,
@@ -225,7 +225,7 @@ def show_again(now: float, inside: Inside, model: Model, observed: Observed, run
     families = model.families
     if model.reels.lengths.size:
         set_lengths(now, model.reels, families.data[0])
-    for i in observed.shown:
+    for i in observed.families:
         if not among(model.implicit_contacts.families, i):
             families.forces[i](
                 now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
@@ -348,7 +348,7 @@ def look_inside(
     for n in range(0 if fresh else 1, LOOKS + 1 if alone else LOOKS):
         t = now - h + h * (EDGE if n == 0 else n / LOOKS if n < LOOKS else 1.0 - EDGE)
         state_within(t, now, h, running.x, running.v, running.f, not alone, inside, model)
-        turned = look(t, x, v, inside.state[2], inside.lines, where, observed, extremes, fresh)
+        turned = inspect(t, x, v, inside.state[2], inside.lines, where, observed, extremes, fresh)
         if n > 0 and not alone and observed.windows.slots.size:
             look_for_means(n, t, x, v, inside.state[2], inside.lines, where, observed, running.averages)
         if observed.sums.shape[0]:
@@ -366,7 +366,7 @@ def look_behind(model: Model, observed: Observed, running: Running, workspace: W
     x, v, f, extremes = running.x, running.v, running.f, running.extremes
     begin_anew(extremes)
     if observed.followed.size + observed.windows.slots.size:
-        look(now, x, v, f, lines, where, observed, extremes, False)
+        inspect(now, x, v, f, lines, where, observed, extremes, False)
     if observed.windows.slots.size:
         look_for_means(0, now, x, v, f, lines, where, observed, running.averages)
     if observed.sums.shape[0]:

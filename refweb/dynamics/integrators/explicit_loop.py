@@ -79,7 +79,7 @@ def inner_stages(
     """
     if reject_step(now - h, h, model, running):
         return False
-    families, inverse, fixed = model.families, model.inertia.inverse, model.inertia.held
+    families, inverse, fixed = model.families, model.inertia.inverse, model.inertia.fixed
     turns = model.inertia.turns
     x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
@@ -106,7 +106,7 @@ def inner_stages(
 @kernel(leaf=True, forceinline=True)
 def begin_forces(t, changing, extra, reaction, push, model, running):
     """Write powers, force of supports and push from outside at the time t that steps begin at."""
-    set_reaction(model.inertia.held, running.f.reshape(-1), reaction)
+    set_reaction(model.inertia.fixed, running.f.reshape(-1), reaction)
     if model.families.powers.shape[0] or changing or model.outside.pushing.size:
         begin_more(t, changing, extra, push, model, running)
 
@@ -142,7 +142,7 @@ def run_steps(
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
     where, known, push, before, total = space.where, space.known, space.push, space.before, space.total
     clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
-    mass, inverse, fixed, driven = model.inertia.mass, model.inertia.inverse, model.inertia.held, model.inertia.driven
+    mass, inverse, fixed, driven = model.inertia.mass, model.inertia.inverse, model.inertia.fixed, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
     viscous, powers, extra, half = families.viscous, families.powers, space.extra, space.half
@@ -257,7 +257,7 @@ def plan(end: float, changing: bool, scheme: Scheme, model: Model, running: Runn
     if steps > MAX_STEPS_PER_ROW:
         clock.step = span / steps
         return False
-    clock.planned = max(int(math.ceil(max(steps, scheme.least) * (1.0 - 1e-9))), 1)
+    clock.planned = max(int(math.ceil(max(steps, scheme.least_steps) * (1.0 - 1e-9))), 1)
     if scheme.finer > 1.0:
         clock.planned = int(math.ceil(scheme.finer * clock.planned))
     return True
@@ -319,8 +319,8 @@ def advance_rows(
             stopped, left = ended_by(events), left - taken
             clock.nsteps += taken
             clock.begun = begun + taken
-            if clock.held:
-                clock.held, clock.cut = 0, SHORTER * clock.step
+            if clock.rejected:
+                clock.rejected, clock.cut = 0, SHORTER * clock.step
                 if clock.cut < LEAST * clock.stable:
                     return HELD
             elif clock.begun < clock.planned and not stopped:

@@ -31,7 +31,7 @@ class ExplicitState(IntegratorState):
 
     force: np.ndarray
     power: np.ndarray
-    way: float = 0.0
+    longest: float = 0.0
     before: np.ndarray = field(init=False, metadata={"saved": False})
 
     def __post_init__(self):

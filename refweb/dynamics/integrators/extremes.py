@@ -160,7 +160,7 @@ def update_extreme(
 
 
 @kernel(leaf=True, apart=("looks",))
-def look(
+def inspect(
     t: float,
     x: Matrix,
     v: Matrix,
@@ -184,7 +184,7 @@ def look(
 
 @kernel(apart=("books",))
 def look_at_sums(t: float, total: Vector, observed: Observed, extremes: Extremes, ending: bool) -> bool:
-    """Inspect sums of the energies ``total`` as `look` does; the time is recorded before."""
+    """Inspect sums of the energies ``total`` as `inspect` does; the time is recorded before."""
     first, signs, turned = len(observed.probes), observed.signs, False
     for i in range(first, signs.size):
         value = inner(observed.sums[i - first], total)

@@ -237,7 +237,7 @@ class Ida(Sundials):
 
         if self.linear_solver != "block":
             rows, columns = self._whole_pattern()
-            return self._whole(rows, columns, self.unknowns + len(self._heavy) + 2 * self._count)
+            return self._full_matrix(rows, columns, self.unknowns + len(self._heavy) + 2 * self._count)
         self._symmetric = Symmetric(self.system.pattern)
         precond, times = IDAPrecond(self._set_up, self._precondition), IDAJacTimes(None, self._jacobian_times)
         return dict(linsolver="gmres", krylov_dim=10, precond=precond, jactimes=times)
@@ -296,7 +296,7 @@ class Ida(Sundials):
 
     def _one_step(self, stop, end):
         try:
-            reached = self._found(end, "onestep", float(stop) if np.isfinite(stop) else None)
+            reached = self._solution(end, "onestep", float(stop) if np.isfinite(stop) else None)
         except Stopped:
             self._refuse_adrift()
             raise
@@ -338,5 +338,5 @@ class Ida(Sundials):
 
     def interpolated(self, t):
         """Unknown displacements and velocities at a time within the last step."""
-        values = self._found(t)
+        values = self._solution(t)
         return self._parts(values.y)[0], self._velocity(values.y, values.yp)

@@ -38,7 +38,7 @@ class ImplicitContacts(Record):
     meets, recalls, sweeps, gives, memories : table
         Their kernels, see `refweb.effects.base.ImplicitContactKernels`, and what is remembered of the step before,
         within a row.
-    shown, told : ndarray of int, List
+    depths, elements : ndarray of int, List
         Which ``outs`` of `refweb.dynamics.integrators.records.Families` has depths, −1 for those that have none, and
         for each cell the row in it.
     pieces : int
@@ -54,8 +54,8 @@ class ImplicitContacts(Record):
     gives: GiveTable
     memories: MatrixTable
     last: Integers
-    shown: Integers
-    told: IntegerTable
+    depths: Integers
+    elements: IntegerTable
     pieces: int
     width: int
 
@@ -73,14 +73,14 @@ class ImplicitContacts(Record):
         depths = [depths_of(system, family) for family in rubbing]
         return cls(
             families=np.array(families, dtype=np.int64),
-            meets=Functions(k.DETECT, [kernels_.meet for kernels_ in kernels_of]),
+            meets=Functions(k.DETECT, [kernels_.detect for kernels_ in kernels_of]),
             recalls=Functions(k.WARM_START, [kernels_.recall for kernels_ in kernels_of]),
             sweeps=Functions(k.GAUSS_SEIDEL, [kernels_.sweep for kernels_ in kernels_of]),
-            gives=Functions(k.COMMIT, [kernels_.give for kernels_ in kernels_of]),
+            gives=Functions(k.COMMIT, [kernels_.commit for kernels_ in kernels_of]),
             last=np.array(last, dtype=np.int64),
             memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
-            shown=np.array([number for number, _ in depths], dtype=np.int64),
-            told=Arrays(INTEGERS, [order_of for _, order_of in depths]),
+            depths=np.array([number for number, _ in depths], dtype=np.int64),
+            elements=Arrays(INTEGERS, [order_of for _, order_of in depths]),
             pieces=system.net.subdivide,
             width=max((kernels_.width for kernels_ in kernels_of), default=0),
         )
@@ -124,13 +124,13 @@ def meet_all(h, x, v, inverse, families, implicit_contacts, touches, ends):
         count = 0
         for m in range(implicit_contacts.families.size):
             i, begin = implicit_contacts.families[m], count
-            if implicit_contacts.shown[m] < 0:
+            if implicit_contacts.depths[m] < 0:
                 count = implicit_contacts.meets[m](
                     h, x, v, inverse, families.cells[i], families.data[i], touches, count
                 )
             else:
                 chosen = lines_in_touch(
-                    families.outs[implicit_contacts.shown[m]], implicit_contacts.told[m], implicit_contacts.pieces
+                    families.outs[implicit_contacts.depths[m]], implicit_contacts.elements[m], implicit_contacts.pieces
                 )
                 some, some_data = rows_of(chosen, families.cells[i], families.data[i])
                 count = implicit_contacts.meets[m](h, x, v, inverse, some, some_data, touches, count)

@@ -29,10 +29,10 @@ class FollowedBodies(FollowedLines):
         self._rows = np.array([(body.spin, body.turn) for body in turning], dtype=np.int64).reshape(-1, 2)
         self._extent = np.array([body.extent for body in turning])
 
-    def look(self, course, piece, at):
+    def inspect(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
         for family in self._families:
-            self._note(course, piece, at, THROUGH, (family.passing, family.cells, family.data))
+            self._record(course, piece, at, THROUGH, (family.passing, family.cells, family.data))
 
     def _turned(self, path):
         """Largest movement of points of bodies as these turn [m]."""

@@ -30,7 +30,7 @@ class Followed:
 
     # What a subclass brings
 
-    def _room(self, bend):
+    def _margin(self, bend):
         """Free distance that a bend of the middle leaves."""
         raise NotImplementedError
 
@@ -40,7 +40,7 @@ class Followed:
 
     # What is made of it
 
-    def _note(self, course, piece, at, which, looked_at):
+    def _record(self, course, piece, at, which, looked_at):
         """Note in a row of what has met the first that may have in a piece of a step."""
         if np.isfinite(course.crossings[which, 0]):
             return
@@ -52,7 +52,7 @@ class Followed:
 
     def _first(self, looked_at, begin, middle, end, at, halvings):
         """(Time from which on two may have met [s], their rows), None where none have."""
-        margin = self._room(middle.x - 0.5 * (begin.x + end.x))
+        margin = self._margin(middle.x - 0.5 * (begin.x + end.x))
         for first, last in ((begin, middle), (middle, end)):
             met = self._met(looked_at, first.x, last.x - first.x, margin)
             if met is None:
@@ -84,14 +84,14 @@ class FollowedLines(Followed):
         """Time in which no line comes through another from displacement x and velocity v [s]."""
         return min((f.crossing.soon(x, v, f.cells, f.data) for f in self._families), default=np.inf)
 
-    def look(self, course, piece, at):
+    def inspect(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
         for family in self._families:
             crossing, beside = family.crossing, (family.crossing.rows, family.crossing.data)
             for which, cells in ((APART, (family.cells, family.data)), (BESIDE, beside)):
-                self._note(course, piece, at, which, (crossing.meets, *cells))
+                self._record(course, piece, at, which, (crossing.meets, *cells))
 
-    def _room(self, bend):
+    def _margin(self, bend):
         return self._spread(bend) + self._turned(bend)
 
     def _met(self, looked_at, x, path, margin):

@@ -59,7 +59,7 @@ class Measurements:
             (p.kernel, np.array(p.rows, dtype=np.int64), np.ascontiguousarray(p.data, dtype=float), p.family)
             for p in probes
         ]
-        self.shown = sorted({probe.family for probe in probes} - {-1})
+        self.families = sorted({probe.family for probe in probes} - {-1})
         self._weights = np.array([quantity.weights for quantity in sums], dtype=float).reshape(len(sums), families + 3)
         self._signs = np.array([float(quantity.sign) for quantity in (*probes, *sums)])
         self._windows = Windows.of(probes)
@@ -70,10 +70,10 @@ class Measurements:
     def probe(self, i, sample):
         """Value of a probe at a `refweb.dynamics.integrators.simpson_balance.Sample`."""
         kernel, rows, data, family = self._probes[i]
-        data = sample.shown.get(family, data)
+        data = sample.per_cell.get(family, data)
         return kernel(sample.time, sample.x, sample.v, sample.force, sample.lines, rows, data, self._where)
 
-    def _place(self, i, sample):
+    def _position_of(self, i, sample):
         """Row or element that the value of a probe stands at."""
         self._where[1] = PLACE
         self.probe(i, sample)
@@ -90,7 +90,7 @@ class Measurements:
 
     def at_start(self, sample, energies):
         """The `Extremes` at t = 0, where no step has been taken, the `Averages` and the values there."""
-        places = [self._place(i, sample) for i in range(self.probed)]
+        places = [self._position_of(i, sample) for i in range(self.probed)]
         values = np.array([*self.probes(sample), *(self._weights @ energies)])
         extremes = Extremes.at_start(values.copy(), np.array([*places, *[-1] * len(self._weights)], dtype=np.int64))
         averages = begin_averages(self._windows, extremes)
@@ -98,7 +98,7 @@ class Measurements:
         extremes.values[stepping] = extremes.recent[stepping, 2] = -np.inf * self._signs[stepping]
         return extremes, averages, values
 
-    def look(self, extremes, sample, energies):
+    def inspect(self, extremes, sample, energies):
         """Take the values at a sample over into the extremes; numbers of what may turn back.
 
         ``energies(sample)`` is what sums weigh.
@@ -116,8 +116,8 @@ class Measurements:
 
     def follow(self, extremes, middle, end, sample_at, energies):
         """Look at a piece of a step: at its middle, its end and, by ``sample_at(time)``, where values turn back."""
-        self.look(extremes, middle, energies)
-        for i in self.look(extremes, end, energies):
+        self.inspect(extremes, middle, energies)
+        for i in self.inspect(extremes, end, energies):
             self._search_top(extremes, i, lambda t: (s := sample_at(t), self.value(i, s, energies)))  # noqa: B023
 
     def average(self, course, piece, end, sample_at):
@@ -157,7 +157,7 @@ class Measurements:
         if self._signs[i] * value > self._signs[i] * extremes.values[i]:
             extremes.values[i], extremes.times[i], extremes.corrections[i] = value, sample.time, correction
             if i < self.probed:
-                extremes.places[i] = self._place(i, sample)
+                extremes.places[i] = self._position_of(i, sample)
 
     def _search_top(self, extremes, i, look_at):
         """Look for a peak between the last three looks, by parabolas through the highest value and its neighbours."""

@@ -153,7 +153,7 @@ class Outside(Record):
 def kept_axes(system):
     """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
     kept = all(f.moment_free or (f.internal and not f.twists) for f in system.families)
-    if system.held.any() or not kept:
+    if system.fixed.any() or not kept:
         return np.zeros((0, 3))
     normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)
     if not len(normals):

@@ -57,7 +57,7 @@ class Observed(Record):
     signs: Vector
     followed: Integers
     windows: Windows
-    shown: Integers
+    families: Integers
     plain: IntegerMatrix
     scales: Vector
 
@@ -80,7 +80,7 @@ class Observed(Record):
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
-            shown=np.unique(families_seen).astype(np.int64),
+            families=np.unique(families_seen).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
         )

@@ -214,7 +214,7 @@ def swap_pairs_of(pairs):
 
 
 @kernel(apart=("near",))
-def take(x: Matrix, nearby: NeighbourList, families: Families) -> None:
+def set_reference(x: Matrix, nearby: NeighbourList, families: Families) -> None:
     """Swap the cells of all families for those within the skin at displacement x."""
     depth = nearby.skin[0].depth
     for m in range(nearby.families.size):
@@ -272,7 +272,7 @@ def look_at_all(system, model):
 def take_pairs(x: Matrix, nearby: NeighbourList, families: Families) -> None:
     """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
     copy_rows(x[: nearby.at.shape[0]], nearby.at)
-    take(x, nearby, families)
+    set_reference(x, nearby, families)
     skin, pairs, elements = nearby.skin[0], 0, 0
     for m in range(nearby.families.size):
         pairs += families.cells[nearby.families[m]].shape[0]
@@ -295,7 +295,7 @@ def reach_all(reach, x, nearby, families):
         return
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf
-        take(x, nearby, families)
+        set_reference(x, nearby, families)
 
 
 @kernel(leaf=True, apart=("pairs",))
@@ -370,7 +370,7 @@ def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourLi
     path, recent = skin.last, skin.last + skin.before + skin.earlier
     if not nearby.at.shape[0]:
         skin.depth, skin.used = max(LASTS * path, 4.0 * recent, min(skin.wished, LONGEST * path)), 0.0
-        take(x, nearby, families)
+        set_reference(x, nearby, families)
         return
     if skin.depth < math.inf:
         skin.used = spread_since(x, nearby.at) + recent

@@ -61,7 +61,7 @@ CLOCK = np.dtype(
         ("planned", np.int64),
         ("stable", float),
         ("cut", float),
-        ("held", np.int64),
+        ("rejected", np.int64),
     ]
 )
 """Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.IntegratorState` by their names,
@@ -107,7 +107,7 @@ class Scheme(Record):
     kicks: Vector
     drifts: Vector
     safety: float
-    least: float
+    least_steps: float
     step_size: float
     finer: float
 
@@ -135,7 +135,7 @@ class Inertia(Record):
     inverse: Matrix
     rates: Matrix
     moving: Integers
-    held: Integers
+    fixed: Integers
     driven: Integers
     linear: int
     turns: RigidRotations
@@ -146,7 +146,7 @@ class Inertia(Record):
         net, free = system.net, ~system.supported
         inverse = aligned(np.where(free, 1.0 / np.where(net.mass > 0.0, net.mass, 1.0)[:, None], 0.0))
         driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(np.int64)
-        moving, fixed = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.held)
+        moving, fixed = np.flatnonzero(free.any(axis=1)), np.flatnonzero(system.fixed)
         return cls(
             net.mass,
             inverse,

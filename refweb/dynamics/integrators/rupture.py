@@ -50,7 +50,7 @@ class Rupturing:
 
     def __init__(self, make, system, probes=(), sums=(), events=()):
         self._probes, self._rest = probes, (sums, events)
-        self._make, self._whole, self._weakness = make, system, system.weakness
+        self._make, self._complete, self._weakness = make, system, system.weakness
         self._breathe = None
         self.inner = self._of(system)
         bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
@@ -82,15 +82,15 @@ class Rupturing:
 
     def refined(self, by=None):
         """The same with a smaller error."""
-        return Rupturing(lambda *parts: self._make(*parts).refined(by), self._whole, self._probes, *self._rest)
+        return Rupturing(lambda *parts: self._make(*parts).refined(by), self._complete, self._probes, *self._rest)
 
     def start(self, x=None, v=None):
         """The course at t = 0, where all breaks that is above its limit."""
-        self.inner = self._of(self._whole)
+        self.inner = self._of(self._complete)
         course = self.inner.start(x, v)
         course.breaks = Breaks()
         over = np.flatnonzero(self._shares(course) >= 1.0)
-        holds = self._holding(np.append(self._whole.net.broken, over))
+        holds = self._holding(np.append(self._complete.net.broken, over))
         now = [element for time, element in self._weakness.times if time <= 0.0 and holds(element)]
         if len(over) or now:
             self._break(course, np.union1d(over, now).astype(np.int64))
@@ -104,7 +104,7 @@ class Rupturing:
         """The course of a checkpoint."""
         arrays = dict(arrays)
         breaks = Breaks(*(arrays.pop(f"broken_{name}") for name in Breaks._fields))
-        system = self._whole
+        system = self._complete
         if len(breaks.elements):
             system = torn(system, breaks.elements, breaks.energies)
         self.inner = self._of(system)
@@ -142,7 +142,7 @@ class Rupturing:
 
     def _holding(self, broken):
         """Function that tells if the line of an element has no element that is ``broken``."""
-        line = self._whole.net.line
+        line = self._complete.net.line
         gone = set(line[broken])
         return lambda element: line[element] not in gone
 
@@ -197,11 +197,11 @@ class Rupturing:
                 moment = brentq(lambda t: over(t) if t > since else below, since, until, xtol=FINE * width)
                 located = self._again(start, reached)
                 last = self.inner.advance(located, np.append(targets[(targets >= since) & (targets < moment)], moment))
-                _take(course, located)
+                _accept(course, located)
                 rows, width = _joined([first[:-1], last]), 0.0
             else:  # its step is taken again, and it only grazes: it has passed, and when is known to a step
                 restored = self._again(self._kept(course), reached)
-                _take(course, restored)
+                _accept(course, restored)
         shares = self._shares(course)
         return rows, np.flatnonzero(shares >= (1.0 - TOGETHER) * shares.max()), width
 
@@ -217,9 +217,9 @@ class Rupturing:
             arrays["force"] = left.force(t, x, v)
         self.inner = self._of(left)
         if self._weakness.watched and len(course.events):
-            _take(course, self._again(arrays, breaks, watching=True))
+            _accept(course, self._again(arrays, breaks, watching=True))
         else:
-            _take(course, self.inner.load(arrays))
+            _accept(course, self.inner.load(arrays))
             course.breaks = breaks
         begin_anew(course.extremes)
 
@@ -246,7 +246,7 @@ def unstrained(probe, broken):
     return probe._replace(data=data)
 
 
-def _take(course, breaks):
+def _accept(course, breaks):
     """Let a course be another."""
     course.__dict__.update(breaks.__dict__)
 

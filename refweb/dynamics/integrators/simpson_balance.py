@@ -47,7 +47,7 @@ class Sample(NamedTuple):
     force: np.ndarray
     lines: np.ndarray
     power: np.ndarray
-    shown: Mapping = MappingProxyType({})
+    per_cell: Mapping = MappingProxyType({})
 
 
 class Rates(NamedTuple):
@@ -153,10 +153,10 @@ class SimpsonBalance:
     """
 
     def __init__(self, system, hold, fast, observed=()):
-        self.system, self._hold, self._least = system, hold, least_energy(system.net)
+        self.system, self._hold, self._least_energy = system, hold, least_energy(system.net)
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
-        families, self._shown = system.families, observed
+        families, self._observed = system.families, observed
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
             Arrays(INDICES, [f.cells for f in families]),
@@ -169,7 +169,7 @@ class SimpsonBalance:
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
         self._outside = Outside.of(system)
         self._pushing = [families[i] for i in self._outside.pushing]
-        self._held, self._fixed = system.supported, np.flatnonzero(system.held)
+        self._supported, self._fixed = system.supported, np.flatnonzero(system.fixed)
 
     def sample(self, t, x, v):
         """The `Sample` of a state."""
@@ -179,7 +179,7 @@ class SimpsonBalance:
         for i, column in self._powered:
             power[i] = out[i][:, column].sum()
         power[-1] = -(force[driven] * v[driven]).sum() if len(driven) else 0.0
-        return Sample(t, x, v, force, out.lines.copy(), power, {i: self._show(out, i) for i in self._shown})
+        return Sample(t, x, v, force, out.lines.copy(), power, {i: self._show(out, i) for i in self._observed})
 
     def _show(self, out, number):
         """Values that probes read of families that write ``out``."""
@@ -241,7 +241,7 @@ class SimpsonBalance:
 
     def _momenta(self, v):
         """M v of what is free, by row [N s]."""
-        return self.system.mass.momentum(np.where(self._held, 0.0, v))
+        return self.system.mass.momentum(np.where(self._supported, 0.0, v))
 
     def energies(self, sample, work, step):
         """Energy of each family, kinetic energy, work [J] and step size [s], for the work of each family."""
@@ -260,8 +260,8 @@ class SimpsonBalance:
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
         open_balance(course.x, self._momenta(course.v), self._outside, course.ledger)
-        by_family = self._own(energies)
-        course.energy, course.largest = by_family.sum(), max(np.abs(by_family).sum(), self._least)
+        by_family = self._by_family(energies)
+        course.energy, course.largest = by_family.sum(), max(np.abs(by_family).sum(), self._least_energy)
 
     def impulses(self, course):
         """Momentum, impulse of the supports and of all else from outside [N s], shape (9,), held against each other."""
@@ -271,11 +271,11 @@ class SimpsonBalance:
 
     def note_largest(self, course, energies):
         """Note the largest energy of a course."""
-        course.largest = max(course.largest, np.abs(self._own(energies)).sum())
+        course.largest = max(course.largest, np.abs(self._by_family(energies)).sum())
 
     def close(self, course, energies, before, remedy):
         """Compare the energies at a row with the work; raise `EnergyDriftError` where a large drift does not fall."""
-        by_family, work = self._own(energies), energies[-2]
+        by_family, work = self._by_family(energies), energies[-2]
         self.note_largest(course, energies)
         drift = abs(by_family.sum() - work - course.energy)
         course.worst = max(course.worst, drift)
@@ -286,9 +286,9 @@ class SimpsonBalance:
                 f"{course.time:.6g} s, limit {DRIFT:g}: {remedy}",
                 course.drift,
             )
-        if course.nsteps and course.largest > self._least:
+        if course.nsteps and course.largest > self._least_energy:
             course.share = share
 
-    def _own(self, energies):
+    def _by_family(self, energies):
         """Energies of the families that are no work, and kinetic energy."""
         return np.delete(energies[:-2], np.flatnonzero(self._working > 0))

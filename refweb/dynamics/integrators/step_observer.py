@@ -92,7 +92,7 @@ class StepObserver(Integrator):
 
     def __init__(self, system, probes=(), sums=(), events=(), rtol=1e-6, atol_position=None, atol_velocity=None):
         self.system, self.rtol = system, rtol
-        self._shown, self._blocks = system.per_cell(), system.blocks()
+        self._per_cell, self._blocks = system.per_cell(), system.blocks()
         if not self.takes_massless:
             refuse_massless(system, self.method)
         if system.constraints and not self.takes_links:
@@ -114,7 +114,7 @@ class StepObserver(Integrator):
         self.stats = dict(nfev=0, njev=0, nlu=0)
         self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
         still = max(fast, self.atol_velocity / rtol)
-        self._book = SimpsonBalance(system, self.hold, still, self._measurements.shown)
+        self._book = SimpsonBalance(system, self.hold, still, self._measurements.families)
         self._limits = StepLimits(system, self.rotations)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
@@ -181,7 +181,7 @@ class StepObserver(Integrator):
     def force_at(self, t, x, v):
         """Force on each unknown [N] at a state of all rows."""
         self.stats["nfev"] += 1
-        rows = self.system.forces(t, x, v, self._shown).force
+        rows = self.system.forces(t, x, v, self._per_cell).force
         force = rows.ravel()[self.system.free]
         if self._wrong is None and not np.isfinite(force.sum()):
             self._wrong = t, rows
@@ -275,7 +275,7 @@ class StepObserver(Integrator):
         system, x, v = self.system, course.x, course.v
         self._reference = np.where(system.supported, x, 0.0)  # motion is written over it
         course.rates = self._book.rates(self._book.sample(course.time, x, v))
-        with self._told(course):
+        with self._report(course):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
     def _take_step(self, course: ObservedState, end):
@@ -286,7 +286,7 @@ class StepObserver(Integrator):
             self._enter(course)  # and the first step is chosen whatever the rows are
             ahead = course.time + max(1e3 * course.step, 1e-6 * course.time)
         self._wrong = None
-        with self._told(course):
+        with self._report(course):
             reached = self.step(stop, ahead)
             if not reached > course.reached:
                 raise Stopped("no step is long enough to change the time")
@@ -325,9 +325,9 @@ class StepObserver(Integrator):
             stop = search(course.events, piece, lambda slot, sample: self._value(piece, slot, sample), self._sample_at)
             if stop < end:
                 piece = self._piece(course, stop)
-        self._look(course, piece)
+        self._inspect(course, piece)
         for followed in self._limits.followed:
-            followed.look(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
+            followed.inspect(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
         course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
         course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
         course.rates = piece.behind
@@ -336,7 +336,7 @@ class StepObserver(Integrator):
         if piece.jump and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(course)
 
-    def _look(self, course, piece):
+    def _inspect(self, course, piece):
         """Look for extremes and means in a piece, and behind a jump at its end."""
 
         def energies(sample):
@@ -348,7 +348,7 @@ class StepObserver(Integrator):
         self._measurements.follow(extremes, piece.middle, end, self._sample_at, energies)
         self._measurements.average(course, piece, end, self._sample_at)
         if piece.jump:
-            self._measurements.look(extremes, piece.end, energies)
+            self._measurements.inspect(extremes, piece.end, energies)
             begin_anew(extremes)
 
     def _value(self, piece, slot, sample):
@@ -368,7 +368,7 @@ class StepObserver(Integrator):
         return f"use a smaller rtol than {self.rtol:g}"
 
     @contextlib.contextmanager
-    def _told(self, course):
+    def _report(self, course):
         """Tell where a method stopped, and what moves there."""
         try:
             yield

@@ -99,7 +99,7 @@ class Sundials(StepObserver):
         size = f"{self.unknowns} unknowns, {'at most' if few else 'more than'} {DENSE}"
         self.linear_solver, self.choice = name, f"{name}, for {size}{why}: {LINEAR_SOLVERS[name]}"
 
-    def _whole(self, rows, columns, size):
+    def _full_matrix(self, rows, columns, size):
         """Options for a Jacobian whose values stand at these rows and columns, where several of a place add up."""
         if self.linear_solver == "dense":
             self._places = rows * size + columns
@@ -174,9 +174,9 @@ class Sundials(StepObserver):
 
     def _one_step(self, stop, end):
         """Take a step; return its time."""
-        return float(self._found(end, "onestep", float(stop) if np.isfinite(stop) else None).t)
+        return float(self._solution(end, "onestep", float(stop) if np.isfinite(stop) else None).t)
 
-    def _found(self, t, mode="normal", stop=None):
+    def _solution(self, t, mode="normal", stop=None):
         """Solution of the solver at a time, or at the end of a step towards it."""
         return _checked(self._solver.step(t, mode, stop))
 

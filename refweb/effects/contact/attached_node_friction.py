@@ -166,7 +166,7 @@ def set_parts(touches, n, x, v, inverse, data):
     touches[n, MIXED], touches[n, MIXED + 1] = delassus(touches, n, 0, 1, inverse), delassus(touches, n, 0, 2, inverse)
 
 
-sweep, (recall, give) = sweeping(moved, apply_force), warm_start(along, apply_force)
+sweep, (recall, commit) = sweeping(moved, apply_force), warm_start(along, apply_force)
 
 
 def kernels(depth, pieces, functions, spins):
@@ -176,5 +176,5 @@ def kernels(depth, pieces, functions, spins):
     Data have the columns of both nodes, see `refweb.effects.attached_nodes`, behind all others.
     """
     return ImplicitContactKernels(
-        meeting(depth, pieces, functions, spins, set_parts), recall, sweep, give, WHOLE, SLOTS * NOTED, True
+        meeting(depth, pieces, functions, spins, set_parts), recall, sweep, commit, WHOLE, SLOTS * NOTED, True
     )

@@ -80,7 +80,7 @@ class Space(NamedTuple):
     x: np.ndarray
     cells: np.ndarray
     data: np.ndarray
-    found: np.ndarray
+    contact_data: np.ndarray
     contacts: np.ndarray
 
 
@@ -232,7 +232,7 @@ def pressing(depth):
     arc = arcs(depth)
 
     @kernel()
-    def note(space, count, s, slot, path, y, g, contact_data, thickness, touching):
+    def record(space, count, s, slot, path, y, g, contact_data, thickness, touching):
         """Write a contact; ``y`` and ``g`` are along the axes of the body that is touched."""
         axes, offset, own_axes, contacts = touching.axes, path[0], path[1], space.contacts
         away = times_transposed(axes, add(y, offset))  # from the row of the body that is touched
@@ -278,14 +278,14 @@ def pressing(depth):
                     continue
                 for k in range(3):
                     space.x[0, k], space.x[1, k] = p[k], q[k]
-                for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.found)):
-                    touch = touch_of(space.x, space.cells, row, 2, LINE, space.found, m)
-                    end = 1 if touch.place > 0.5 else 0
+                for m in range(contacts(space.x, space.cells, row, 0, 1, 2, LINE, space.contact_data)):
+                    touch = touch_of(space.x, space.cells, row, 2, LINE, space.contact_data, m)
+                    end = 1 if touch.xi > 0.5 else 0
                     if (touch.inner or data[c, at + OWNS + end] != 0.0) and count < limit:
-                        w = window(False, touch.place, touch.inner)[0]
+                        w = window(False, touch.xi, touch.inner)[0]
                         contact_data = touch.spot.depth, w * touch.weight, w * touch.share, 1.0 if touch.inner else 0.0
                         which = slot + (2 if touch.inner else end)
-                        note(
+                        record(
                             space,
                             count,
                             s,
@@ -303,12 +303,12 @@ def pressing(depth):
                 two = times(frame_b.axes, times_transposed(frame_a.axes, vector_at(data, c, at + THIRD)))
                 _, w, y, deep, g = arc(data[c, at + OWNS], data[c, at + OWNS + 1], p, relative, two, pair)
                 if w > 0.0 and count < limit:
-                    note(space, count, s, slot, path, y, g, (deep, w, w, 1.0), thickness, frame_b)
+                    record(space, count, s, slot, path, y, g, (deep, w, w, 1.0), thickness, frame_b)
                     count += 1
             else:
                 deep, g, _ = depth(p, pair.shape)
                 if deep > 0.0 and count < limit:
-                    note(space, count, s, slot, path, p, g, (deep, 1.0, 1.0, 0.0), thickness, frame_b)
+                    record(space, count, s, slot, path, p, g, (deep, 1.0, 1.0, 0.0), thickness, frame_b)
                     count += 1
         return count
 
@@ -319,7 +319,7 @@ def pressing(depth):
 def meeting(first, second):
     """Kernels of two bodies whose depths are given, see `pressing`.
 
-    ``space_of(data)`` is the `Space`, and ``meet(ahead, x, cells, data, c, space)`` the number of contacts of a pair
+    ``space_of(data)`` is the `Space`, and ``detect(ahead, x, cells, data, c, space)`` the number of contacts of a pair
     that it holds.
     """
     (press, shape), (press_back, second_shape) = pressing(second), pressing(first)
@@ -336,7 +336,7 @@ def meeting(first, second):
         )
 
     @kernel()
-    def meet(ahead, x, cells, data, c, space):
+    def detect(ahead, x, cells, data, c, space):
         away = apart(x, cells, data, c)
         reach = data[c, SIDES + EXTENT] + data[c, SIDES + SIDE + EXTENT] + ahead
         if dot(away, away) > reach * reach:
@@ -344,4 +344,4 @@ def meeting(first, second):
         count = press(ahead, x, cells, data, c, 0, space, 0)
         return press_back(ahead, x, cells, data, c, 1, space, count)
 
-    return space_of, meet
+    return space_of, detect

@@ -148,13 +148,13 @@ def delassus(touches, n, i, j, inverse):
 
 
 @kernel(forceinline=True)
-def set_direction(touches, n, i, own, row):
+def set_direction(touches, n, i, first, second):
     """Write direction i of a contact, as either body has it."""
     for k in range(3):
-        touches[n, AXES + 3 * i + k] = own.axis[k]
-        touches[n, LEVERS + 3 * i + k], touches[n, ARMS + 3 * i + k] = -own.lever[k], -own.arm[k]
-        touches[n, LEVERS_OF_SECOND + 3 * i + k] = row.lever[k]
-        touches[n, ARMS_OF_SECOND + 3 * i + k] = row.arm[k]
+        touches[n, AXES + 3 * i + k] = first.axis[k]
+        touches[n, LEVERS + 3 * i + k], touches[n, ARMS + 3 * i + k] = -first.lever[k], -first.arm[k]
+        touches[n, LEVERS_OF_SECOND + 3 * i + k] = second.lever[k]
+        touches[n, ARMS_OF_SECOND + 3 * i + k] = second.arm[k]
 
 
 @kernel()
@@ -197,7 +197,7 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
     touches[n, SLOT] = contacts[m, WHICH]
 
 
-sweep, (recall, give) = sweeping(moved, apply_force), warm_start(along, apply_force)
+sweep, (recall, commit) = sweeping(moved, apply_force), warm_start(along, apply_force)
 
 
 @functools.cache
@@ -264,5 +264,5 @@ def kernels(first, second):
         force,
         stiffness,
         damping,
-        lambda parts: ImplicitContactKernels(meeting_all, recall, sweep, give, WHOLE, NOTED * SLOTS * parts),
+        lambda parts: ImplicitContactKernels(meeting_all, recall, sweep, commit, WHOLE, NOTED * SLOTS * parts),
     )

@@ -53,7 +53,7 @@ class PointContact(NamedTuple):
     ----------
     c : int
         Cell.
-    place : float
+    xi : float
         Its place ξ.
     inner : bool
         Whether the place moves as the line does.
@@ -66,7 +66,7 @@ class PointContact(NamedTuple):
     """
 
     c: int
-    place: float
+    xi: float
     inner: bool
     pair: Pair
     spot: ContactPoint
@@ -116,7 +116,7 @@ def place_moves(touch, moving, nodes, functions, z):
     The last row is of the body; all are zero unless ``moving``.
     """
     z[:] = 0.0
-    pair, xi, spot = touch.pair, touch.place, touch.spot
+    pair, xi, spot = touch.pair, touch.xi, touch.spot
     curve = rise(pair, xi, spot)[1]
     if not moving or not touch.weight * curve < 0.0:
         return
@@ -135,7 +135,7 @@ class Places(NamedTuple):
     deepest: Callable
     contacts: Callable
     touch_of: Callable
-    found: tuple
+    buffer: tuple
 
 
 @kernel(forceinline=True)

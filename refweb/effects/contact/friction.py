@@ -164,7 +164,7 @@ def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_
 
     ``z`` is what `place_moves` writes; ``by_y`` and ``by_u (3, 3)`` are space to work in.
     """
-    c, xi, pair, (y, d, _, deep, g, bend) = touch.c, touch.place, touch.pair, touch.spot
+    c, xi, pair, (y, d, _, deep, g, bend) = touch.c, touch.xi, touch.pair, touch.spot
     w, w1, _ = window(pair.once, xi, touch.inner)
     push = rubbed_by(touch)
     steep = touch.share * pair.stiffness * w * slope_of_power(pair.exponent, deep)
@@ -205,7 +205,7 @@ def add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_
 @kernel(forceinline=True)
 def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
     """Add what a contact has of −∂f/∂v, along the axes of the body; ``by_u (3, 3)`` is space to work in."""
-    c, xi, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
+    c, xi, pair, y = touch.c, touch.xi, touch.pair, touch.spot.y
     u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
     by_velocity(pair, rubbed_by(touch), touch.spot.gradient, u, by_u)
     for b in range(nodes + 2 if spins else nodes + 1):
@@ -274,7 +274,7 @@ def kernels(depth, pieces, nodes, functions, spins):
         for first in range(0, cells.shape[0], pieces):
             for n in range(contacts(x, cells, data, first, pieces, nodes, functions, buffer)):
                 touch = touch_of(x, cells, data, nodes, functions, buffer, n)
-                c, xi, pair, y = touch.c, touch.place, touch.pair, touch.spot.y
+                c, xi, pair, y = touch.c, touch.xi, touch.pair, touch.spot.y
                 u, _, _ = slip_of(v, cells, c, nodes, spins, functions, pair, xi, y)
                 friction = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
                 out[c, 0] += dot(friction, u)
@@ -308,7 +308,7 @@ def kernels(depth, pieces, nodes, functions, spins):
                 place_moves(touch, touch.inner, nodes, functions, z)
                 add_stiffness(blocks, v, cells, touch, nodes, spins, functions, z, by_y, by_u)
                 if spins == 2:
-                    pair, xi, y = touch.pair, touch.place, touch.spot.y
+                    pair, xi, y = touch.pair, touch.xi, touch.spot.y
                     u, _, _ = slip_of(v, cells, touch.c, nodes, spins, functions, pair, xi, y)
                     friction = friction_force(pair, rubbed_by(touch), touch.spot.gradient, u)
                     add_push(pushes[touch.c - first], 1.0, friction, xi, nodes, functions)

@@ -164,7 +164,7 @@ def set_touch(touches, n, touch, cells, v, inverse, spins, functions):
     a, b, body, spin = cells[c, 0], cells[c, 1], cells[c, 2], cells[c, 3] if spins else -1
     touches[n, CELL], touches[n, ROWS], touches[n, ROWS + 1], touches[n, ROWS + 2] = c, a, b, body
     touches[n, ROWS + 3] = spin
-    near, far = share(0, 2, functions, touch.place)[0], share(1, 2, functions, touch.place)[0]
+    near, far = share(0, 2, functions, touch.xi)[0], share(1, 2, functions, touch.xi)[0]
     touches[n, SHARES], touches[n, SHARES + 1] = near, far
     y, g = times_transposed(pair.axes, touch.spot.y), times_transposed(pair.axes, touch.spot.gradient)
     steep, g = facing(g)
@@ -200,10 +200,10 @@ def set_touch(touches, n, touch, cells, v, inverse, spins, functions):
     touches[n, PUSH], touches[n, DAMPING] = rubbed_by(touch) * steep, pair.damping * steep
     touches[n, FRICTION], touches[n, SLIP] = pair.friction, pair.slip_velocity
     touches[n, THETA + 1] = 1.0
-    touches[n, SLOT] = 0.0 if touch.inner or pair.once else 1.0 if touch.place < 0.5 else 2.0
+    touches[n, SLOT] = 0.0 if touch.inner or pair.once else 1.0 if touch.xi < 0.5 else 2.0
 
 
-sweep, (recall, give) = sweeping(moved, apply_force), warm_start(along, apply_force)
+sweep, (recall, commit) = sweeping(moved, apply_force), warm_start(along, apply_force)
 
 
 @kernel()
@@ -225,7 +225,7 @@ def meeting(depth, pieces, functions, spins, more=alone):
     _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
 
     @kernel(DETECT)
-    def meet(h, x, v, inverse, cells, data, touches, begin):
+    def detect(h, x, v, inverse, cells, data, touches, begin):
         buffer, count = np.empty((limit * pieces, columns)), begin
         at_node = np.full(x.shape[0], -1)
         for first in range(0, cells.shape[0], pieces):
@@ -233,7 +233,7 @@ def meeting(depth, pieces, functions, spins, more=alone):
                 if count < touches.shape[0]:
                     touch = touch_of(x, cells, data, 2, functions, buffer, n)
                     if not touch.inner:
-                        node = cells[touch.c, 0 if touch.place < 0.5 else 1]
+                        node = cells[touch.c, 0 if touch.xi < 0.5 else 1]
                         row = at_node[node]
                         if row >= 0 and int(touches[row, ROWS + 2]) == cells[touch.c, 2]:
                             touches[row, PUSH] += rubbed_by(touch) * facing(touch.spot.gradient)[0]
@@ -246,7 +246,7 @@ def meeting(depth, pieces, functions, spins, more=alone):
             touches[n, THETA] = fitted(h * touches[n, OWN] * touches[n, PUSH] * touches[n, DAMPING])
         return count
 
-    return meet
+    return detect
 
 
 def kernels(depth, pieces, functions, spins):
@@ -257,4 +257,4 @@ def kernels(depth, pieces, functions, spins):
     depth, pieces, functions, spins
         See `refweb.effects.contact.friction.kernels`.
     """
-    return ImplicitContactKernels(meeting(depth, pieces, functions, spins), recall, sweep, give, WIDTH, SLOTS * NOTED)
+    return ImplicitContactKernels(meeting(depth, pieces, functions, spins), recall, sweep, commit, WIDTH, SLOTS * NOTED)

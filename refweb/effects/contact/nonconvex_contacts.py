@@ -44,7 +44,7 @@ COLUMNS = 6
 
 
 @kernel()
-def note(buffer, n, c, xi, inner, weight, rise):
+def record(buffer, n, c, xi, inner, weight, rise):
     """Write a contact to a row."""
     buffer[n, 0], buffer[n, 1], buffer[n, 2] = c, xi, inner
     buffer[n, WEIGHT], buffer[n, SHARE], buffer[n, RISE] = weight, max(weight, 0.0), rise
@@ -149,7 +149,7 @@ def several(within, rise):
                     deep = within(x, cells, data, c, nodes, functions, at).depth
                     if deep > 0.0 and 0.0 < at < 1.0:
                         felt = 4.0 * at * (1.0 - at) * deep * power_of_depth(pair.exponent, deep)
-                        note(buffer, count, c, at, 1.0, sign, felt)
+                        record(buffer, count, c, at, 1.0, sign, felt)
                         count += 1
             if n == parts:
                 last = spot.depth
@@ -180,7 +180,7 @@ def several(within, rise):
             count, begin, end = scan(x, cells, data, c, nodes, functions, buffer, count)
             for at, deep in ((0.0, begin), (1.0, end)):
                 if deep > 0.0:
-                    note(buffer, count, c, at, 0.0, 1.0, 0.0)
+                    record(buffer, count, c, at, 0.0, 1.0, 0.0)
                     count += 1
         return count
 

@@ -109,13 +109,13 @@ class Deepest(NamedTuple):
         k [N/m^p] and p of its contact.
     moving : bool
         Whether it comes with energy, in dynamics, or is pushed.
-    least : float
+    smallest : float
         Stiffness that its energy, or what pushes, asks for at the start [N/m^p].
     chosen : bool
         Whether the stiffness is refweb's choice.
     initial : float
         Overlap at t = 0 [m], which no stiffness changes.
-    held : bool
+    fixed : bool
         Whether it is deeper than allowed, and neither the line nor the body is free to give way.
     """
 
@@ -126,10 +126,10 @@ class Deepest(NamedTuple):
     stiffness: float
     exponent: float
     moving: bool
-    least: float
+    smallest: float
     chosen: bool
     initial: float
-    held: bool
+    fixed: bool
 
     @property
     def too_deep(self):
@@ -154,7 +154,7 @@ class Deepest(NamedTuple):
         """
         share = self.overlap / (AIM * allowed(self.body))
         factor = self.stiffness * share ** (self.exponent + self.moving)
-        return rounded_up(max(factor, self.least) if self.in_core else factor)
+        return rounded_up(max(factor, self.smallest) if self.in_core else factor)
 
     def plain(self):
         """Convert to values for ``run.json``."""
@@ -181,7 +181,7 @@ class Deepest(NamedTuple):
             raise SolverError(
                 f"line {self.line} starts in the core of a body, {self._where()}: move the body or the web"
             )
-        if self.chosen and not self.held and self.too_deep and self.overlap > DEEPER * self.initial:
+        if self.chosen and not self.fixed and self.too_deep and self.overlap > DEEPER * self.initial:
             raise too_soft(self, f"line {self.line} is {self._where()}", allowed(self.body), [self.body.name])
         if self.in_core:
             raise SolverError(
@@ -199,7 +199,7 @@ class Deepest(NamedTuple):
             yield f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
 
     def _remedy(self):
-        if self.held:
+        if self.fixed:
             return "all its nodes and the body are held or moved as prescribed, and no stiffness keeps them apart"
         return (
             f"stiffness = {self.enough:g} should be enough in place of {self.stiffness:g}, or leave it out "
@@ -228,7 +228,7 @@ class Overlaps:
         self._initial = [0.0] * len(system.net.bodies)
         self._laws = [scene.contact.law_of(body) for body in system.net.bodies]
         self._load_steps = getattr(scene.solve, "load_steps", ())
-        self.found = [self._deepest(i, 0.0, 0.0, None) for i in range(len(self.bodies))]
+        self.deepest = [self._deepest(i, 0.0, 0.0, None) for i in range(len(self.bodies))]
         self.pairs = pairs
 
     @property
@@ -242,7 +242,7 @@ class Overlaps:
             smallest = first_stiffness(self.system, body, exponent, self._load_steps)
         if self._moving and time == 0.0:
             self._initial[i] = overlap
-        net, unmoved = self.system.net, self.system.held
+        net, unmoved = self.system.net, self.system.fixed
         fixed_pair = overlap > allowed(body) and bool(unmoved[[body.row, *net.cells[net.line == line].ravel()]].all())
         fields = stiffness, exponent, self._moving, smallest, body.name in self._chosen, self._initial[i], fixed_pair
         return Deepest(body, overlap, time, line, *fields)
@@ -251,21 +251,21 @@ class Overlaps:
         """Stiffness of the contact of a body [N/m^p]."""
         return self._laws[self.bodies.index(body)][0]
 
-    def note(self, i, overlap, time, line):
+    def record(self, i, overlap, time, line):
         """Note the deepest overlap [m] of body ``i``, its time [s] and its line, if it is deeper than before."""
-        if overlap > self.found[i].overlap:
-            self.found[i] = self._deepest(i, overlap, time, line)
+        if overlap > self.deepest[i].overlap:
+            self.deepest[i] = self._deepest(i, overlap, time, line)
 
     def refuse(self):
         """Refuse what may not be, see `Deepest.refuse`."""
-        for deepest in self.found:
+        for deepest in self.deepest:
             deepest.refuse()
         if self.pairs is not None:
             self.pairs.refuse()
 
     def plain(self):
         """Convert to values for ``run.json``, by name."""
-        return {deepest.body.name: deepest.plain() for deepest in self.found}
+        return {deepest.body.name: deepest.plain() for deepest in self.deepest}
 
     def _pushed_along(self, deepest):
         """Remark on pushes along lines, see `push_along`."""
@@ -285,7 +285,7 @@ class Overlaps:
         """Remarks for a reader of the results."""
         elsewhere = self.pairs.touched if self.pairs is not None else ()
         what = "the web" if self.pairs is None else "anything"
-        for deepest in self.found:
+        for deepest in self.deepest:
             if deepest.overlap > 0.0 or deepest.body.name not in elsewhere:
                 yield from deepest.remarks(what)
             yield from self._pushed_along(deepest)

@@ -36,7 +36,7 @@ class DeepestPair(NamedTuple):
         k [N/m^p] and p of their contact.
     chosen : tuple of str
         Names of those whose stiffness is refweb's choice.
-    least : float
+    smallest : float
         Stiffness that their energy asks for at the start [N/m^p], where they are still getting deeper, else 0.
     initial : float
         Overlap at t = 0 [m], which no stiffness changes.
@@ -48,7 +48,7 @@ class DeepestPair(NamedTuple):
     stiffness: float
     exponent: float
     chosen: tuple
-    least: float
+    smallest: float
     initial: float
 
     @property
@@ -75,7 +75,7 @@ class DeepestPair(NamedTuple):
     def enough(self):
         """Stiffness that would do [N/m^p]: of an overlap that is `AIM` of what is allowed."""
         factor = self.stiffness * (self.overlap / (AIM * self.allowed)) ** (self.exponent + 1.0)
-        return rounded_up(max(factor, self.least) if self.in_core else factor)
+        return rounded_up(max(factor, self.smallest) if self.in_core else factor)
 
     def plain(self):
         """Convert to values for ``run.json``."""
@@ -136,8 +136,8 @@ class PairOverlaps:
 
     def __init__(self, contact, chosen, system):
         self._contact, self._chosen, self._system = contact, set(chosen), system
-        self.found = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
-        self._way, self._met = None, None
+        self.deepest = [self._deepest(bodies, 0.0, 0.0, 0.0) for bodies in pairs_of(system)]
+        self._path_limit, self._met = None, None
 
     def _deepest(self, bodies, overlap, time, initial):
         stiffness, exponent, *_ = self._contact.law_between(*bodies)
@@ -146,12 +146,12 @@ class PairOverlaps:
         smallest = first_between(self._system, bodies, exponent) if deep else 0.0
         return DeepestPair(bodies, overlap, time, stiffness, exponent, chosen, smallest, initial)
 
-    def note(self, i, overlap, time):
+    def record(self, i, overlap, time):
         """Note the deepest overlap [m] of pair ``i`` and its time [s], if it is deeper than before."""
-        was = self.found[i]
+        was = self.deepest[i]
         if overlap > was.overlap:
             initial = overlap if time == 0.0 else was.initial
-            self.found[i] = self._deepest(was.bodies, overlap, time, initial)
+            self.deepest[i] = self._deepest(was.bodies, overlap, time, initial)
 
     def note_way(self, safety=0.0, step=0.0, speed=0.0):
         """Note what bounds the way in a step.
@@ -159,7 +159,9 @@ class PairOverlaps:
         That is ``safety``, where steps follow the bound, or the size of all steps [s] and the largest speed of a point
         of a body [m/s].
         """
-        self._way = (lambda pair: WAY * safety * pair.thickness) if safety > 0.0 else (lambda pair: 2.0 * step * speed)
+        self._path_limit = (
+            (lambda pair: WAY * safety * pair.thickness) if safety > 0.0 else (lambda pair: 2.0 * step * speed)
+        )
 
     def note_met(self, met):
         """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
@@ -167,21 +169,21 @@ class PairOverlaps:
 
     def refuse(self):
         """Refuse what may not be, see `DeepestPair.refuse`."""
-        for deepest in self.found:
+        for deepest in self.deepest:
             deepest.refuse()
 
     def plain(self):
         """Convert to values for ``run.json``, by names: the pairs that have touched."""
-        return {", ".join(b.name for b in pair.bodies): pair.plain() for pair in self.found if pair.overlap > 0.0}
+        return {", ".join(b.name for b in pair.bodies): pair.plain() for pair in self.deepest if pair.overlap > 0.0}
 
     def passage(self):
         """ "certified", or of which pair it is not certain that nothing has passed, and when it was deepest."""
         if self._met is not None:
-            return self._told(*self._met)
-        if self._way is None:
+            return self._text(*self._met)
+        if self._path_limit is None:
             return "not certified"
-        for pair in self.found:
-            if not pair.overlap + (path := self._way(pair)) < pair.thickness:
+        for pair in self.deepest:
+            if not pair.overlap + (path := self._path_limit(pair)) < pair.thickness:
                 when = f", deepest at t = {pair.time:.6g} s" if pair.overlap > 0.0 else ""
                 return (
                     f"not certified: bodies {pair.name} may come nearer by {path:.3g} m in a step, and their middles "
@@ -189,11 +191,11 @@ class PairOverlaps:
                 )
         return "certified"
 
-    def _told(self, time, body_a, body_b, *_):
+    def _text(self, time, body_a, body_b, *_):
         """The same of steps that were followed, of which two bodies have met at a time, or none."""
         if not math.isfinite(time):
             return "certified"
-        pair = next(pair for pair in self.found if [body.row for body in pair.bodies] == [body_a, body_b])
+        pair = next(pair for pair in self.deepest if [body.row for body in pair.bodies] == [body_a, body_b])
         return (
             f"not certified: bodies {pair.name} came as near each other as {pair.thickness:.3g} m below a surface, "
             f"where they may pass, at t = {time:.6g} s"
@@ -202,9 +204,9 @@ class PairOverlaps:
     @property
     def touched(self):
         """Names of the bodies that have touched others."""
-        return {body.name for pair in self.found if pair.overlap > 0.0 for body in pair.bodies}
+        return {body.name for pair in self.deepest if pair.overlap > 0.0 for body in pair.bodies}
 
     def remarks(self):
         """Remarks for a reader of the results."""
-        for deepest in self.found:
+        for deepest in self.deepest:
             yield from deepest.remarks()

@@ -47,7 +47,7 @@ def slope_of_power(exponent, deep):
 def push_of(touch):
     """k W δ^p of a contact [N], less than 0 of a minimum."""
     pair = touch.pair
-    faded = touch.weight * pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
+    faded = touch.weight * pair.stiffness * window(pair.once, touch.xi, touch.inner)[0]
     return faded * power_of_depth(pair.exponent, touch.spot.depth)
 
 
@@ -55,7 +55,7 @@ def push_of(touch):
 def rubbed_by(touch):
     """k W δ^p that losses go by [N], see `refweb.effects.contact.nonconvex_contacts`."""
     pair = touch.pair
-    faded = touch.share * pair.stiffness * window(pair.once, touch.place, touch.inner)[0]
+    faded = touch.share * pair.stiffness * window(pair.once, touch.xi, touch.inner)[0]
     return faded * power_of_depth(pair.exponent, touch.spot.depth)
 
 
@@ -132,7 +132,7 @@ def foresight(depth, spins=0):
 @kernel(forceinline=True)
 def add_stiffness(blocks, touch, definite, nodes, functions, z):
     """Add what a contact has of the stiffness, along the axes of the body; ``z`` is what `place_moves` writes."""
-    c, xi, pair, spot = touch.c, touch.place, touch.pair, touch.spot
+    c, xi, pair, spot = touch.c, touch.xi, touch.pair, touch.spot
     deep, d, g, h = spot.depth, spot.d, spot.gradient, spot.hessian
     w, w1, _ = window(pair.once, xi, touch.inner)
     steep = touch.weight * pair.stiffness * w * slope_of_power(pair.exponent, deep)
@@ -213,7 +213,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                 g = times_transposed(touch.pair.axes, touch.spot.gradient)
                 for k in range(3):
                     for a in range(nodes):
-                        f[cells[c, a], k] -= share(a, nodes, functions, touch.place)[0] * push * g[k]
+                        f[cells[c, a], k] -= share(a, nodes, functions, touch.xi)[0] * push * g[k]
                     f[cells[c, nodes], k] += push * g[k]
                     out[c, FELT + k] += push * g[k]
                 if spins:
@@ -230,7 +230,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                 touch = touch_of(x, cells, data, nodes, functions, buffer, n)
                 pair, deep = touch.pair, touch.spot.depth
                 stored = pair.stiffness / (pair.exponent + 1.0) * power_of_depth(pair.exponent, deep) * deep
-                out[touch.c] += touch.weight * window(pair.once, touch.place, touch.inner)[0] * stored
+                out[touch.c] += touch.weight * window(pair.once, touch.xi, touch.inner)[0] * stored
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
@@ -246,9 +246,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
                 place_moves(touch, touch.inner and not definite, nodes, functions, z)
                 add_stiffness(blocks, touch, definite, nodes, functions, z)
                 if turning:
-                    add_push(
-                        pushes[touch.c - first], -push_of(touch), touch.spot.gradient, touch.place, nodes, functions
-                    )
+                    add_push(pushes[touch.c - first], -push_of(touch), touch.spot.gradient, touch.xi, nodes, functions)
             for c in range(first, first + pieces):
                 axes = paired(x, cells, data, c, nodes).axes
                 if turning:

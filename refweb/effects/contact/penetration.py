@@ -42,11 +42,11 @@ class BodyPassage:
         self._system, self._met = system, np.full(5, np.inf)
         self._followed = any(family.passing is not None for family in system.families)
 
-    def note(self, met):
+    def record(self, met):
         """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""
         self._met = met
 
-    def told(self):
+    def status(self):
         """True if nothing can have passed, as ``run.json`` has it."""
         if not self._followed:
             return "not certified: curved elements are not followed"
@@ -62,4 +62,4 @@ class BodyPassage:
     def remarks(self):
         """Remarks for a reader of the results."""
         if np.isfinite(self._met[0]):
-            yield f"lines may have passed through bodies, {self.told()}"
+            yield f"lines may have passed through bodies, {self.status()}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...accepted import accepts, by_name
 from ...errors import InputError
-from ...messages import nearest, shown
+from ...messages import nearest, quote
 from ...tables import Table, boolean, field, real, table
 from ..base import CONTACT_COLUMNS, OWN, Family
 from .line_body_ccd import passing
@@ -30,7 +30,7 @@ OUT_OF_REACH = 1e6, 7e5, 4e5
 @accepts({"enum": [1, 1.5]})
 def _exponent(name, value):
     if isinstance(value, bool) or value not in (1, 1.5):
-        raise InputError(f"{name} = {shown(value)} must be 1 or 1.5")
+        raise InputError(f"{name} = {quote(value)} must be 1 or 1.5")
     return float(value)
 
 

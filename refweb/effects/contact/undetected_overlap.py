@@ -41,40 +41,40 @@ class Silent:
     """
 
     def __init__(self, net, bodies):
-        self._net, self._found = net, {}
+        self._net, self._overlaps = net, {}
         pairs = [(a, b) for a, b in itertools.combinations(bodies, 2) if not (a.fixed and b.fixed)]
         self._pairs = pairs
         self._rows = np.array([(a.row, b.row) for a, b in pairs])
         self._reach = np.array([a.extent + b.extent for a, b in pairs])
 
-    def look(self, time, x):
+    def inspect(self, time, x):
         """Note which bodies are in each other at displacements x, shape (rows, 3)."""
         places = self._net.points + x
         away = np.linalg.norm(places[self._rows[:, 0]] - places[self._rows[:, 1]], axis=1)
         for n in np.flatnonzero(away < self._reach).tolist():
             a, b = self._pairs[n]
-            if n not in self._found:
+            if n not in self._overlaps:
                 deep = max(_depth(a, b, places, x), _depth(b, a, places, x))
                 if deep > LEAST * min(a.thickness, b.thickness):
-                    self._found[n] = deep, time
+                    self._overlaps[n] = deep, time
 
     def kept(self):
         """Known overlaps, shape (pairs, 3): number of a pair, depth [m] and time [s]."""
-        return np.array([(n, *values) for n, values in self._found.items()]).reshape(-1, 3)
+        return np.array([(n, *values) for n, values in self._overlaps.items()]).reshape(-1, 3)
 
-    def take(self, kept):
+    def restore(self, kept):
         """Go on with what was known."""
-        self._found = {int(n): (float(deep), float(time)) for n, deep, time in kept}
+        self._overlaps = {int(n): (float(deep), float(time)) for n, deep, time in kept}
 
     def remarks(self):
         """Remarks for a reader of the results."""
-        for n, (deep, time) in itertools.islice(self._found.items(), MOST):
+        for n, (deep, time) in itertools.islice(self._overlaps.items(), MOST):
             a, b = self._pairs[n]
             yield (
                 f'bodies "{a.name}" and "{b.name}" are {deep:.3g} m deep in each other at t = {time:.6g} s and do not '
                 "feel it: between_bodies = true in [contact] lets bodies touch"
             )
-        if (more := len(self._found) - MOST) > 0:
+        if (more := len(self._overlaps) - MOST) > 0:
             yield f"{more} more pairs of bodies are in each other"
 
 

@@ -138,7 +138,7 @@ def recall(number, memory, f, touches, begin, end):
 
 
 @kernel(COMMIT)
-def give(number, memory, v, touches, begin, end, out):
+def commit(number, memory, v, touches, begin, end, out):
     """Write the power of each cell at the velocities v."""
     for n in range(begin, end):
         row, power = int(touches[n, ROW]), 0.0
@@ -172,7 +172,7 @@ def rubbing(nodes, more=alone, sweep=sweep, width=WIDTH):
     """
 
     @kernel(DETECT)
-    def meet(h, x, v, inverse, cells, data, touches, begin):
+    def detect(h, x, v, inverse, cells, data, touches, begin):
         for c in range(cells.shape[0] if begin + cells.shape[0] <= touches.shape[0] else 0):
             n, (t, _) = begin + c, direction(x, cells, data, c, nodes, ALONG, SLOPES)
             u = relative(v, cells, data, c)
@@ -183,4 +183,4 @@ def rubbing(nodes, more=alone, sweep=sweep, width=WIDTH):
             more(touches, n, x, data, c)
         return begin + cells.shape[0]
 
-    return ImplicitContactKernels(meet, recall, sweep, give, width, 0, more is not alone)
+    return ImplicitContactKernels(detect, recall, sweep, commit, width, 0, more is not alone)

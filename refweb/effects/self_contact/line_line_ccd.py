@@ -21,7 +21,7 @@ from ...kernels import CCD_NEIGHBOURS, MEETS, TIME_TO_CONTACT, kernel
 from ...net.net import REFERENCE
 from ..vectors import dot
 from .pair import SCALE, SHAPE, TOUCH, WIDTH, nearest, place_of
-from .search import found
+from .search import near_pairs
 
 MEETING = 1e-9
 """Distance at which centre lines meet, over that at which lines touch."""
@@ -81,7 +81,7 @@ def gone(vector, share, path):
 
 
 @kernel()
-def meet(margin, geometry, ways, joined):
+def would_meet(margin, geometry, ways, joined):
     """(True if a pair comes nearer than ``margin`` on its way, distance at the start, largest change of it)."""
     (p, u, w), (dp, du, dw) = geometry, ways
     longest, share, start = longest_of(dp, du, dw), 0.0, distance(p, u, w, joined)
@@ -97,7 +97,7 @@ def meet(margin, geometry, ways, joined):
 
 
 @kernel(forceinline=True)
-def note(cells, c, met):
+def record_pair(cells, c, met):
     """Write the nodes of pair c."""
     for n in range(4):
         met[n] = cells[c, n]
@@ -106,13 +106,13 @@ def note(cells, c, met):
 @kernel(MEETS)
 def meets(margin, path, kick, drift, x, v, f, inverse, cells, data, met):
     if cells.shape[1] != 4:
-        _, cells, data = found(max(path, 0.0) + margin, x, cells, data)
+        _, cells, data = near_pairs(max(path, 0.0) + margin, x, cells, data)
     for c in range(cells.shape[0]):
         if data[c, SCALE] > 0.0:
             near, joined = margin + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
             ways = ways_of(cells, c, kick, drift, v, f, inverse)
-            if meet(near, place_of(x, cells, data, c), ways, joined)[0]:
-                note(cells, c, met)
+            if would_meet(near, place_of(x, cells, data, c), ways, joined)[0]:
+                record_pair(cells, c, met)
                 return True
     return False
 
@@ -136,11 +136,11 @@ def watch(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen,
             continue
         near, joined = margin + MEETING * data[c, TOUCH], cells[c, 0] == cells[c, 2]
         ways = ways_of(cells, c, kick, drift, v, f, inverse)
-        closed, start, _ = meet(near, place_of(x, cells, data, c), ways, joined)
+        closed, start, _ = would_meet(near, place_of(x, cells, data, c), ways, joined)
         due[c] = past + start
         next_one = min(next_one, due[c])
         if closed and data[c, SCALE] > 0.0 and not came:
-            note(cells, c, met)
+            record_pair(cells, c, met)
             came = True
     due[count], due[count + 2] = past + path, next_one
     return came

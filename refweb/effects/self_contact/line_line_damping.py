@@ -19,9 +19,9 @@ import math
 import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
-from .line_line_penalty import MOST, OF_REACH, add_all_second, give, pushed, reject_step, steepest, stored
+from .line_line_penalty import MOST, OF_REACH, add_all_second, add_forces, pushed, reject_step, steepest, stored
 from .pair import DAMPING, LENGTH, OTHER, SCALE, TOUCH
-from .search import found
+from .search import near_pairs
 
 SHALLOW = 0.05
 """Share of the overlap that a pair may come to that is reckoned with before it is there: a step that has to do with
@@ -48,15 +48,15 @@ def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             _, forces = pushed(x, cells, data, c)
             damped, _, power = loss(v, cells, data, c, forces)
-            give(damped, f, cells, c, forces)
+            add_forces(damped, f, cells, c, forces)
             out[c, 0] = damped * power
         return
     out[:, 0] = 0.0
-    chosen, rows, numbers = found(0.0, x, cells, data)
+    chosen, rows, numbers = near_pairs(0.0, x, cells, data)
     for c in range(rows.shape[0]):
         _, forces = pushed(x, rows, numbers, c)
         damped, _, power = loss(v, rows, numbers, c, forces)
-        give(damped, f, rows, c, forces)
+        add_forces(damped, f, rows, c, forces)
         for n in range(2):
             out[chosen[c, n], 0] += 0.5 * damped * power
 
@@ -121,7 +121,7 @@ def add_bounds_of_any(reach, speed, x, mass, rates, cells, data, viscous):
     if cells.shape[1] == 4:
         add_bounds(reach, speed, x, mass, rates, cells, data, viscous)
         return
-    _, rows, numbers = found(min(reach, data[:, LENGTH].max()), x, cells, data)
+    _, rows, numbers = near_pairs(min(reach, data[:, LENGTH].max()), x, cells, data)
     add_bounds(reach, speed, x, mass, rates, rows, numbers, viscous)
 
 

@@ -58,7 +58,7 @@ from ..vectors import cross, dot
 from .line_line_penalty import bound as press_bound
 from .line_line_penalty import pushed
 from .pair import FRICTION, LENGTH, NAMES, OTHER, ROLLS, RUBBING, SLIP, TOUCH, place_of
-from .search import found
+from .search import near_pairs
 
 ALIKE = 0.01
 """Share of (2r)²/(L L') that keeps the slip of lines along each other finite: it takes half of it from friction."""
@@ -171,7 +171,7 @@ def force(t, x, v, f, cells, data, out):
             out[c, 0] = rub(x, v, f, cells, data, c, rows, shares)
         return
     out[:, 0] = 0.0
-    chosen, pairs, numbers = found(0.0, x, cells, data)
+    chosen, pairs, numbers = near_pairs(0.0, x, cells, data)
     for c in range(pairs.shape[0]):
         out[chosen[c, 0], 0] += rub(x, v, f, pairs, numbers, c, rows, shares)
 
@@ -306,11 +306,11 @@ def set_touch(touches, at, c, cell, normal, cells, data, v, inverse, rows, share
 
 
 @kernel(DETECT)
-def meet(h, x, v, inverse, cells, data, touches, begin):
+def detect(h, x, v, inverse, cells, data, touches, begin):
     rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     count, chosen = begin, np.empty((0, 2), dtype=np.int64)
     if cells.shape[1] != 4:
-        chosen, cells, data = found(0.0, x, cells, data)
+        chosen, cells, data = near_pairs(0.0, x, cells, data)
     for c in range(cells.shape[0]):
         normal = slip_rows(x, cells, data, c, rows, shares)
         if normal > 0.0:
@@ -353,7 +353,7 @@ def recall(number, memory, f, touches, begin, end):
 
 
 @kernel(COMMIT)
-def give(number, memory, v, touches, begin, end, out):
+def commit(number, memory, v, touches, begin, end, out):
     out[:, 0] = 0.0
     for n in range(begin, end):
         row, at = slot_of(memory, touches, n, number)
@@ -364,5 +364,5 @@ def give(number, memory, v, touches, begin, end, out):
         out[int(touches[n, CELL]), 0] += q * along(touches, n, 1, v) + s * along(touches, n, 2, v)
 
 
-KICKS = ImplicitContactKernels(meet, recall, sweeping(moved, apply_force), give, WHOLE, SLOTS * NOTED)
+KICKS = ImplicitContactKernels(detect, recall, sweeping(moved, apply_force), commit, WHOLE, SLOTS * NOTED)
 """How explicit kicks solve for it."""

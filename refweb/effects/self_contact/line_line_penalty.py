@@ -31,7 +31,7 @@ from ...kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..vectors import cross, dot
 from .overlap_integrals import add_second, first
 from .pair import ENDS, LENGTH, OTHER, SCALE, TOUCH, angle_factor, apart, nearest, numbers_of, place_of
-from .search import REACH, found
+from .search import REACH, near_pairs
 
 MARGIN = 0.75
 """Factor on that of a rigid body: of 4000 pairs at random no row sum is above 0.7 of what it leaves."""
@@ -53,7 +53,7 @@ def overlap(p, u, w, n, s, t, of):
     uu, uw, ww, nn, pp, pu, pw = dot(u, u), dot(u, w), dot(w, w), dot(n, n), dot(p, p), dot(p, u), dot(p, w)
     first_share, a = first(pp, pu, pw, uw, ww, nn, s, t, of.touch)
     second_share, b = first(pp, -pw, -pu, uw, uu, nn, t, s, of.touch)
-    half_scale, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.other
+    half_scale, more = 0.5 * of.scale * of.length, 0.5 * of.scale * of.second
     return half_scale * first_share + more * second_share, (
         half_scale * a[0] + more * b[0],
         half_scale * a[1] - more * b[2],
@@ -131,11 +131,11 @@ def crossed(geometry, n, of):
     wide, high = max(half * second_length, along * second_length * short), max(half * first, along * first * short)
     if not (wide <= s <= 1.0 - wide and high <= t <= 1.0 - high):
         return 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
-    size = of.length * second_length + of.other * first
+    size = of.length * second_length + of.second * first
     scale = 8.0 / 15.0 * of.scale * remainder * half
     j, by_p, share = scale * remainder * size, -5.0 * scale * pn * inverse * size, scale * remainder * short
     turn = -(by_p * pn + j) * inverse
-    return j, by_p, turn, of.other * second_length * share, of.length * first * share, pn * pn * inverse
+    return j, by_p, turn, of.second * second_length * share, of.length * first * share, pn * pn * inverse
 
 
 @kernel()
@@ -143,7 +143,7 @@ def forces_of(geometry, of):
     """(How deep a pair that may touch overlaps [m], `NOT_SEEN` where it does not, the forces on its four nodes)."""
     p, u, w = geometry
     n = cross(u, w)
-    f, area = angle_factor(n, of.length, of.other, of.touch)
+    f, area = angle_factor(n, of.length, of.second, of.touch)
     j, by_p, turn, direct, more, square = crossed(geometry, n, of)
     if j == 0.0:
         return forces_near_ends(geometry, n, f, area, of)
@@ -189,7 +189,7 @@ def pushed(x, cells, data, c):
 
 
 @kernel(forceinline=True)
-def give(share, f, cells, c, forces):
+def add_forces(share, f, cells, c, forces):
     """Add a share of the forces on the four nodes of pair c to f."""
     for n in range(4):
         for k in range(3):
@@ -205,7 +205,7 @@ def energy_of(geometry, of):
         s, t, square = nearest(geometry.p, geometry.u, geometry.w)
         if not square > (REACH * of.touch) ** 2:
             j = overlap(between(geometry, s, t), geometry.u, geometry.w, n, s, t, of)[0]
-    return angle_factor(n, of.length, of.other, of.touch)[0] * j
+    return angle_factor(n, of.length, of.second, of.touch)[0] * j
 
 
 @kernel(forceinline=True)
@@ -222,14 +222,14 @@ def force(t, x, v, f, cells, data, out):
             deep, forces = pushed(x, cells, data, c)
             out[c, 0] = max(deep, 0.0)
             if deep != NOT_SEEN:
-                give(1.0, f, cells, c, forces)
+                add_forces(1.0, f, cells, c, forces)
         return
     out[:, 0] = 0.0
-    chosen, rows, numbers = found(0.0, x, cells, data)
+    chosen, rows, numbers = near_pairs(0.0, x, cells, data)
     for c in range(rows.shape[0]):
         deep, forces = pushed(x, rows, numbers, c)
         if deep != NOT_SEEN:
-            give(1.0, f, rows, c, forces)
+            add_forces(1.0, f, rows, c, forces)
             for n in range(2):
                 out[chosen[c, n], 0] = max(out[chosen[c, n], 0], deep)
 
@@ -241,7 +241,7 @@ def energy(t, x, cells, data, out):
             out[c] = stored(x, cells, data, c)
         return
     out[:] = 0.0
-    chosen, rows, numbers = found(0.0, x, cells, data)
+    chosen, rows, numbers = near_pairs(0.0, x, cells, data)
     for c in range(rows.shape[0]):
         half = 0.5 * stored(x, rows, numbers, c)
         for n in range(2):
@@ -278,11 +278,11 @@ def add_all_second(x, cells, data, c, definite, block):
         return
     p, u, w = geometry
     n = cross(u, w)
-    f, area = angle_factor(n, of.length, of.other, of.touch)
+    f, area = angle_factor(n, of.length, of.second, of.touch)
     half = 0.5 * of.scale * f
     add_second(p, u, w, of.touch, half * of.length, definite, (0, 1, 2, 3), block)
     back = -p[0], -p[1], -p[2]
-    add_second(back, w, u, of.touch, half * of.other, definite, (2, 3, 0, 1), block)
+    add_second(back, w, u, of.touch, half * of.second, definite, (2, 3, 0, 1), block)
     if definite:
         return
     s, t, _ = nearest(p, u, w)
@@ -382,7 +382,7 @@ def bound(reach, speed, x, mass, rates, cells, data):
     elif reach > FAR * longest(x, cells, data):
         note_all(speed, mass, cells, data, rates_here, largest)
     else:
-        _, rows, numbers = found(reach, x, cells, data)
+        _, rows, numbers = near_pairs(reach, x, cells, data)
         note_pairs(reach, speed, x, mass, rows, numbers, rates_here, largest)
     for r in range(rates.size):
         rates[r] += min(rates_here[r], MOST * largest[r])

@@ -40,7 +40,7 @@ class Numbers(NamedTuple):
     touch: float
     scale: float
     length: float
-    other: float
+    second: float
 
 
 @kernel(forceinline=True)

@@ -56,7 +56,7 @@ def would_pass(system, v, nodes):
     It is that which stores, at `AIM` of the radius, the energy with which they come at velocities v. A node that a body
     carries comes with the mass of the body.
     """
-    fixed, pairs = system.held.all(axis=1), np.reshape(nodes, (2, 2))
+    fixed, pairs = system.fixed.all(axis=1), np.reshape(nodes, (2, 2))
     crossing = system.families[pressed(system)].crossing
     given = f"{lines_of(system.net, nodes)} would pass through each other"
     heavy = []
@@ -116,7 +116,7 @@ class Passage:
         self.touch, self._stiffness, self._elements = family.crossing.touch, family.crossing.stiffness, family.elements
         self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
 
-    def note(self, overlap, crossings):
+    def record(self, overlap, crossings):
         """Note the deepest overlap [m], and what has met so far, see `IntegratorState.crossings`."""
         self._deepest, self._crossings = max(self._deepest, overlap), crossings
 
@@ -125,7 +125,7 @@ class Passage:
         values = {"overlap": self._deepest, "radius": 0.5 * self.touch, "stiffness": self._stiffness}
         return {**values, "chosen": self._chosen}
 
-    def told(self):
+    def status(self):
         """True if nothing can have passed, as ``run.json`` has it."""
         if self._unfollowed is not None:
             return f"not certified: {self._unfollowed}"
@@ -141,7 +141,7 @@ class Passage:
 
     def remarks(self):
         """Remarks for a reader of the results."""
-        if (status := self.told()) != "certified":
+        if (status := self.status()) != "certified":
             yield f"lines may have passed through lines, {status}"
 
     def _enough(self, overlap, elements, v):
@@ -180,7 +180,7 @@ class Passage:
             " and ".join(str(n) for n in self._system.net.line[elements].ravel().tolist()) if elements.ndim else None
         )
         names = f"lines {names}" if names else f"line {self._system.net.line[elements]} and another"
-        if elements.ndim and self._system.held[self._system.net.cells[elements]].all():
+        if elements.ndim and self._system.fixed[self._system.net.cells[elements]].all():
             raise SolverError(
                 f"{names} overlap by {overlap:.3g} m at {when}, more than their radius {radius:g}: {PRESCRIBED}"
             )

@@ -206,7 +206,7 @@ def paired(chosen, cells, data):
 
 
 @kernel()
-def found(skin, x, cells, data):
+def near_pairs(skin, x, cells, data):
     """(numbers of the elements, nodes, numbers) of all pairs within a skin of touching."""
     chosen = pairs_within(skin, x, cells, data)
     rows, numbers = paired(chosen, cells, data)

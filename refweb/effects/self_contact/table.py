@@ -15,7 +15,7 @@ from ..base import Crossing, Family, without
 from ..length_factor import shortest_of
 from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
-from .search import distances, found, near, paired
+from .search import distances, near, near_pairs, paired
 
 LISTED = 20_000
 """Largest number of pairs that are one list, which implicit methods need; above, pairs are found as they come near."""
@@ -103,7 +103,7 @@ class SelfContact(Table):
 
         self._refuse_too_large(net)
         cells, data = self._elements(net, near_along(net, 2.0 * self.radius))
-        self._refuse_overlap(net, *found(0.0, np.zeros_like(net.points), cells, data))
+        self._refuse_overlap(net, *near_pairs(0.0, np.zeros_like(net.points), cells, data))
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
         common = dict(internal=True, disable_cells=without(SCALE), finder=None, near=near)
         if chosen is not None and len(chosen) <= LISTED:
@@ -116,7 +116,7 @@ class SelfContact(Table):
                     f"radius = {self.radius:g}: {len(cells)} elements make more than {LISTED} pairs, which statics "
                     'does not take: use [solve] kind = "dynamic" and a [damping], or a smaller web'
                 )
-            common |= dict(cells=cells, data=data, elements=np.arange(len(cells)), near=None, finder=found)
+            common |= dict(cells=cells, data=data, elements=np.arange(len(cells)), near=None, finder=near_pairs)
             all_listed = False
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
         kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import memory
 from ...errors import InputError
-from ...messages import shown
+from ...messages import quote
 from ..mesh_readers import by_meshio, by_vtk
 
 FORMATS = {".stl": "stl", ".obj": "obj", ".vtp": None}
@@ -30,7 +30,7 @@ def read(path):
         raise InputError(f"there is no file {path}")
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
-        raise InputError(f"format {shown(path.suffix)} must be one of {', '.join(FORMATS)}: use meshio convert")
+        raise InputError(f"format {quote(path.suffix)} must be one of {', '.join(FORMATS)}: use meshio convert")
     size = path.stat().st_size
     memory.check(memory.READING * size, f"the {size / 1e6:.3g} MB of {path.name}")
     points, cells = _of_vtk(path) if FORMATS[suffix] is None else _of_meshio(path, FORMATS[suffix])

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError
-from ...messages import shown
+from ...messages import quote
 from ...tables import Several, integer, real, rows, table, text
 from ..rigid_body import Grown, Shape, axes_of
 
@@ -119,9 +119,9 @@ class Mesh(Shape):
             content = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
             return _solid(path, content, self.scale, self.grid)
         except InputError as error:
-            raise InputError(f"file = {shown(self.file)}: {error}") from None
+            raise InputError(f"file = {quote(self.file)}: {error}") from None
         except OSError as error:
-            raise InputError(f"file = {shown(self.file)}: cannot be read: {error.strerror or error}") from None
+            raise InputError(f"file = {quote(self.file)}: cannot be read: {error.strerror or error}") from None
 
     def settle(self):
         """Read the file."""
@@ -192,7 +192,7 @@ class Mesh(Shape):
         """Remarks on repairs of its file."""
         return self.solid.remarks
 
-    def told(self):
+    def texts(self):
         """Texts on its size, its centre of mass in the file, and the error of its field at the surface."""
         solid, field = self.solid, self.solid.field
         centre = ", ".join(f"{x:.4g}" for x in solid.centre)

@@ -45,7 +45,7 @@ class TotalAngularMomentum(Nodal):
         total += sum((moment * state.v[row] for row, moment in spins), np.zeros(3))
         return Value(float(self.sizes(total[None])[0]), None)
 
-    def place(self, system, at):
+    def position(self, system, at):
         """Nowhere."""
         return None
 

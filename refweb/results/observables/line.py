@@ -57,7 +57,7 @@ class Line(Observable):
             return Probe(line, [self.column, first, last + 1], scale)
         return Probe(line_of, [self.column, *elements.tolist()], scale)
 
-    def place(self, system, at):
+    def position(self, system, at):
         """The line of an element."""
         return int(system.net.line[at])
 

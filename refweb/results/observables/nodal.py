@@ -46,9 +46,9 @@ class Nodal(Observable):
         rows = self.rows(state.system)
         sizes = self.sizes(self.vectors(state)[rows])
         at = int(np.argmax(sizes))
-        return Value(float(sizes[at]), self.place(state.system, int(rows[at])))
+        return Value(float(sizes[at]), self.position(state.system, int(rows[at])))
 
-    def place(self, system, at):
+    def position(self, system, at):
         """The node; none of a body."""
         return at if self.observe.body is None else None
 

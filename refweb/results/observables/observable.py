@@ -80,7 +80,7 @@ class Observable:
         """Least and largest value that are possible, whatever the state: a magnitude is not negative."""
         return NOT_NEGATIVE if "component" in self.keys and self.observe.component is None else ANY
 
-    def place(self, system, at):
+    def position(self, system, at):
         """Node or line of the scene, where the probe says it stands at row or element ``at``; None for the whole."""
         return None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...accepted import accepts
 from ...errors import InputError
-from ...messages import nearest, shown
+from ...messages import nearest, quote
 from ...registry import OBSERVABLES, load
 from ...tables import Several, Table, choice, component, field, nodes, real, table, text
 
@@ -15,7 +15,7 @@ SIGN = {"max": 1.0, "min": -1.0, "final": 0.0}
 @accepts(lambda: {"type": "string", "enum": list(OBSERVABLES)})
 def _quantity(name, value):
     if value not in tuple(OBSERVABLES):
-        raise InputError(f"{name} = {shown(value)} must be one of the quantities, {nearest(value, OBSERVABLES)}")
+        raise InputError(f"{name} = {quote(value)} must be one of the quantities, {nearest(value, OBSERVABLES)}")
     return value
 
 
@@ -88,16 +88,16 @@ class Observe(Table):
         """Refuse a node, line or component that the quantity does not have."""
         if "," in self.name or '"' in self.name:
             raise InputError(
-                f"name = {shown(self.name)} must have no commas and no quotes: it heads a column of history.csv"
+                f"name = {quote(self.name)} must have no commas and no quotes: it heads a column of history.csv"
             )
         for key in ("node", "body", "to", "component", "line"):
             if getattr(self, key) is not None and key not in self.observable.keys:
-                value = shown(getattr(self, key))
+                value = quote(getattr(self, key))
                 raise InputError(f'{key} = {value} has no meaning for quantity = "{self.quantity}"')
         if self.component == 3 and self.quantity != "orientation":
             raise InputError(f'component = "w" has no meaning for quantity = "{self.quantity}"')
         if self.node is not None and self.body is not None:
-            raise InputError(f"node = {shown(self.node)} and body = {shown(self.body)} exclude each other")
+            raise InputError(f"node = {quote(self.node)} and body = {quote(self.body)} exclude each other")
         if self.average is not None and self.observable.booked:
             raise InputError(
                 f'average = {self.average:g} has no meaning for quantity = "{self.quantity}", which is summed over '

@@ -29,7 +29,7 @@ class Overlap(Observable):
         """The deepest over all lines."""
         deep = state.overlap(self.body(state.system.net))
         at = int(np.argmax(deep))
-        return Value(float(deep[at]), self.place(state.system, at if deep[at] > 0.0 else -1))
+        return Value(float(deep[at]), self.position(state.system, at if deep[at] > 0.0 else -1))
 
     def bounds(self, system):
         """A depth."""
@@ -39,7 +39,7 @@ class Overlap(Observable):
         """Make the probe of the contact of its body."""
         return probe_of(system, self.body(system.net))
 
-    def place(self, system, at):
+    def position(self, system, at):
         """The line of an element, None where nothing is touched."""
         return int(system.net.line[at]) if at >= 0 else None
 

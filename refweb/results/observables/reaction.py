@@ -22,11 +22,11 @@ class Reaction(Nodal):
         """The sum over its rows."""
         rows = self.rows(state.system)
         total = state.reaction[rows] if len(rows) == 1 else state.reaction[rows].sum(axis=0, keepdims=True)
-        return Value(float(self.sizes(total)[0]), self.place(state.system, int(rows[0])))
+        return Value(float(self.sizes(total)[0]), self.position(state.system, int(rows[0])))
 
-    def place(self, system, at):
+    def position(self, system, at):
         """The node, where it is one; a sum stands nowhere."""
-        return super().place(system, at) if len(self.rows(system)) == 1 else None
+        return super().position(system, at) if len(self.rows(system)) == 1 else None
 
     def probe(self, system):
         """Make the probe of the support forces on nodes, or of all contact forces on a body."""
