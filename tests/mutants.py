@@ -342,9 +342,9 @@ MUTANTS = [
     ),
     Mutant("effects/contact/body_body_detection", "(thickness - 0.5 * deep)", "thickness"),
     Mutant("effects/contact/body_body_penalty", "steep * total / lever", "steep / lever"),
-    Mutant("effects/contact/body_body_friction", "-own.lever[k], -own.arm[k]", "own.lever[k], own.arm[k]"),
+    Mutant("effects/contact/body_body_friction", "-first.lever[k], -first.arm[k]", "first.lever[k], first.arm[k]"),
     Mutant(
-        "effects/contact/pair_overlap", "if not pair.overlap + (path := self._way(pair)) < pair.thickness", "if False"
+        "effects/contact/pair_overlap", "if not pair.overlap + (path := self._path_limit(pair)) < pair.thickness", "if False"
     ),
     Mutant("effects/contact/undetected_overlap", "if deep > LEAST * min(a.thickness, b.thickness)", "if False"),
     Mutant("net/skeleton", "rows[:, OWNS] + 2.0 * math.pi / ARCS", "rows[:, OWNS] + 1.9 * math.pi / ARCS"),
@@ -399,7 +399,7 @@ MUTANTS = [
     Mutant("statics/predictor", "if energy < lowest:", "if energy > lowest:"),
     Mutant("system/conjugate_gradients", "p = z + _over(size, last) * p", "p = z"),
     # Dynamics, its books and its ±
-    Mutant("dynamics/integrators/simpson_balance", "np.where(self._held, 0.0, v)", "v"),
+    Mutant("dynamics/integrators/simpson_balance", "np.where(self._supported, 0.0, v)", "v"),
     Mutant("dynamics/integrators/simpson_balance", "s - 1.5 * s**2 + s**3 / 1.5", "s - 1.5 * s**2 + s**3 / 3.0"),
     Mutant("dynamics/integrators/simpson_balance", "np.bincount(self._fixed % 3,", "np.bincount(self._fixed // 3 % 3,"),
     Mutant("dynamics/integrators/rows", "if inertia.inverse[r, k] > 0.0 else", "if inertia.mass[r] > 0.0 else"),
@@ -554,7 +554,7 @@ MUTANTS = [
         "self.per_cell() if per_cell is",
         "self.__dict__.setdefault('one', self.per_cell()) if per_cell is",
     ),
-    Mutant("system/broken_lines", "changed.families.append(held(net))", "pass"),
+    Mutant("system/broken_lines", "changed.families.append(held_energy(net))", "pass"),
     Mutant(
         "dynamics/integrators/rupture", "_holding(self.inner.system.net.broken)", "_holding(course.breaks.elements)"
     ),

@@ -89,7 +89,7 @@ class Sweep:
         import numpy as np
 
         from ..errors import InputError
-        from ..messages import nearest
+        from ..messages import nearest, quote
 
         known = {item.name: f"{item.name} [{item.unit}]" for item in results_among(self.columns)}
         known |= {path: path for path in self.study.parameters}
