@@ -344,7 +344,9 @@ MUTANTS = [
     Mutant("effects/contact/body_body_penalty", "steep * total / lever", "steep / lever"),
     Mutant("effects/contact/body_body_friction", "-first.lever[k], -first.arm[k]", "first.lever[k], first.arm[k]"),
     Mutant(
-        "effects/contact/pair_overlap", "if not pair.overlap + (path := self._path_limit(pair)) < pair.thickness", "if False"
+        "effects/contact/pair_overlap",
+        "if not pair.overlap + (path := self._path_limit(pair)) < pair.thickness",
+        "if False",
     ),
     Mutant("effects/contact/undetected_overlap", "if deep > LEAST * min(a.thickness, b.thickness)", "if False"),
     Mutant("net/skeleton", "rows[:, OWNS] + 2.0 * math.pi / ARCS", "rows[:, OWNS] + 1.9 * math.pi / ARCS"),

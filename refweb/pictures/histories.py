@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..results.units import scale_of
-from .plot_data import bar, told, unit_of
+from .plot_data import bar, text_of, unit_of
 from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, dot, label, legend, telling
 
 OF_ALL = "Points: results of all steps, with ± where it is known. Lines: rows of the history."
@@ -35,7 +35,7 @@ def history(runs, name):
             error = bar(result, factor)
             ink = {"color": s.ink.colour, "markeredgecolor": DARK, "capsize": 5.0, "elinewidth": 2.0, "markersize": 6.0}
             point = axes.errorbar(result.time / second, result.value / factor, error, fmt=s.ink.marker, **ink, zorder=3)
-            entries.append((point, s.said(f"{told(result)} at t = {_time(result.time, second, clock)}")))
+            entries.append((point, s.said(f"{text_of(result)} at t = {_time(result.time, second, clock)}")))
         marks(axes, having, second)
         label(axes, name, called)
         legend(axes, entries)
@@ -85,7 +85,7 @@ def steps(runs, name):
             for step, result in rows:
                 ink = {"color": s.ink.colour, "fmt": s.ink.marker, "capsize": 5.0, "elinewidth": 2.0, "markersize": 6.0}
                 point = axes.errorbar(step, result.value / factor, bar(result, factor), **ink)
-            entries.append((point, s.said(f"{told(rows[-1][1])} at step {rows[-1][0]:g}")))
+            entries.append((point, s.said(f"{text_of(rows[-1][1])} at step {rows[-1][0]:g}")))
         tick_steps(axes, [step for rows in series for step, _ in rows])
         label(axes, name, called)
         legend(axes, entries)

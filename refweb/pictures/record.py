@@ -179,7 +179,7 @@ def of_folder(folder, with_frames=True):
         arrays = cell_arrays(frames[number].paths["web"], (field, "slack"))
         return _values(frame(number), field) if arrays is None else Values(arrays[field], arrays["slack"] > 0.5)
 
-    frame = functools.partial(read, folder, found=frames)
+    frame = functools.partial(read, folder, known_paths=frames)
     return Record(name, kind, summary, scene, times, frame, table, values)
 
 
