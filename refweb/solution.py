@@ -194,7 +194,7 @@ class Solution(SolutionData):
             What is drawn, a panel each: an observable or another column of the history; ``energy`` or ``momentum``, the
             books; ``spectrum`` of the first observable or ``spectrum:NAME``; ``stress``, ``tension`` or ``strain`` of
             lines, over distance from the place that was hit or loaded; ``frequencies`` of modes. By default the
-            observables and the book of energies, in statics the results over load steps, of one stress over distance.
+            observables and the energy balance, in statics the results over load steps, of one stress over distance.
         out : path-like, optional
             A ``.png``, ``.svg`` or ``.pdf`` to write.
 

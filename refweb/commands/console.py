@@ -64,7 +64,7 @@ def print_scene(scene, system):
     else:
         knob = INTEGRATORS[solve.method].knob
         step = f"{knob} {getattr(solve, knob):g}" if solve.step_size is None else f"step {solve.step_size:g} s"
-        how += f"{solve.duration:g} s, {step}, a row every {scene.output.interval:g} s"
+        how += f"{solve.duration:g} s, {step}, output interval {scene.output.interval:g} s"
     counts, sizes = on_web(web_of(system))
     corners, steps = [], []
     if solve.kind == "dynamic" and len(system.corners):

@@ -7,10 +7,10 @@ def add_arguments(parser):
     """The folders, what is drawn of them, and where."""
     parser.add_argument("folders", nargs="+", metavar="DIR", help="result folders; several are drawn over each other")
     text = (
-        "an observable or another column of history.csv; energy or momentum, their books; spectrum or spectrum:NAME; "
+        "an observable or another column of history.csv; energy or momentum, with balance; spectrum or spectrum:NAME; "
     )
     text += "stress, tension or strain of lines, over distance; frequencies, of modes. Repeatable (default: the "
-    text += "observables and the book of energies; in statics results over load steps, of one stress over distance)"
+    text += "observables and the energy balance; in statics results over load steps, of one stress over distance)"
     parser.add_argument("--quantity", action="append", metavar="NAME", help=text)
     parser.add_argument("--out", metavar="FILE", help="a .png, .svg or .pdf (default: plot.png in the first DIR)")
 

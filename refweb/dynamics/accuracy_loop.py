@@ -101,7 +101,7 @@ def run_within_drift(simulation, folder, tell):
                 solution.warnings.append(f"{error}; repeated with {name} = {standing.knob:g}")
                 simulation.again(folder)
                 continue
-            tell("finding errors by a twin run", 1.0)
+            tell("finding errors by step refinement", 1.0)
             ended = twin.ended() if twin else None
         break
     if twin and isinstance(twin.failure, Spent):
@@ -120,7 +120,7 @@ def run_within_drift(simulation, folder, tell):
         if folder is not None:
             folder.keep_twin(solution.twin_end)
     elif twin:
-        solution.warnings.append(f"no errors are known: the twin run failed: {twin.failure}")
+        solution.warnings.append(f"no errors are known: the step-refinement run failed: {twin.failure}")
     if scene.throw is not None:
         solution.throw = _throw(simulation, run, ended, rows, known)
 

@@ -46,7 +46,7 @@ def _warn_of_near(solution, count):
         if 0.0 < later["time"] - first["time"] < first["error"] + later["error"]:
             solution.warnings.append(
                 f"lines {first['line']} and {later['line']} break within ± of each other at t = {later['time']:.6g} s: "
-                "run and twin have them in this order, which is not proven"
+                "the run and its refinement have them in this order, which is not proven"
             )
             return
 

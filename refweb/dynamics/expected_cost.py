@@ -108,5 +108,5 @@ def expected_cost(scene, system):
     prices = [steps[0] * each * step_price(system), steps[-1] * each * step_price(system, touched=True)]
     counts = " to ".join(dict.fromkeys(f"{n:.2g}" for n in steps))
     seconds = " to ".join(dict.fromkeys(f"{price:.2g}" for price in prices))
-    twin = " with the twin" if scene.accuracy.error == "twin" else ""
+    twin = " with step refinement" if scene.accuracy.error == "twin" else ""
     return f"{'; '.join(texts)}; {counts} steps, some {seconds} s of CPU time{twin}"

@@ -20,7 +20,7 @@ from .integrators.integrator import MAX_STEPS_PER_ROW, IntegratorState
 from .schedule import FEW_CORNERS, Schedule, blocks
 
 NO_TWIN = (
-    "the run that it starts from had no twin run: ± holds the error that this run adds, not that of "
+    "the run that it starts from had no step-refinement run: ± holds the error that this run adds, not that of "
     "the state it starts from"
 )
 

@@ -82,7 +82,7 @@ class Twin:
 
     def _breathe(self, t):
         if self._stop.is_set():
-            raise InterruptedError(f"the twin run was ended at t = {t:g} s")
+            raise InterruptedError(f"the step-refinement run was ended at t = {t:g} s")
         check_budget(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
 
     def _run(self, made):
@@ -233,7 +233,7 @@ def add_errors(simulation, run, twin, rows):
     solution = simulation.solution
     first_run, refined = run.course, twin.course
     if first_run.stopped != refined.stopped:
-        which = ["the run", "its twin, the second run of a smaller error"][:: 1 if first_run.stopped else -1]
+        which = ["the run", "its step refinement, the second run of a smaller error"][:: 1 if first_run.stopped else -1]
         solution.warnings.append("no errors are known: an event ends {}, but not {}".format(*which))
         return 0.0
     factor = 1.0 / (1.0 - simulation.integrator.error_share(first_run, refined))

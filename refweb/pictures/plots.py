@@ -43,7 +43,7 @@ def kinds(record):
     lines = {name: f"{name} over {over}" for name in run.observables if dynamic or rows > 1}
     offered = {}
     if run.energies:
-        offered["energy"] = "Energy by kind" + (", and how far its book is open" if dynamic else "")
+        offered["energy"] = "Energy by kind" + (", and the error of its balance" if dynamic else "")
     if dynamic and balances.has_momentum(run):
         offered["momentum"] = "Momentum against the impulses of supports and loads"
     if dynamic and rows >= spectra.FEWEST and run.observables:
@@ -71,7 +71,7 @@ def draw(records, what=None, title=None):
     records : Record or sequence of Record
         Runs of one kind.
     what : str or sequence of str, optional
-        Names of `kinds`, or of columns of their tables; by default observables and the book of energies, in statics the
+        Names of `kinds`, or of columns of their tables; by default observables and the energy balance, in statics the
         results over load steps, of one load step stress over distance, of modes their frequencies. A spectrum alone is
         that of the first observable, a field of lines alone that over distance.
     title : str, optional

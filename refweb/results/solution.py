@@ -19,7 +19,7 @@ SOLVER = dict.fromkeys(
 """What a solver reports; None for what it does not know."""
 
 
-OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "elements leave", "neglected": "orbit neglects"}
+OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "discretisation error", "neglected": "orbit neglects"}
 """Errors of a result besides ± of the scene as it stands, and the words before them."""
 
 

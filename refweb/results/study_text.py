@@ -80,7 +80,8 @@ def on_spread(entry):
             text = readable(of_result["error"], None, of_result["unit"])
             more = "exceeds" if of_result["error"] > spread else "is not small beside"
             spread = readable(spread, None, of_result["unit"])
-            yield f"{name}: ± of up to {text} {more} the spread, {spread}: a smaller safety or rtol tells cases apart"
+            remedy = "a smaller safety or rtol resolves the differences of cases"
+            yield f"{name}: ± of up to {text} {more} the spread, {spread}: {remedy}"
 
 
 def rows_of_conditions(entry):

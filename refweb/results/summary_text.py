@@ -110,7 +110,7 @@ def on_run(summary):
         )
         yield "contact", f"{text} m, stiffness {lines['stiffness']:.3g}" + ", chosen" * lines.get("chosen", False)
     for name, status in summary.get("passage", {}).items():
-        text = "nothing can have passed: certified" if status == "certified" else status
+        text = "no penetration: certified" if status == "certified" else status
         yield "passage", f"{name}: {text}"
     if (breaks := summary.get("breaks")) is not None:
         yield from _breaks(breaks)
@@ -169,7 +169,7 @@ def _breaks(breaks):
         when = readable(entry["time"], entry["error"], "s")
         yield (
             "breaks" * (n == 0),
-            f"line {entry['line']} at t = {when}, which held {readable(entry['energy'], None, 'J')}",
+            f"line {entry['line']} at t = {when}, stored energy {readable(entry['energy'], None, 'J')}",
         )
     if len(breaks) > FEW_BREAKS:
         yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
@@ -186,11 +186,12 @@ def _horizon(horizon):
     """Sentence on the horizon of a motion."""
     ended = [(k, time) for k, time in horizon["digits"] if time is not None]
     text = f"a difference of {horizon['perturbation']:.0e} m"
-    text += f" grows with {horizon['growth']:.3g} e-folds/s" if horizon["growth"] is not None else " does not grow"
+    growth = horizon["growth"]
+    text += " does not grow" if growth is None else f" grows with the Lyapunov exponent {growth:.3g} 1/s"
     text += "".join(f"; {k - 1} digit{'s' * (k != 2)} after {time:.4g} s" for k, time in ended[-3:])
     left = max((k for k, time in horizon["digits"] if time is None), default=0)
     text += f"; {'more than ' * (left == 12)}{left} digit{'s' * (left != 1)} at the end" if left else ""
-    return text + (f"; statistical: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
+    return text + (f"; chaotic: {', '.join(horizon['statistical'])}" if horizon["statistical"] else "")
 
 
 def _equal(first, second):

@@ -40,7 +40,7 @@ class Breaks(NamedTuple):
 
 
 def torn(system, elements, energies):
-    """The system with these elements broken, which held these energies [J].
+    """The system with these elements broken, stored energy these energies [J].
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def test_in_words():
     given = scene(ball(), refweb.Contact(stiffness=1e8))
     text = expected_cost(given, given.build())
     assert "by elasticity of line 1; " in text and "where all is touched, by contact at " in text
-    assert " steps, some " in text and text.endswith("s of CPU time with the twin")
+    assert " steps, some " in text and text.endswith("s of CPU time with step refinement")
     alone = scene(step_size=1e-5).replace(accuracy=refweb.Accuracy(error="none"))
     assert expected_cost(alone, alone.build()).startswith("10 µs as given, of ")
     assert "at most by elasticity of line 1; 1e+05 steps, some " in expected_cost(alone, alone.build())

@@ -418,7 +418,7 @@ def test_errors_go_on_where_the_second_leg_is_resumed(tmp_path):
 def test_a_state_without_errors_says_so(tmp_path):
     refweb.run(swing(0.01, error="none"), out=tmp_path / "first")
     (warning,) = refweb.run(swing(0.01, start=str(tmp_path / "first"))).warnings
-    assert warning.startswith("the run that it starts from had no twin run")
+    assert warning.startswith("the run that it starts from had no step-refinement run")
 
 
 def test_errors_are_three_times_what_is_off():

@@ -541,7 +541,7 @@ def test_linked_loops_do_not_separate(damping):
     solution = refweb.run(pulled(scene, rings, 1.0), progress=False)
     told = dict(on_run(solution.summary()))
     assert solution.passage["lines"] == "certified"
-    assert told["passage"] == "lines: nothing can have passed: certified"
+    assert told["passage"] == "lines: no penetration: certified"
     linked = {linking_number(*(state.system.net.points[r] + state.x[r] for r in rings)) for _, state in solution.frames}
     assert len(linked) == 1 and abs(linked.pop()) == 1 and len(solution.frames) > 10
     assert np.abs(solution.state.v).max() < 100.0

@@ -280,7 +280,7 @@ def test_errors_of_smoothing_and_elements_are_shown_beside(tmp_path):
     gravity, accuracy = refweb.Gravity(acceleration=(0, 0, -9.81)), refweb.Accuracy(refine=True)
     found = refweb.run(refweb.Scene(web=web, cable=cable, effects=[gravity], accuracy=accuracy))
     table, shown = found.to_pandas("results"), found._repr_html_()
-    for key, text in (("smoothing", "smoothing moves"), ("discretisation", "elements leave")):
+    for key, text in (("smoothing", "smoothing moves"), ("discretisation", "discretisation error")):
         assert table.loc["deflection", key] == getattr(found.results["deflection"], key) > 0.0
         assert f"{text} deflection by" in shown
 

@@ -112,9 +112,9 @@ def test_command_line(tmp_path, capsys):
         '[gravity]\nacceleration = [0.0, 0.0, -9.81]\n[solve]\nkind = "dynamic"\nduration = 0.05\n'
     )
     assert main(["run", str(path), "--horizon", "--out", str(tmp_path / "out")]) == 0
-    assert "e-folds/s" in capsys.readouterr().out
+    assert "Lyapunov exponent" in capsys.readouterr().out
     assert main(["info", str(tmp_path / "out")]) == 0
-    assert "e-folds/s" in capsys.readouterr().out
+    assert "Lyapunov exponent" in capsys.readouterr().out
 
 
 def test_bad_input():
