@@ -16,10 +16,12 @@ def add_arguments(parser):
     parser.add_argument("--field", metavar="NAME", help=text)
     text = "range of the colours [SI], --range=-1e3,2e3 where it begins with a minus, or auto: that of the one frame "
     text += "(default: that of all frames)"
-    parser.add_argument("--range", nargs="+", action=_Words, most=2, folder=folder, metavar=("LOW", "HIGH"), help=text)
+    parser.add_argument(
+        "--range", nargs="+", action=_Words, maximum=2, folder=folder, metavar=("LOW", "HIGH"), help=text
+    )
     parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="what displacements are drawn times")
     text = "one view: oblique, side, front, top, or a direction to the viewer such as 1 0 0.5 (default: two views)"
-    parser.add_argument("--view", nargs="+", action=_Words, most=3, folder=folder, metavar=("NAME", "X"), help=text)
+    parser.add_argument("--view", nargs="+", action=_Words, maximum=3, folder=folder, metavar=("NAME", "X"), help=text)
     parser.add_argument("--out", metavar="FILE", help="picture to write (default: DIR/web.png)")
     text = "a film of all frames, of a mode its swing: a GIF (default: DIR/web.gif), or where ffmpeg is found an MP4"
     parser.add_argument("--animate", action="store_true", help=text)

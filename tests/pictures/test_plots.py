@@ -136,7 +136,7 @@ def test_energies_are_stacked_to_what_came_in(runs):
     table, book = s.history, balances.energy_book(s)
     assert list(book.parts) == ["strain_energy", "potential_energy", "kinetic_energy", "dissipated_energy"]
     low = table["potential_energy"].min()
-    assert low < 0.0 and book.least["potential_energy"] == low
+    assert low < 0.0 and book.smallest["potential_energy"] == low
     np.testing.assert_allclose(book.top + low, table["total_energy"] + table["dissipated_energy"], atol=1e-14)
     largest = max(np.abs(v).sum() for v in zip(*(table[name] for name in book.parts), strict=True))
     drift = s.record.summary["solver"]["energy_drift"]
@@ -300,7 +300,7 @@ def test_distances_are_from_where_a_body_touches(runs):
     time = moved.summary["results"]["deflection"]["time"]
     near = distances.spread(moved, "stress")
     assert abs(near.frame.time - time) == min(abs(t - time) for t in moved.times.values()) > 0.0
-    assert "nearest to deflection" in near.note
+    assert "nearest to deflection" in near.remark
 
 
 def test_distances_where_all_is_slack(runs):

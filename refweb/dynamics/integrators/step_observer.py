@@ -325,7 +325,7 @@ class StepObserver(Integrator):
             stop = search(course.events, piece, lambda slot, sample: self._value(piece, slot, sample), self._sample_at)
             if stop < end:
                 piece = self._piece(course, stop)
-        self._inspect(course, piece)
+        self._inspect_step(course, piece)
         for followed in self._limits.followed:
             followed.inspect(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
         course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
@@ -336,7 +336,7 @@ class StepObserver(Integrator):
         if piece.jump and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(course)
 
-    def _inspect(self, course, piece):
+    def _inspect_step(self, course, piece):
         """Look for extremes and means in a piece, and behind a jump at its end."""
 
         def energies(sample):
