@@ -1,6 +1,8 @@
 """Compile what the shipped scenes need, for images of machines and for clusters.
 
-With ``--ship`` machine code that all usual processors of this kind run is written into the package itself, for a wheel.
+Machine code is kept in a cache folder of the user's, or in the folder that the environment variable REFWEB_CACHE names.
+Two processes compile where there are two cores; REFWEB_COMPILERS=1 leaves it to one. With ``--ship`` machine code that
+all usual processors of this kind run is written into the package itself, for a wheel.
 """
 
 import contextlib
