@@ -31,7 +31,9 @@ def parser():
     verbs = top.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     for name, reference in COMMANDS.items():
         verb = load(reference)
-        verb.add_arguments(verbs.add_parser(name, help=_help(verb)))
+        text = (verb.__doc__ or "").strip().replace("``", "").replace("%", "%%")
+        form = argparse.RawDescriptionHelpFormatter
+        verb.add_arguments(verbs.add_parser(name, help=_help(verb), description=text, formatter_class=form))
     return top
 
 
