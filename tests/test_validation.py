@@ -29,6 +29,7 @@ LONG = (
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in cases.names()])
 def test_case(name):
+    """Numbers of publications, closed forms and other programs beside those of whole runs: no other test has them."""
     title, body = cases.text(name)
     assert title and body, f"{name} does not say what it is"
     case = cases.run(name, quick=True)

@@ -42,6 +42,7 @@ def test_new_writes_a_scene_that_passes_the_check(here, capsys):
 
 
 def test_what_is_commented_out_passes_the_check_as_well(here):
+    """Each line of a new scene file that a user may uncomment is a scene that runs."""
     text = re.sub(r"(?m)^# (\[|\w+ = )", r"\1", START)
     assert len([line for line in text.splitlines() if line.startswith("# ")]) == 5
     (here / "all.toml").write_text(text, encoding="utf-8")

@@ -550,6 +550,7 @@ def test_the_summary_tells_of_breaks():
 
 
 def test_pictures_of_broken_lines(tmp_path):
+    """Frames and pages mark broken lines, with a colour of their own."""
     from refweb.pictures.record import of_folder
     from refweb.pictures.stage import BROKEN, Seen
 

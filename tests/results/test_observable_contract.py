@@ -87,6 +87,7 @@ def probed(observe, state):
 
 @pytest.mark.parametrize("name", PROBED)
 def test_both_faces_agree(name):
+    """The value in a state and that of the probe, of every quantity in every state."""
     for state in STATES:
         for observe in tables(name):
             observe.on(state.system)

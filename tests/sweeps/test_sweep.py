@@ -530,6 +530,7 @@ def test_a_kill_before_and_after_every_write(tmp_path):
 
 
 def test_kills(tmp_path):
+    """A study that is killed at any moment keeps whole rows, and goes on to the rows of a study that is not."""
     left = alone("kills", tmp_path, 8, 1, "made-up")
     assert len(left) == 8 and sum(0 < rows < 12 for rows in left) >= 1
 
