@@ -15,7 +15,7 @@ def add_errors_of_breaks(solution, run, refined, share):
     ----------
     solution : refweb.Solution
         At the end of the run, with its breaks and results.
-    own, other : refweb.system.broken_lines.Breaks
+    run, refined : refweb.system.broken_lines.Breaks
         Of the run and of its twin.
     share : float
         ± over the difference of the two.

@@ -186,7 +186,7 @@ def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drift
         Of either run.
     floors : dict of str to float
         What ± is at least.
-    own, other : ndarray, shape (rows, columns)
+    rows_run, rows_refined : ndarray, shape (rows, columns)
         Rows of either history, see `refweb.dynamics.history.Watch.compared`. Those of equal times are compared: the
         last ones differ where an event ends either run.
     order : float

@@ -146,7 +146,7 @@ class Family:
         As ``near``, where cells are elements of which any two may act on each other, or pairs of them: finds (numbers
         of the elements, their rows, their data) of the pairs that may act soon. Such a family has no stiffness; None
         where cells are what acts.
-    rubbing : Rubbing, optional
+    rubbing : ImplicitContactKernels, optional
         How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
     crossing : Crossing, optional
         What tells whether lines have passed through lines, where those of its cells push each other.
@@ -172,7 +172,7 @@ class Family:
         Times at which the force has a corner [s]; no step of an implicit method passes one.
     elements : ndarray of int, shape (cells,) or (cells, 2), optional
         Elements of the net that each cell acts through, and with which it ends; None for what acts on nodes.
-    sever : callable, optional
+    disable_cells : callable, optional
         Changes rows of ``data`` in place so that their cells do nothing, where one of their ``elements`` is broken.
     """
 

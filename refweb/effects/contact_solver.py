@@ -134,7 +134,7 @@ def sweeping(moved, apply_force):
     ----------
     moved : kernel
         ``(touches, n, i, f, inverse)``: component along direction i of the acceleration by forces f at contact n.
-    push_apart : kernel
+    apply_force : kernel
         ``(touches, n, p, q, s, f)``: adds a force along the three directions of contact n to f.
     """
 
@@ -175,7 +175,7 @@ def warm_start(along, apply_force):
     ----------
     along : kernel
         ``(touches, n, i, rows)``: component along direction i of u, of velocities (rows, 3).
-    push_apart : kernel
+    apply_force : kernel
         See `sweeping`.
     """
 

@@ -143,7 +143,7 @@ def families(net, speed, pull, **arguments):
         Ω [rad/s].
     pull : array_like, shape (3, 3)
         G [1/s²].
-    **own
+    **arguments
         ``name`` and ``book`` of the families, and what else they have.
     """
     heavy = net.heavy

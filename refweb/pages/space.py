@@ -40,7 +40,7 @@ class Space(NamedTuple):
         Largest distance of a point from where it is in the record [m].
     extent : float
         Diagonal of the box around the web in all frames [m].
-    shown, missing : list of int
+    numbers, missing : list of int
         Numbers of the frames that are there, and of those that cannot be read.
     """
 

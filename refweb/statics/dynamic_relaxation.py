@@ -95,7 +95,7 @@ class Relaxation:
     ----------
     system : refweb.system.system.System
         With a net whose ``quasi_static`` is True.
-    progress, most, tolerance
+    progress, limit, tolerance
         See `solve`.
     """
 

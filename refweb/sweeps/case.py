@@ -36,7 +36,7 @@ class Job(NamedTuple):
         Its scene as a file would have it.
     folder, file : str
         Where paths in it start, and what it is called in messages.
-    keep : {"none", "json", "all"}
+    keeps : {"none", "json", "all"}
         What is to come back besides cells.
     home : tuple
         Machine and process that sent it.

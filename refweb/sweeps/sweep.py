@@ -210,7 +210,7 @@ class Kept:
     ----------
     folder : path-like, optional
         The folder.
-    found : Sweep
+    study_run : Sweep
         The study.
 
     Attributes

@@ -22,7 +22,7 @@ class ExplicitState(IntegratorState):
         Force [N], last seen with the velocity at half a step.
     power : ndarray, shape (families,)
         Power of each family that is booked by it at the last step [W].
-    way : float
+    longest : float
         By how much two rows may have come nearer to each other in a step, at most [m]; infinite where that is not
         known.
     before : ndarray, shape (3, rows, 3)

@@ -263,7 +263,7 @@ class Integrator(Protocol):
         Factor on the knob for another run where the book of energies stays open, below 1.
     beside : bool
         Whether ``advance`` runs compiled and releases the interpreter, so that a twin may run in a thread beside it.
-    breathe : callable
+    on_progress : callable
         Called with the time [s] some times a second of ``advance``, or once in some steps; it may raise, which ends the
         run: one of a compiled loop is then as it was at the row before.
 
@@ -308,7 +308,7 @@ class Integrator(Protocol):
 
         Parameters
         ----------
-        course : Course
+        course : IntegratorState
             Where it is; it is taken along.
         times : sequence of float
             Times of the rows [s], increasing, the first not before the course's own.
@@ -366,7 +366,7 @@ class Integrator(Protocol):
 
         Parameters
         ----------
-        course, finer : Course
+        course, finer : IntegratorState
             A run at its end, and that of ``refined()``.
         """
         ...

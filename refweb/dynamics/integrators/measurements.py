@@ -49,7 +49,7 @@ class Measurements:
     ----------
     probed : int
         Number of probes.
-    shown : list of int
+    families : list of int
         Numbers of the families of whose cells probes read what they show, see `refweb.results.probes.Probe`.
     """
 

@@ -42,7 +42,7 @@ class Observed(Record):
         Probes whose sign is not 0.
     windows : refweb.dynamics.integrators.averages.Windows
         Windows of the probes that are averaged.
-    shown : ndarray of int
+    families : ndarray of int
         Families whose values per cell are the data of probes.
     plain : ndarray of int, shape (probes, 4)
         What the loop looks at itself, see `refweb.results.probes.plain_of`.

@@ -96,7 +96,7 @@ class Scheme(Record):
         Shares of a step by which velocities and positions go in turn, one kick more than drifts.
     safety : float
         Share of the bound of a kick, a drift and a kick that a step is.
-    least : float
+    least_steps : float
         Least number of steps of a row.
     step_size : float
         Largest step instead [s], 0 where the bound says.
@@ -123,7 +123,7 @@ class Inertia(Record):
         Its inverse, 0 where a support holds.
     rates : ndarray, shape (2, rows)
         Space for what bounds stiffness and damping of each row.
-    moving, held, driven : ndarray of int
+    moving, fixed, driven : ndarray of int
         Rows that are free somewhere, supported components 3 · row + axis, and rows whose motion is prescribed.
     linear : int
         Number of rows that are places; the others are angles.

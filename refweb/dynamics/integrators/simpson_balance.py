@@ -37,7 +37,7 @@ class Sample(NamedTuple):
         What the line elements show: tension [N], strain [1].
     power : ndarray, shape (families + 1,)
         Power of each family and, last, of motion [W].
-    shown : dict of int to ndarray
+    per_cell : dict of int to ndarray
         What families show of their cells that probes read, by number of the family.
     """
 
@@ -148,7 +148,7 @@ class SimpsonBalance:
         ``hold(x, v)`` moves a state to the nearest one that the equations allow.
     fast : float
         Velocity [m/s] below which nothing is held to be moving.
-    shown : sequence of int
+    observed : sequence of int
         Numbers of the families of whose cells probes read what they show.
     """
 

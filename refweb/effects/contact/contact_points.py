@@ -59,7 +59,7 @@ class PointContact(NamedTuple):
         Whether the place moves as the line does.
     pair : Pair
         The element and the body.
-    spot : Spot
+    spot : ContactPoint
         What is there.
     weight, share : float
         By what its energy counts, and its losses; 1 but on bodies that are not convex.
