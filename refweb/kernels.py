@@ -27,10 +27,10 @@ all its digits, which it loses when positions are the unknowns.
                    show it
 `NEAR`             ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come
                    nearer by ``skin`` [m] to ``chosen``; their number
-`MEETS`            ``(room, way, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come
-                   nearer than ``room`` [m] in a drift behind a kick, in which rows come nearer by ``way`` [m] at
+`MEETS`            ``(margin, path, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come
+                   nearer than ``margin`` [m] in a drift behind a kick, in which rows come nearer by ``path`` [m] at
                    most, with ``inverse`` as in `DETECT`; its rows are written to ``met``
-`CCD_NEIGHBOURS`   ``(room, way, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells
+`CCD_NEIGHBOURS`   ``(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells
                    that are looked at when their turn comes: ``due`` has the way of all drifts after which that is,
                    behind them that way itself, what it may come to with those that are ``chosen``, the last of which
                    is their number, and how far the turn of the next is at least

@@ -138,7 +138,7 @@ class Stage:
 
     The `inspect`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
     (lines, points, 3), empty where nothing has moved, and the `middle` of the web, shape (3,) [m]; what has been
-    `seen`.
+    `limits`.
     """
 
     options: Look

@@ -68,7 +68,7 @@ def duality_bound(system, equilibrium, factor=None):
     equilibrium : refweb.statics.equilibrium.Equilibrium
         Its state.
     factor : refweb.system.factorization.Factor, optional
-        Used again where there is one; where it holds a tangent, ``held`` is its prestress τ [N].
+        Used again where there is one; where it holds a tangent, ``values_held`` is its prestress τ [N].
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     bars = Bars(net, x)

@@ -87,7 +87,7 @@ class ImplicitContacts(Record):
 
 
 def depths_of(system, family):
-    """(``shown``, ``told``) of a family, see `Rubbed`: of the push of the same lines on the same bodies."""
+    """(``depths``, ``elements``) of a family, see `ImplicitContacts`: of the push of the same lines on the same bodies."""
     near = near_of(system)
     for i in near if family.contact else ():
         push = system.families[i]

@@ -8,7 +8,7 @@ made of a system and of what is to be looked at:
 * `Sum`, the same of energies, work and step size;
 * `refweb.dynamics.integrators.events.Event`, a moment at which one of these passes a level.
 
-``start`` makes a `Course`, the whole state of a run; ``advance`` takes it on and returns a `History` of rows.
+``start`` makes a `IntegratorState`, the whole state of a run; ``advance`` takes it on and returns a `History` of rows.
 """
 
 from __future__ import annotations

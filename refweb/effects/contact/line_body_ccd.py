@@ -62,7 +62,7 @@ def passing(depth, nodes, functions, spins=0):
     """The kernel of `refweb.kernels.MEETS` of lines in bodies of one depth, None for spheres alone.
 
     It writes the nodes of an element, the row of the body, and 1 where that is in the core of the body already, else 0.
-    ``room`` is what points of bodies come nearer by as they turn. Arguments are those of
+    ``margin`` is what points of bodies come nearer by as they turn. Arguments are those of
     `refweb.effects.contact.penalty.kernels`.
     """
     if depth is None:
