@@ -87,7 +87,7 @@ class ImplicitContacts(Record):
 
 
 def depths_of(system, family):
-    """(``depths``, ``elements``) of a family, see `ImplicitContacts`: of the push of the same lines on the same bodies."""
+    """(``depths``, ``elements``) of the push of the lines of a family on its bodies, see `ImplicitContacts`."""
     near = near_of(system)
     for i in near if family.contact else ():
         push = system.families[i]

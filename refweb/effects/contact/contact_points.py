@@ -158,10 +158,10 @@ def climb(value, curve, low, high, moved, xi):
 def places(depth, spins=0):
     """Kernels that find where lines touch.
 
-    ``within(x, cells, data, c, nodes, functions, xi)`` is the `ContactPoint` at a place of cell c, ``deepest`` of all but
-    the place (place, depth) of the contact between the ends of a cell, or `NOWHERE`. ``contacts`` finds those of a
-    line, and ``touch_of`` is the `PointContact` that is one of them. ``buffer`` is (rows for each element, columns)
-    of what it finds.
+    ``within(x, cells, data, c, nodes, functions, xi)`` is the `ContactPoint` at a place of cell c, ``deepest`` of all
+    but the place (place, depth) of the contact between the ends of a cell, or `NOWHERE`. ``contacts`` finds those of a
+    line, and ``touch_of`` is the `PointContact` that is one of them. ``buffer`` is (rows for each element, columns) of
+    what it finds.
 
     Parameters
     ----------
