@@ -197,13 +197,13 @@ def folded(folder, radius, gap=1.6, onto=False, size=24, side=0.1):
 
 def of_pairs(scene, times=200):
     """(Pairs, those that touch, ns of the push of each, ns of a pair that is apart) of a folded net at its start."""
-    from refweb.effects.self_contact.search import found
+    from refweb.effects.self_contact.search import near_pairs
 
     system = scene.build()
     family = next(family for family in system.families if family.crossing is not None)
     numbers = []
     for x, skin in ((system.laid, 0.0), (system.laid * [1.0, 1.0, 3.0], 0.05)):
-        _, rows, data = found(skin, x, family.cells, family.data)
+        _, rows, data = near_pairs(skin, x, family.cells, family.data)
         out, force = np.zeros((len(rows), 1)), np.zeros_like(x)
         best = np.inf
         for _ in range(5):
