@@ -177,7 +177,14 @@ SCENES["by relaxation"] = brief("catenary", method="relaxation")
 SCENES["by relaxation"]["cable"] |= {"law": "linear"}
 
 
-ALIKE = ("triangle-impact", "hexagon-impact", "square-oblique-impact", "triangle-load", "hexagon-load")
+ALIKE = (
+    "triangle-impact",
+    "hexagon-impact",
+    "square-oblique-impact",
+    "triangle-load",
+    "hexagon-load",
+    "published-throw",
+)
 """Scenes that call for what others of the same kind call for, on another web."""
 
 

@@ -23,8 +23,9 @@ LONG = (
     "capture_in_orbit",
     "published_throw",
     "falling_net",
+    "odds_of_capture",
 )
-"""Cases that take more than ten seconds with ``--quick``; what they show has tests of its own beside them."""
+"""Cases that take more than eight seconds with ``--quick``; what they show has tests of its own beside them."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in cases.names()])
