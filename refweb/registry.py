@@ -224,13 +224,13 @@ FILES = {"web": ("path", "lines"), "body": ("file",), "fold": ("file",)}
 """Keys of tables of a scene that are paths of files."""
 
 
-def with_files(given, folder, tables=tuple(FILES)):
+def with_files(given, change, tables=tuple(FILES)):
     """A copy of the dict of a scene with ``folder(path)`` for each path of a file in some tables."""
 
     def placed(table, keys):
         if not isinstance(table, dict):
             return table
-        return {k: folder(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
+        return {k: change(value) if k in keys and isinstance(value, str) else value for k, value in table.items()}
 
     given, changed = with_fold(given), {}
     for name in tables:

@@ -68,7 +68,7 @@ def test_refusals_are_foreseen(monkeypatch):
         return row.passes
 
     assert passes()
-    reject_step = few["nets"]["without supports"]
+    expected = few["nets"]["without supports"]
     for method in STATIC:
 
         def tired(fields, other, method=method):
@@ -77,10 +77,10 @@ def test_refusals_are_foreseen(monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(hard_cases, "attempt", tired)
             assert not passes()
-        for refused in (reject_step["refused"] | {method: "tired"}, reject_step["refused"] | {method: None}):
-            few["nets"]["without supports"] = reject_step | {"refused": refused}
+        for refused in (expected["refused"] | {method: "tired"}, expected["refused"] | {method: None}):
+            few["nets"]["without supports"] = expected | {"refused": refused}
             assert not passes()
-        few["nets"]["without supports"] = reject_step
+        few["nets"]["without supports"] = expected
     few["nets"]["one line taut"] = few["nets"]["one line taut"] | {"refused": {STATIC[0]: "no equilibrium"}}
     assert not passes()
 

@@ -189,10 +189,10 @@ def print_cost(summary):
         work = (str(run[key]) for key in ("nfev", "nsteps"))
         grid.add_row(run["method"], run["setting"], *errors, number(run["cpu_s"], ".3f"), *work)
     rows: list = [("runs", grid)] if grid.rows else []
-    parts = {}
+    failures = {}
     for run in (run for run in runs if run["status"] != "solved"):
-        parts.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
-    for (status, method, message), settings in parts.items():
+        failures.setdefault((run["status"], run["method"], run["message"]), []).append(run["setting"])
+    for (status, method, message), settings in failures.items():
         which = "" if status == "refused" else f", {settings[0]}" + (" and finer" if len(settings) > 1 else "")
         rows.append(({"budget": "left out"}.get(status, status), f"{method}{which}: {message or 'there was no time'}"))
     rows.append(("price", summary["sentence"]))
@@ -241,19 +241,19 @@ def _compared(value):
     return Text(readable(value["value"], value["error"], value["unit"]))
 
 
-def print_sweep_begins(study_rows):
+def print_sweep_begins(sweep):
     """Print what a study is about to run."""
     from ..results.study_text import on_design
 
-    study = study_rows.study.to_dict()
+    study = sweep.study.to_dict()
     varied, how = on_design(study)
-    done = sum(row["status"] not in ("waiting", "skipped") for row in study_rows.rows)
-    rows = [("scene", study_rows.title), ("varied", varied), ("cases", f"{len(study_rows.cases)}, {how}")]
-    rows += [("", text) for text in study_rows.reasons]
+    done = sum(row["status"] not in ("waiting", "skipped") for row in sweep.rows)
+    rows = [("scene", sweep.title), ("varied", varied), ("cases", f"{len(sweep.cases)}, {how}")]
+    rows += [("", text) for text in sweep.reasons]
     rows += [("", f"{done} of them have rows already")] if done else []
     kept = {"json": "run.json of each", "all": "result folders of all"}
     rows += [("keeps", kept[study["keep"]])] if study["keep"] in kept else []
-    _box(study_rows.study.title, rows)
+    _box(sweep.study.title, rows)
 
 
 def print_sweep(summary):

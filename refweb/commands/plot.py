@@ -19,7 +19,7 @@ def run(arguments):
     """Draw, and print where the plot is; which folders lack what goes to the error stream."""
     from ..pictures.plots import plot
 
-    paths = plot(arguments.folders, quantity=arguments.quantity, out=arguments.out)
-    print(paths.path)
-    for words in paths.lacking:
+    picture = plot(arguments.folders, quantity=arguments.quantity, out=arguments.out)
+    print(picture.path)
+    for words in picture.lacking:
         print(f"refweb: {words}", file=sys.stderr)

@@ -208,11 +208,11 @@ def needed(kernels, features=None):
     """
     wanted, left = {}, list(kernels)
     while left:
-        kernel_ = left.pop()
-        if kernel_.name in wanted:
+        item = left.pop()
+        if item.name in wanted:
             continue
-        wanted[kernel_.name] = kernel_
-        left += [k for k in kernel_.callees if features is None or k.apart <= features]
+        wanted[item.name] = item
+        left += [k for k in item.callees if features is None or k.apart <= features]
     return list(wanted.values())
 
 
@@ -224,16 +224,16 @@ def prepare(kernels, features=None):
     kernels, features
         See `needed`.
     """
-    wanted = [candidate for candidate in needed(kernels, features) if candidate.signature is not None]
-    unknown = [candidate for candidate in wanted if not candidate.known()]
-    new = {candidate.name: n for n, candidate in enumerate(unknown)}
+    wanted = [item for item in needed(kernels, features) if item.signature is not None]
+    unknown = [item for item in wanted if not item.known()]
+    new = {item.name: n for n, item in enumerate(unknown)}
     with _no_collection(), beside(unknown):
-        for candidate in wanted:
-            for tell in watchers if candidate.name in new else ():
-                tell(new[candidate.name], len(new))
-            candidate.address()
-    for candidate in kernels:
-        candidate.prepared = True
+        for item in wanted:
+            for tell in watchers if item.name in new else ():
+                tell(new[item.name], len(new))
+            item.address()
+    for item in kernels:
+        item.prepared = True
 
 
 @contextlib.contextmanager

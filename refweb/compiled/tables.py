@@ -254,9 +254,9 @@ class Functions:
 
     def __init__(self, signature, kernels):
         self.signature, self.kernels = signature, tuple(kernels)
-        for kernel_ in self.kernels:
-            if kernel_.signature != signature:
-                raise TypeError(f"{kernel_.name} has the signature {kernel_.signature}, not {signature}")
+        for item in self.kernels:
+            if item.signature != signature:
+                raise TypeError(f"{item.name} has the signature {item.signature}, not {signature}")
 
     @functools.cached_property
     def _numba_type_(self):
@@ -270,7 +270,7 @@ class Functions:
 
     @functools.cached_property
     def _items(self):
-        return np.array([kernel_.address() for kernel_ in self.kernels], dtype=WORD)
+        return np.array([item.address() for item in self.kernels], dtype=WORD)
 
     @functools.cached_property
     def _head(self):

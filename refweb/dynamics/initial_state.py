@@ -87,8 +87,8 @@ def equilibrium(system, progress=None):
     """
     from ..statics.load_steps import solve
 
-    (equilibria,) = solve(system, [0.0], progress)
-    return equilibria
+    (equilibrium,) = solve(system, [0.0], progress)
+    return equilibrium
 
 
 def checkpoint(folder, name, remedy=""):

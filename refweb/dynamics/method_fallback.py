@@ -76,7 +76,7 @@ class MethodFallback:
 
         Parameters
         ----------
-        error : refweb.errors.NoEnd
+        error : refweb.errors.IntegrationError
             Why it did not.
 
         Raises

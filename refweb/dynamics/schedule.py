@@ -104,7 +104,7 @@ def blocks(integrator, course, schedule, first=0):
     ----------
     integrator : refweb.dynamics.integrators.integrator.Integrator
         What advances.
-    course : refweb.dynamics.integrators.integrator.Course
+    course : refweb.dynamics.integrators.integrator.IntegratorState
         The state of its run.
     schedule : Schedule
         Where to.

@@ -35,7 +35,7 @@ class TwinRun(NamedTuple):
     ----------
     results : dict of str to refweb.results.solution.Result
         By name, without errors.
-    course : refweb.dynamics.integrators.integrator.Course
+    course : refweb.dynamics.integrators.integrator.IntegratorState
         Its end.
     rows : ndarray, shape (rows, columns)
         See `refweb.dynamics.history.Watch.compared`.
@@ -80,7 +80,7 @@ class Twin:
         if self._thread is not None:
             self._thread.join()
 
-    def _breathe(self, t):
+    def _on_progress(self, t):
         if self._stop.is_set():
             raise InterruptedError(f"the step-refinement run was ended at t = {t:g} s")
         check_budget(self._simulation, t / self._simulation.schedule.times[-1], twin=True)
@@ -89,7 +89,7 @@ class Twin:
         simulation, rows = self._simulation, []
         try:
             integrator = made()
-            integrator.on_progress = self._breathe
+            integrator.on_progress = self._on_progress
             begin = simulation.begin if simulation.begin_of_twin is None else simulation.begin_of_twin
             course = integrator.start(*begin.motion)
             for block in blocks(integrator, course, simulation.schedule):

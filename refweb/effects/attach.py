@@ -87,9 +87,9 @@ class Attach(Table):
                 "another shape, such as a cylinder, or fixed = true"
             )
         nodes_found = np.unique(net.web.find(self.node))
-        for neighbour in net.bodies:
-            for node in np.intersect1d(nodes_found, neighbour.carried):
-                raise InputError(f'node = {node} is on body "{neighbour.name}" already')
+        for body_here in net.bodies:
+            for node in np.intersect1d(nodes_found, body_here.carried):
+                raise InputError(f'node = {node} is on body "{body_here.name}" already')
         points = (net.points[nodes_found] - net.points[body.row]) @ body.axes.T
         if self.point is not None:
             points[:] = self.point + body.offset

@@ -187,8 +187,8 @@ def _segments(blocks, points):
             share.append(np.ones(len(pairs)))
             continue
         size = np.linalg.norm(np.diff(points[pairs % len(points)], axis=1)[:, 0], axis=1).reshape(-1, pieces)
-        counts = size.sum(axis=1, keepdims=True)
-        share.append((size / np.where(counts > 0.0, counts, 1.0)).ravel())
+        total = size.sum(axis=1, keepdims=True)
+        share.append((size / np.where(total > 0.0, total, 1.0)).ravel())
     return np.concatenate(lines), np.concatenate(of), np.concatenate(share)
 
 

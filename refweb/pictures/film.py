@@ -23,7 +23,7 @@ SIZE = (1200, 750)
 """Of a film [pixel]."""
 PHASES, SWINGS = 24, 12.0
 """Images of a period of a mode, and of them in a second [1/s]."""
-WARM_START = 64
+FRAMES_KEPT = 64
 """Frames that are held in memory, to be drawn after the camera has seen all."""
 SAMPLES = 6
 """Images that a GIF has its colours of."""
@@ -96,7 +96,7 @@ class _Film:
         self._record, self._poses, self._options = record, poses, options
         self._swings = record.kind == "modes"
         self._fps = SWINGS if self._swings else fps
-        self._read = functools.lru_cache(WARM_START)(record.frame)
+        self._read = functools.lru_cache(FRAMES_KEPT)(record.frame)
         self._last = self._read(poses[-1].number)
         self._decimals = max((len(f"{t:.6g}".partition(".")[2]) for t in record.times.values()), default=0)
 

@@ -136,9 +136,9 @@ class Seen(NamedTuple):
 class Stage:
     """Common parts of all pages.
 
-    The `inspect`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
-    (lines, points, 3), empty where nothing has moved, and the `middle` of the web, shape (3,) [m]; what has been
-    `limits`.
+    Drawing `options`; the `views` and their `rectangles`; the `radius` of lines; the undeformed lines `origin`, shape
+    (lines, points, 3), empty where nothing has moved; the `middle` of the web, shape (3,) [m]; the `limits` of all
+    frames.
     """
 
     options: Look

@@ -77,10 +77,8 @@ def prepared(record, field=None, off_screen=False):
     show(numbers.index(first))
     plotter.add_text(record.title[:100], name="title", position="upper_left", font_size=14, color=DARK)
     if len(numbers) > 1:
-        ends, style = (
-            [0, len(numbers) - 1],
-            {"pointa": (0.3, 0.08), "pointb": (0.7, 0.08), "color": DARK, "fmt": "%.0f"},
-        )
+        ends = [0, len(numbers) - 1]
+        style = {"pointa": (0.3, 0.08), "pointb": (0.7, 0.08), "color": DARK, "fmt": "%.0f"}
         plotter.add_slider_widget(show, ends, value=numbers.index(first), title="frame", style="modern", **style)
     _aim(plotter, stage)
     return plotter, show

@@ -62,12 +62,12 @@ class Passage:
     def _looks(self, body, path):
         """Shares of a way (rows, 3) at which lines may be deepest: about where its nodes are nearest to a body."""
         net = self._system.net
-        begin, nodes_seen = net.points[: net.nodes] + self._x[: net.nodes] - net.points[body.row], path[: net.nodes]
-        length = np.linalg.norm(nodes_seen, axis=1)
+        begin, shift = net.points[: net.nodes] + self._x[: net.nodes] - net.points[body.row], path[: net.nodes]
+        length = np.linalg.norm(shift, axis=1)
         moved = np.flatnonzero(PARTS * length > body.thickness)
-        begin, nodes_seen, length = begin[moved], nodes_seen[moved], length[moved]
-        nearest = np.clip(-(begin * nodes_seen).sum(axis=1) / length**2, 0.0, 1.0)
-        order = np.argsort(np.linalg.norm(begin + nearest[:, None] * nodes_seen, axis=1))[:MOST]
+        begin, shift, length = begin[moved], shift[moved], length[moved]
+        nearest = np.clip(-(begin * shift).sum(axis=1) / length**2, 0.0, 1.0)
+        order = np.argsort(np.linalg.norm(begin + nearest[:, None] * shift, axis=1))[:MOST]
         step = body.thickness / (PARTS * length[order])
         around = nearest[order, None] + step[:, None] * np.arange(-PARTS, PARTS + 1)
         return np.unique(around[(around > 0.0) & (around < 1.0)])

@@ -68,14 +68,14 @@ def duality_bound(system, equilibrium, factor=None):
     equilibrium : refweb.statics.equilibrium.Equilibrium
         Its state.
     factor : refweb.system.factorization.Factor, optional
-        Used again where there is one; where it holds a tangent, ``values_held`` is its prestress τ [N].
+        Used again where there is one; where it holds a tangent, ``shift`` is its prestress τ [N].
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     bars = Bars(net, x)
     outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
     factor, bound = factor or Factor(system.pattern), None
     balance = _Balance(system, bars, x, outer)
-    if factor.values_held is not None:
+    if factor.shift is not None:
         bound = balance.bound(*balance.by_tangent(factor))
     if bound is None or not bound.sharp:
         improved = balance.bound(*balance.by_laplacian(factor))
@@ -123,7 +123,7 @@ class _Balance:
         system, bars = self._system, self._bars
         across = bars.tension / np.where(bars.length > 0.0, bars.length, 1.0)
         along = np.where(bars.tension > 0.0, bars.stiffness - across, 0.0)[:, None] * bars.direction
-        across = (across + factor.values_held / bars.natural)[:, None]
+        across = (across + factor.shift / bars.natural)[:, None]
         down = self._of_bars.T.tocsr()
 
         def weigh(change):

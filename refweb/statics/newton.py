@@ -253,7 +253,7 @@ class Newton:
 
     def _can_use_again(self, tension):
         """Tell if a tangent is at hand, and that of lines in tension, without follower or centrifugal forces."""
-        return self.factor.values_held is not None and not (self.follows or self.turns or (tension < 0.0).any())
+        return self.factor.shift is not None and not (self.follows or self.turns or (tension < 0.0).any())
 
     def _by_factor_at_hand(self, values, b, tolerance):
         """Solutions y of the matrix of ``values``, shape (n,) or (n, k), as conjugate gradients find them."""
@@ -329,12 +329,12 @@ class Newton:
             if state.floating is not None:
                 solve = null.solve
         forces = self._disturbing(state)
-        by_factor = np.zeros((len(forces), system.rows, 3))
-        for deviation, force in zip(by_factor, forces, strict=True):
+        deviations = np.zeros((len(forces), system.rows, 3))
+        for deviation, force in zip(deviations, forces, strict=True):
             if (p := solve(force)) is None:
                 return None
             deviation.ravel()[system.free] = p
-        return by_factor
+        return deviations
 
     def _deviations_by_factor_at_hand(self, state):
         """The same where nothing floats, as its duality bound proves; None where that does not say or takes long."""

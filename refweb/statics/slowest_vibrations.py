@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh
 
-NUMBER, WARM_START = 4, 20
+NUMBER, VECTORS = 4, 20
 """Number of μ that are looked for without C, and of vectors that are kept for it; with C twice as many of both."""
 CLOSE = 1e-6
 """Error of these μ, over them."""
@@ -95,10 +95,10 @@ def slowest(solver, M, C=None):
         by, transposed, factor, start = weighed.twice, weighed.twice_transposed, 2, np.tile(start, 2)
 
     def largest_pairs(matvec, close) -> Any:
-        if len(start) <= 2 * factor * WARM_START:
+        if len(start) <= 2 * factor * VECTORS:
             return np.linalg.eig(np.column_stack([matvec(e) for e in np.eye(len(start))]))
         operator = LinearOperator((len(start), len(start)), matvec=matvec, dtype=float)  # pyright: ignore[reportCallIssue]  # as __new__ takes them
-        return eigs(operator, factor * NUMBER, which="LM", v0=start, ncv=factor * WARM_START, tol=close)
+        return eigs(operator, factor * NUMBER, which="LM", v0=start, ncv=factor * VECTORS, tol=close)
 
     mu, right = largest_pairs(by, CLOSE)
     suspect = (mu.imag != 0.0) | (mu.real < 0.0) if C is None else mu.real > -CLOSE * abs(mu)

@@ -142,7 +142,7 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
         with recorded(result, clock, lambda: f"{len(result.spectra)} load steps"), followed(progress) as tell:
             _follow(result, rest, number, tell)
     finally:
-        result.table = as_history(COLUMNS, [row for spectrum_n in result.spectra for row in _rows(spectrum_n)])
+        result.table = as_history(COLUMNS, [row for computed in result.spectra for row in _rows(computed)])
         result.warnings += left_out(system)
         if out is not None:
             result.save(out, force)
@@ -170,56 +170,54 @@ def _follow(result, rest, number, tell):
     solve = load(STATICS[method])
     for equilibrium in solve(rest, steps, lambda text: tell(text, len(result.spectra) / len(steps))):
         tell(f"step {equilibrium.step:g}, modes", len(result.spectra) / len(steps))
-        spectrum_n = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
+        computed = spectrum(rest, equilibrium.step, equilibrium.x, number, scene.seed)
         result.state = State(rest, equilibrium.step, equilibrium.x)
         if result.spectra:
             result.spectra[-1] = replace(result.spectra[-1], shapes=None)
-        result.spectra.append(spectrum_n)
+        result.spectra.append(computed)
         stats = {key: equilibrium.stats.get(key) for key in SOLVER} | {
             "method": method,
             "factorization": rest.factorized_by,
             "duality_gap": equilibrium.duality_bound.gap if equilibrium.duality_bound else None,
-            "smallest_pivot": -1 if spectrum_n.unstable else 0 if spectrum_n.zero else 1,
+            "smallest_pivot": -1 if computed.unstable else 0 if computed.zero else 1,
             "slack_nodes": len(open_rows(result.state, equilibrium)),
         }
         totals = {key: totals[key] + stats[key] for key in totals}
         result.solver = {**stats, **totals}
         result.steps.append(
-            {"step": spectrum_n.step, "results": _results(spectrum_n), "solver": stats, **_described(spectrum_n)}
+            {"step": computed.step, "results": _results(computed), "solver": stats, **_described(computed)}
         )
-        remarks.record(spectrum_n.step, remarks_on(spectrum_n, result.state, equilibrium))
+        remarks.record(computed.step, remarks_on(computed, result.state, equilibrium))
         result.warnings = [*remarks.texts(), *rest.remarks()]
 
 
-def _results(spectrum_n):
+def _results(computed):
     """Frequencies of a spectrum by name; a result stands where the displacement of its shape is largest."""
-    values = zip(spectrum_n.frequency.tolist(), spectrum_n.error.tolist(), spectrum_n.nodes.tolist(), strict=True)
+    values = zip(computed.frequency.tolist(), computed.error.tolist(), computed.nodes.tolist(), strict=True)
     return {
-        f"frequency_{k}": Result(f, error, "Hz", spectrum_n.step, node) for k, (f, error, node) in enumerate(values, 1)
+        f"frequency_{k}": Result(f, error, "Hz", computed.step, node) for k, (f, error, node) in enumerate(values, 1)
     }
 
 
-def _described(spectrum_n):
+def _described(computed):
     """Data of a spectrum for ``run.json`` besides its frequencies."""
     names = ("squared", "bound", "residual", "modal_mass", "shares", "moving")
     return {
-        "unstable": spectrum_n.unstable,
-        "zero": spectrum_n.zero,
-        **{name: getattr(spectrum_n, name).tolist() for name in names},
+        "unstable": computed.unstable,
+        "zero": computed.zero,
+        **{name: getattr(computed, name).tolist() for name in names},
     }
 
 
-def _rows(spectrum_n):
+def _rows(computed):
     """A spectrum as rows of ``modes.csv``."""
-    count = np.arange(1, len(spectrum_n.squared) + 1)
+    count = np.arange(1, len(computed.squared) + 1)
     columns = [
-        np.full(len(count), spectrum_n.step),
+        np.full(len(count), computed.step),
         count,
-        spectrum_n.frequency,
-        spectrum_n.error,
-        spectrum_n.squared,
-        spectrum_n.residual,
+        computed.frequency,
+        computed.error,
+        computed.squared,
+        computed.residual,
     ]
-    return np.column_stack(
-        [*columns, spectrum_n.modal_mass, spectrum_n.shares, spectrum_n.moving, spectrum_n.nodes]
-    ).tolist()
+    return np.column_stack([*columns, computed.modal_mass, computed.shares, computed.moving, computed.nodes]).tolist()

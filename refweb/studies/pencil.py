@@ -72,9 +72,8 @@ class Pencil:
         self._ridge = STRAIN * strained
         self._ridge[pattern.diagonal] += ROUNDING * taut
         sums = abs(self.K).sum(axis=0) + taut
-        self._top = (
-            10.0 * (sums[self.massive] / diagonal[self.massive]).max()
-        )  # above every ω², of consistent mass as well
+        # Above every ω², of consistent mass as well.
+        self._top = 10.0 * (sums[self.massive] / diagonal[self.massive]).max()
         if len(self.massless):
             self._hold_massless(1e17 * sums.max() / diagonal[self.massive].min(), taut)
 

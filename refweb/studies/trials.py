@@ -294,9 +294,7 @@ class Statics:
             states.append(equilibrium)
             _check(deadline)
         trial.cpu_s = clock() - began
-        return [State(system, equilibria.step, equilibria.x) for equilibria in states], [
-            equilibria.stats for equilibria in states
-        ]
+        return [State(system, state.step, state.x) for state in states], [state.stats for state in states]
 
 
 def _check(deadline):

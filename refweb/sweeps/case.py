@@ -129,15 +129,12 @@ def _brought(job, directory):
         source = pathlib.Path(path)
         same = source.is_file() and hashlib.sha256(source.read_bytes()).digest() == hashlib.sha256(content).digest()
         if not same:
-            tables = (
-                directory / str(number)
-                if source.name not in ("run.json", "scene.toml", "checkpoint.npz")
-                else directory / "start"
-            )
-            tables.mkdir(exist_ok=True)
-            (tables / source.name).write_bytes(content)
-            moved[path] = str(tables / source.name)
-            moved[str(source.parent)] = str(tables)
+            of_a_run = source.name in ("run.json", "scene.toml", "checkpoint.npz")
+            folder = directory / ("start" if of_a_run else str(number))
+            folder.mkdir(exist_ok=True)
+            (folder / source.name).write_bytes(content)
+            moved[path] = str(folder / source.name)
+            moved[str(source.parent)] = str(folder)
     base = pathlib.Path(job.folder or "")
 
     def brought(path):

@@ -127,9 +127,7 @@ class Carried:
         fast, turned = T.copy(), np.zeros_like(T)
         for i, c, (b, s, q) in cell.parts:
             arm, omega, W, u, angle = state[c]
-            at, body, spin, quaternion = (
-                slice(3 * i, 3 * i + 3), slice(3 * b, 3 * b + 3), slice(3 * s, 3 * s + 3), slice(3 * q, 3 * q + 3)
-            )  # fmt: skip
+            at, body, spin, quaternion = (slice(3 * row, 3 * row + 3) for row in (i, b, s, q))
             A = _cross(arm)
             T[at, body] = fast[at, body] = L[body, at] = np.eye(3)
             L[spin, at], fast[at, spin] = A, -A @ W

@@ -213,14 +213,14 @@ class Factor:
 
     Attributes
     ----------
-    values_held : object
-        What its caller says of the matrix that it holds; None where nothing is said.
+    shift : float or None
+        Prestress τ by which the tangent that it holds is shifted [N]; None where it holds no tangent.
     solutions : int
         Number of solutions below which these cost clearly less than another factorization.
     """
 
     def __init__(self, pattern):
-        self.pattern, self.values_held = pattern, None
+        self.pattern, self.shift = pattern, None
         self._made = {}
         self._by: Any = None
         self._values = np.zeros(0)
@@ -229,12 +229,12 @@ class Factor:
     def solutions(self):
         return self._by.solutions
 
-    def update(self, values, fixed=None):
-        """Factorize the symmetric matrix of these values, and keep what is said of it."""
+    def update(self, values, shift=None):
+        """Factorize the symmetric matrix of these values, of a tangent with a ``shift`` or of another matrix."""
         self._values = values
         if not self.pattern.size:
             return
-        self.values_held = fixed
+        self.shift = shift
         try:
             self._adopt(self.pattern.library.name)
         except RuntimeError:  # singular, of which qdldl leaves what can be used
@@ -323,13 +323,13 @@ def _not_positive(solver):
 class Lu:
     """LU of matrices of one `refweb.system.sparsity.Pattern`, with what a `Factor` has."""
 
-    values_held, solutions = None, 0
+    shift, solutions = None, 0
 
     def __init__(self, pattern):
         self.pattern = pattern
         self._solver: Any = None
 
-    def update(self, values, fixed=None):
+    def update(self, values, shift=None):
         """Factorize the matrix of these values."""
         from scipy.sparse.linalg import splu
 

@@ -131,7 +131,7 @@ def test_a_factorization_of_another_matrix_is_not_trusted():
     other.factor.update(values, 1e-3)
     bound = duality_bound(net_system, state, other.factor)
     assert bound.gap <= 2.0 * expected.gap
-    assert other.factor.values_held is None  # it has made its own
+    assert other.factor.shift is None  # it has made its own
 
 
 @pytest.mark.parametrize("columns", [1, 4])

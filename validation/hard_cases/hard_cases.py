@@ -588,8 +588,8 @@ def matrix(groups, methods, prove, tolerance, reason, quick):
                     line.append("left out")
                     continue
                 solution, why = attempt(members[name], method)
-                reject_step = members[name]["refused"].get(method)
-                as_foreseen = reject_step in why if reject_step else not why
+                expected = members[name]["refused"].get(method)
+                as_foreseen = expected in why if expected else not why
                 if not as_foreseen:
                     unforeseen.append(f"{name} by {method}")
                 if solution is None:

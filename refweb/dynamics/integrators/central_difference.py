@@ -40,7 +40,7 @@ from .workspace import Workspace
 
 TWIN_STEPS = math.sqrt(2.0)
 """Steps of a twin over those of a run: with a method of order 2 it has half the error."""
-SHARED = tuple(CLOCK.names or ())[: (CLOCK.names or ()).index("least")]
+SHARED = tuple(CLOCK.names or ())[: (CLOCK.names or ()).index("least_energy")]
 """Numbers that a course and the loop's clock have in common."""
 
 
@@ -240,7 +240,7 @@ class CentralDifference(Integrator):
         clock = np.zeros(1, dtype=CLOCK)
         for name in SHARED:
             clock[name] = getattr(course, name)
-        clock["least"] = self._least_energy
+        clock["least_energy"] = self._least_energy
         changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = course.power, np.zeros((2, changing)), course.crossings, self._touches

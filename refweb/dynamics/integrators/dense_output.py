@@ -131,9 +131,8 @@ def book_within(
     kick, a drift and a kick, energies between have an error of their own where something touches.
     """
     families, mass, turns, last = model.families, model.inertia.mass, model.inertia.turns, 0.0
-    cells, data, energies, stored, working = (
-        families.cells, families.data, families.energies, families.stored, families.working
-    )  # fmt: skip
+    cells, data = families.cells, families.data
+    energies, stored, working = families.energies, families.stored, families.working
     if smooth and families.powers.shape[0]:
         book_energies(
             now, running.x, running.v, mass, turns, cells, data, energies, stored, running.work, working, total

@@ -193,7 +193,7 @@ def drifts_away(clock, energy, stored, work, limit):
     clock.worst = max(clock.worst, drift)
     if not math.isfinite(drift):
         return True
-    if clock.nsteps == 0 or not clock.largest > clock.least:
+    if clock.nsteps == 0 or not clock.largest > clock.least_energy:
         return False
     share, before = drift / clock.largest, clock.share
     clock.share = share

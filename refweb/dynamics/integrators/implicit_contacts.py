@@ -63,26 +63,23 @@ class ImplicitContacts(Record):
     def of(cls, system):
         """Those of a system."""
         families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
-        rubbing = [system.families[i] for i in families]
-        kernels_of = [family.rubbing for family in rubbing]
-        last = [
-            i
-            for i, kernels_ in enumerate(kernels_of)
-            if i + 1 == len(kernels_of) or kernels_of[i + 1].sweep is not kernels_.sweep
-        ]
-        depths = [depths_of(system, family) for family in rubbing]
+        terms = [system.families[i] for i in families]
+        rubbing = [family.rubbing for family in terms]
+        sweeps = [kernels_.sweep for kernels_ in rubbing]
+        last = [i for i, sweep in enumerate(sweeps) if sweeps[i + 1 : i + 2] != [sweep]]
+        depths = [depths_of(system, family) for family in terms]
         return cls(
             families=np.array(families, dtype=np.int64),
-            meets=Functions(k.DETECT, [kernels_.detect for kernels_ in kernels_of]),
-            recalls=Functions(k.WARM_START, [kernels_.recall for kernels_ in kernels_of]),
-            sweeps=Functions(k.GAUSS_SEIDEL, [kernels_.sweep for kernels_ in kernels_of]),
-            gives=Functions(k.COMMIT, [kernels_.commit for kernels_ in kernels_of]),
+            meets=Functions(k.DETECT, [kernels_.detect for kernels_ in rubbing]),
+            recalls=Functions(k.WARM_START, [kernels_.recall for kernels_ in rubbing]),
+            sweeps=Functions(k.GAUSS_SEIDEL, sweeps),
+            gives=Functions(k.COMMIT, [kernels_.commit for kernels_ in rubbing]),
             last=np.array(last, dtype=np.int64),
-            memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in rubbing]),
+            memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in terms]),
             depths=np.array([number for number, _ in depths], dtype=np.int64),
-            elements=Arrays(INTEGERS, [order_of for _, order_of in depths]),
+            elements=Arrays(INTEGERS, [elements for _, elements in depths]),
             pieces=system.net.subdivide,
-            width=max((kernels_.width for kernels_ in kernels_of), default=0),
+            width=max((kernels_.width for kernels_ in rubbing), default=0),
         )
 
 
@@ -92,9 +89,7 @@ def depths_of(system, family):
     for i in near if family.contact else ():
         push = system.families[i]
         if push.contact:
-            keys, its = (
-                losses.elements * system.rows + losses.cells[:, system.net.along.size] for losses in (family, push)
-            )
+            keys, its = (term.elements * system.rows + term.cells[:, system.net.along.size] for term in (family, push))
             order = np.argsort(its)
             matches = order[np.minimum(np.searchsorted(its, keys, sorter=order), len(its) - 1)]
             if (its[matches] == keys).all():
@@ -103,13 +98,13 @@ def depths_of(system, family):
 
 
 @kernel()
-def lines_in_touch(depths, order, pieces):
+def lines_in_touch(depths, elements, pieces):
     """Numbers of the cells of lines that show a depth."""
-    chosen, count = np.empty(order.size, dtype=np.int64), 0
-    for first in range(0, order.size, pieces):
+    chosen, count = np.empty(elements.size, dtype=np.int64), 0
+    for first in range(0, elements.size, pieces):
         apart = True
         for c in range(first, first + pieces):
-            apart = apart and depths[order[c], 0] <= 0.0
+            apart = apart and depths[elements[c], 0] <= 0.0
         if not apart:  # what is not a number touches
             for c in range(first, first + pieces):
                 chosen[count] = c

@@ -70,7 +70,7 @@ class IntegratorState:
         Work of each family that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
-    ledger : refweb.dynamics.integrators.momentum_balance.Ledger
+    ledger : refweb.dynamics.integrators.momentum_balance.MomentumBalance
         The book of momentum.
     averages : refweb.dynamics.integrators.averages.Averages
         Means over windows, of the probes that have one.

@@ -222,7 +222,7 @@ def turning(x: Matrix, p: Matrix, outside: Outside, turned: Vector) -> tuple[flo
     """
     places, mass, axes = outside.places, outside.mass, outside.axes
     total, size, far = 0.0, 0.0, 0.0
-    centre, momentum, momentum_path, velocity_sum = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    centre, momentum, arm, relative = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     for r in range(mass.size):
         total += mass[r]
         for k in range(3):
@@ -232,17 +232,14 @@ def turning(x: Matrix, p: Matrix, outside: Outside, turned: Vector) -> tuple[flo
     for r in range(p.shape[0]):
         if r < mass.size:
             for k in range(3):
-                momentum_path[k] = places[r, k] + x[r, k] - centre[k] / total
-                velocity_sum[k] = p[r, k] - mass[r] / total * momentum[k]
-            a0, a1, a2 = (
-                momentum_path[1] * velocity_sum[2] - momentum_path[2] * velocity_sum[1],
-                momentum_path[2] * velocity_sum[0] - momentum_path[0] * velocity_sum[2],
-                0.0,
-            )
-            a2 = momentum_path[0] * velocity_sum[1] - momentum_path[1] * velocity_sum[0]
-            reach = math.sqrt(momentum_path[0] ** 2 + momentum_path[1] ** 2 + momentum_path[2] ** 2)
+                arm[k] = places[r, k] + x[r, k] - centre[k] / total
+                relative[k] = p[r, k] - mass[r] / total * momentum[k]
+            a0 = arm[1] * relative[2] - arm[2] * relative[1]
+            a1 = arm[2] * relative[0] - arm[0] * relative[2]
+            a2 = arm[0] * relative[1] - arm[1] * relative[0]
+            reach = math.sqrt(arm[0] ** 2 + arm[1] ** 2 + arm[2] ** 2)
             far = max(far, reach)
-            size += reach * math.sqrt(velocity_sum[0] ** 2 + velocity_sum[1] ** 2 + velocity_sum[2] ** 2)
+            size += reach * math.sqrt(relative[0] ** 2 + relative[1] ** 2 + relative[2] ** 2)
         else:
             a0, a1, a2 = p[r, 0], p[r, 1], p[r, 2]
             size += math.sqrt(a0 * a0 + a1 * a1 + a2 * a2)

@@ -230,10 +230,10 @@ def show_near(nearby: NeighbourList, families: Families) -> None:
     """
     if not nearby.skin[0].depth < math.inf:
         return
-    size, sources = nearby.families.size, len(families.data)
+    size, count = nearby.families.size, len(families.data)
     for m in range(size):
-        all_values, values = families.outs[nearby.families[m]], families.outs[sources - size + m]
-        chosen = families.cells[sources + m]
+        all_values, values = families.outs[nearby.families[m]], families.outs[count - size + m]
+        chosen = families.cells[count + m]
         if chosen.shape[1] == 1:
             for n in range(chosen.shape[0]):
                 for k in range(all_values.shape[1]):
@@ -341,11 +341,11 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
     """
     if not bits.size:
         return
-    skin, count, driven, turns = model.nearby.skin[0], np.int64(0), model.inertia.driven, model.inertia.turns
+    skin, largest, driven, turns = model.nearby.skin[0], np.int64(0), model.inertia.driven, model.inertia.turns
     if not goes_freely(model):
         for q in range(bits.size):
-            count = max(count, bits[q] & SIGN)
-        skin.top = count
+            largest = max(largest, bits[q] & SIGN)
+        skin.top = largest
     path = abs(drift) * skin.fastest
     for d in range(driven.size):
         for k in range(3):

@@ -55,7 +55,7 @@ CLOCK = np.dtype(
         ("largest", float),
         ("worst", float),
         ("share", float),
-        ("least", float),
+        ("least_energy", float),
         ("since", float),
         ("begun", np.int64),
         ("planned", np.int64),
@@ -67,8 +67,7 @@ CLOCK = np.dtype(
 """Numbers that the loop writes: those of a `refweb.dynamics.integrators.integrator.IntegratorState` by their names,
 then the energy that a drift is held against at least, the time from which steps are equal, how many of these are taken,
 0 where none are, and how many they are; the step that is stable there [s], that to which it is cut so that lines do not
-pass, 0
-where it is not, and whether it is to be cut."""
+pass, 0 where it is not, and whether it is to be cut."""
 ClockArray = Annotated[np.ndarray, types.Array(from_dtype(CLOCK), 1, "C")]
 
 LINE = 64
@@ -127,7 +126,7 @@ class Inertia(Record):
         Rows that are free somewhere, supported components 3 · row + axis, and rows whose motion is prescribed.
     linear : int
         Number of rows that are places; the others are angles.
-    turns : refweb.net.rotation.Turns
+    turns : refweb.net.rotation.RigidRotations
         Bodies whose orientation counts.
     """
 
@@ -312,14 +311,9 @@ class Model(Record):
     @classmethod
     def of(cls, system, outs):
         """Make the record of a `refweb.system.system.System`, whose families write their values to ``outs``."""
-        inertia, families, implicit_contacts = (
-            Inertia.of(system),
-            Families.of(system, outs),
-            ImplicitContacts.of(system),
-        )
-        motions, reels, outside = Motions.of(system), Reels.of(system), Outside.of(system)
-        kept = NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system)
-        return cls(inertia, families, implicit_contacts, motions, reels, system.corners, outside, *kept)
+        forces = Inertia.of(system), Families.of(system, outs), ImplicitContacts.of(system)
+        changes = Motions.of(system), Reels.of(system), system.corners, Outside.of(system)
+        return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
 
 
 class Running(Record):
@@ -337,7 +331,7 @@ class Running(Record):
         Work of each family and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports [N s].
-    ledger : refweb.dynamics.integrators.momentum_balance.Ledger
+    ledger : refweb.dynamics.integrators.momentum_balance.MomentumBalance
         The book of momentum.
     extremes : refweb.dynamics.integrators.extremes.Extremes
         Extremes of probes and sums.

@@ -50,8 +50,8 @@ class Rupturing:
 
     def __init__(self, make, system, probes=(), sums=(), events=()):
         self._probes, self._rest = probes, (sums, events)
-        self._make, self._complete, self._weakness = make, system, system.weakness
-        self._breathe = None
+        self._make, self._intact, self._weakness = make, system, system.weakness
+        self._report = None
         self.inner = self._of(system)
         bare = np.flatnonzero((system.net.mass <= 0.0) & ~system.supported.all(axis=1))
         if len(bare):
@@ -70,27 +70,27 @@ class Rupturing:
 
     @on_progress.setter
     def on_progress(self, call):
-        self._breathe = self.inner.on_progress = call
+        self._report = self.inner.on_progress = call
 
     def _of(self, system):
         """The integrator of a system."""
         broken = system.net.broken
         inner = self._make(system, [unstrained(probe, broken) for probe in self._probes], *self._rest)
-        if self._breathe is not None:
-            inner.on_progress = self._breathe
+        if self._report is not None:
+            inner.on_progress = self._report
         return inner
 
     def refined(self, by=None):
         """The same with a smaller error."""
-        return Rupturing(lambda *parts: self._make(*parts).refined(by), self._complete, self._probes, *self._rest)
+        return Rupturing(lambda *parts: self._make(*parts).refined(by), self._intact, self._probes, *self._rest)
 
     def start(self, x=None, v=None):
         """The course at t = 0, where all breaks that is above its limit."""
-        self.inner = self._of(self._complete)
+        self.inner = self._of(self._intact)
         course = self.inner.start(x, v)
         course.breaks = Breaks()
         over = np.flatnonzero(self._shares(course) >= 1.0)
-        holds = self._holding(np.append(self._complete.net.broken, over))
+        holds = self._holding(np.append(self._intact.net.broken, over))
         now = [element for time, element in self._weakness.times if time <= 0.0 and holds(element)]
         if len(over) or now:
             self._break(course, np.union1d(over, now).astype(np.int64))
@@ -104,7 +104,7 @@ class Rupturing:
         """The course of a checkpoint."""
         arrays = dict(arrays)
         breaks = Breaks(*(arrays.pop(f"broken_{name}") for name in Breaks._fields))
-        system = self._complete
+        system = self._intact
         if len(breaks.elements):
             system = torn(system, breaks.elements, breaks.energies)
         self.inner = self._of(system)
@@ -142,7 +142,7 @@ class Rupturing:
 
     def _holding(self, broken):
         """Function that tells if the line of an element has no element that is ``broken``."""
-        line = self._complete.net.line
+        line = self._intact.net.line
         gone = set(line[broken])
         return lambda element: line[element] not in gone
 
@@ -246,9 +246,9 @@ def unstrained(probe, broken):
     return probe._replace(data=data)
 
 
-def _accept(course, breaks):
+def _accept(course, accepted):
     """Let a course be another."""
-    course.__dict__.update(breaks.__dict__)
+    course.__dict__.update(accepted.__dict__)
 
 
 def _joined(parts):

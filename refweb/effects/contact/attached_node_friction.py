@@ -148,9 +148,8 @@ def set_parts(touches, n, x, v, inverse, data):
         for end in range(2):
             if touches[n, SHARES + end] > 0.0:
                 add_node(touches, n, i, end, x, data, c)
-    first, last, mixed = (
-        delassus(touches, n, 1, 1, inverse), delassus(touches, n, 2, 2, inverse), delassus(touches, n, 1, 2, inverse)
-    )  # fmt: skip
+    first, last = delassus(touches, n, 1, 1, inverse), delassus(touches, n, 2, 2, inverse)
+    mixed = delassus(touches, n, 1, 2, inverse)
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
         cosine, sine = math.cos(angle), math.sin(angle)

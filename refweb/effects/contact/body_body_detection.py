@@ -158,16 +158,16 @@ def arcs(depth):
     """
 
     @kernel()
-    def on_arc(position, start, end, centre, frame_a, frame_b, pair):
+    def on_arc(position, start, end, centre, first, second, pair):
         """(point, depth, G, slope and bend of the depth by the place)."""
         turn = end - start
         angle = start + turn * position
         c, s = math.cos(angle), math.sin(angle)
-        e = frame_a[0] * c + frame_b[0] * s, frame_a[1] * c + frame_b[1] * s, frame_a[2] * c + frame_b[2] * s
+        e = first[0] * c + second[0] * s, first[1] * c + second[1] * s, first[2] * c + second[2] * s
         d = (
-            turn * (frame_b[0] * c - frame_a[0] * s),
-            turn * (frame_b[1] * c - frame_a[1] * s),
-            turn * (frame_b[2] * c - frame_a[2] * s),
+            turn * (second[0] * c - first[0] * s),
+            turn * (second[1] * c - first[1] * s),
+            turn * (second[2] * c - first[2] * s),
         )
         deep, g, h = depth(add(centre, e), pair.shape)
         return add(centre, e), deep, g, dot(g, d), dot(d, hessian_times(h, d)) - turn * turn * dot(g, e)
@@ -185,15 +185,15 @@ def arcs(depth):
         )
 
     @kernel()
-    def touched(start, end, centre, frame_a, frame_b, pair):
+    def touched(start, end, centre, first, second, pair):
         power, largest, best = pair.exponent, -math.inf, 0
-        radius, nearest = math.sqrt(dot(frame_a, frame_a)), -math.inf
+        radius, nearest = math.sqrt(dot(first, first)), -math.inf
         size, reach = (end - start) * radius, 2.0 * STEEPEST * radius * math.sin(0.25 * (end - start))
-        _, deep, _, _, _ = on_arc(0.5, start, end, centre, frame_a, frame_b, pair)
+        _, deep, _, _, _ = on_arc(0.5, start, end, centre, first, second, pair)
         if deep + reach <= 0.0:
             return 0.0, 0.0, centre, 0.0, centre
         for n in range(SAMPLES + 1):
-            _, deep, _, _, _ = on_arc(n / SAMPLES, start, end, centre, frame_a, frame_b, pair)
+            _, deep, _, _, _ = on_arc(n / SAMPLES, start, end, centre, first, second, pair)
             nearest = max(nearest, deep)
             felt = deep
             if deep > 0.0:
@@ -202,19 +202,15 @@ def arcs(depth):
                 largest, best = felt, n
         if nearest + size / SAMPLES <= 0.0:  # gradients are shorter than 2
             return 0.0, 0.0, centre, 0.0, centre
-        low, high, position, moved = (
-            max(best - 1, 0) / SAMPLES,
-            min(best + 1, SAMPLES) / SAMPLES,
-            best / SAMPLES,
-            math.inf,
-        )
+        low, high = max(best - 1, 0) / SAMPLES, min(best + 1, SAMPLES) / SAMPLES
+        position, moved = best / SAMPLES, math.inf
         for _ in range(100):
-            _, deep, _, slope, curve = on_arc(position, start, end, centre, frame_a, frame_b, pair)
+            _, deep, _, slope, curve = on_arc(position, start, end, centre, first, second, pair)
             value, curve = rising(power, position, deep, slope, curve)
             low, high, moved, position = climb(value, curve, low, high, moved, position)
             if moved <= 1e-15:
                 break
-        p, deep, g, _, _ = on_arc(position, start, end, centre, frame_a, frame_b, pair)
+        p, deep, g, _, _ = on_arc(position, start, end, centre, first, second, pair)
         w = math.sin(math.pi * position) ** 2
         return position, (w if deep > 0.0 else 0.0), p, deep, g
 
@@ -248,12 +244,8 @@ def pressing(depth):
 
     @kernel()
     def press(ahead, x, cells, data, c, s, space, count):
-        frame_a, frame_b, mine, its = (
-            frame_of(x, cells, data, c, s),
-            frame_of(x, cells, data, c, 1 - s),
-            side(s),
-            side(1 - s),
-        )
+        frame_a, frame_b = frame_of(x, cells, data, c, s), frame_of(x, cells, data, c, 1 - s)
+        mine, its = side(s), side(1 - s)
         away = apart(x, cells, data, c)
         if s == 1:
             away = -away[0], -away[1], -away[2]

@@ -163,7 +163,7 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
 
     The two tangents are those between which J M⁻¹ Jᵀ has no mixed term.
     """
-    law, frame_a, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
+    law, frame_a, frame_b = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
     spins = int(data[c, SIDES + SPINS]), int(data[c, SIDES + SIDE + SPINS])
     touches[n, CELL], touches[n, ROWS], touches[n, ROWS + 1] = c, cells[c, 0], cells[c, 1]
     touches[n, ROWS + 2] = cells[c, 2] if spins[0] else -1
@@ -175,19 +175,18 @@ def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
     size = math.sqrt(dot(e, e))
     e = e[0] / size, e[1] / size, e[2] / size
     h = cross(g, e)
-    set_direction(touches, n, 0, direction(g, y, frame_a, spins[0]), direction(g, z, two, spins[1]))
-    lever_a, its = direction(e, y, frame_a, spins[0]), direction(e, z, two, spins[1])
-    own_too, its_too = direction(h, y, frame_a, spins[0]), direction(h, z, two, spins[1])
-    set_direction(touches, n, 1, lever_a, its)
-    set_direction(touches, n, 2, own_too, its_too)
-    first, last, mixed = (
-        delassus(touches, n, 1, 1, inverse), delassus(touches, n, 2, 2, inverse), delassus(touches, n, 1, 2, inverse)
-    )  # fmt: skip
+    set_direction(touches, n, 0, direction(g, y, frame_a, spins[0]), direction(g, z, frame_b, spins[1]))
+    tangent_a, tangent_b = direction(e, y, frame_a, spins[0]), direction(e, z, frame_b, spins[1])
+    binormal_a, binormal_b = direction(h, y, frame_a, spins[0]), direction(h, z, frame_b, spins[1])
+    set_direction(touches, n, 1, tangent_a, tangent_b)
+    set_direction(touches, n, 2, binormal_a, binormal_b)
+    first, last = delassus(touches, n, 1, 1, inverse), delassus(touches, n, 2, 2, inverse)
+    mixed = delassus(touches, n, 1, 2, inverse)
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
         c1, s1 = math.cos(angle), math.sin(angle)
-        set_direction(touches, n, 1, mixture(c1, lever_a, s1, own_too), mixture(c1, its, s1, its_too))
-        set_direction(touches, n, 2, mixture(c1, own_too, -s1, lever_a), mixture(c1, its_too, -s1, its))
+        set_direction(touches, n, 1, mixture(c1, tangent_a, s1, binormal_a), mixture(c1, tangent_b, s1, binormal_b))
+        set_direction(touches, n, 2, mixture(c1, binormal_a, -s1, tangent_a), mixture(c1, binormal_b, -s1, tangent_b))
     for i in range(3):
         touches[n, OWN + i] = delassus(touches, n, i, i, inverse)
         touches[n, START + i], touches[n, FORCES + i] = along(touches, n, i, v), 0.0
@@ -208,10 +207,10 @@ def kernels(first, second):
     @kernel()
     def add_forces(x, v, f, cells, data, c, space):
         """Add the forces of a pair; their power [W], and the force on the second body [N]."""
-        law, frame_a, two = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
+        law, frame_a, frame_b = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
         power, felt = 0.0, (0.0, 0.0, 0.0)
         a, b, contacts = cells[c, 0], cells[c, 1], space.contacts
-        w, o = turned_velocity(v, data, cells, c, 0, frame_a), turned_velocity(v, data, cells, c, 1, two)
+        w, o = turned_velocity(v, data, cells, c, 0, frame_a), turned_velocity(v, data, cells, c, 1, frame_b)
         for n in range(detect(0.0, x, cells, data, c, space)):
             y, z = place_of(contacts, n, 0), place_of(contacts, n, 1)
             p, q = cross(w, y), cross(o, z)
@@ -226,7 +225,7 @@ def kernels(first, second):
             for s in range(2):
                 frame, arm, sign, spins = (frame_a, y, 1.0, data[c, SIDES + SPINS])
                 if s == 1:
-                    frame, arm, sign, spins = (two, z, -1.0, data[c, SIDES + SIDE + SPINS])
+                    frame, arm, sign, spins = (frame_b, z, -1.0, data[c, SIDES + SIDE + SPINS])
                 for k in range(3):
                     f[cells[c, s], k] += sign * friction[k]
                 if spins > 0.0:

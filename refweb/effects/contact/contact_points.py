@@ -210,18 +210,18 @@ def places(depth, spins=0):
     def deepest(x, cells, data, c, nodes, functions):
         if nodes > 2:  # from the places where samples are largest, of which there may be several
             largest, where, depth_there = -math.inf, 0.0, 0.0
-            before, state = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
+            before, current = -math.inf, felt(x, cells, data, c, nodes, functions, 0.0)
             for n in range(SAMPLES + 1):
                 at, after = n / SAMPLES, -math.inf
                 if n < SAMPLES:
                     after = felt(x, cells, data, c, nodes, functions, at + 1.0 / SAMPLES)
-                if state >= before and state > after:
+                if current >= before and current > after:
                     low, high = max(at - 1.0 / SAMPLES, 0.0), min(at + 1.0 / SAMPLES, 1.0)
                     xi, deep = climbed(x, cells, data, c, nodes, functions, low, high, at)
                     value = felt(x, cells, data, c, nodes, functions, xi)
                     if value > largest:
                         largest, where, depth_there = value, xi, deep
-                before, state = state, after
+                before, current = current, after
             return where, depth_there
         return climbed(x, cells, data, c, nodes, functions, 0.0, 1.0, 0.5)
 

@@ -228,8 +228,8 @@ def add_damping(blocks, v, cells, touch, nodes, spins, functions, by_u):
 
 
 @kernel()
-def add_row_sums(rates, limit, mass, cells, data, c, nodes, spins):
-    """Add the row sums of the contacts of an element, with ∂F/∂y of at most ``limit`` each.
+def add_row_sums(rates, slope, mass, cells, data, c, nodes, spins):
+    """Add the row sums of the contacts of an element, with ∂F/∂y of at most ``slope`` each.
 
     Unknowns of the body are scaled as in `refweb.effects.contact.nearest_point.lightness`, and its rotation likewise.
     """
@@ -237,7 +237,7 @@ def add_row_sums(rates, limit, mass, cells, data, c, nodes, spins):
     delta, thick, b = lightness(mass, cells, c, nodes), thickness(pair.shape), cells[c, nodes]
     if spins == 2:
         thick = lever_of(data, c, nodes)
-    limit *= 1.0 if nodes == 2 else float(nodes * nodes)
+    slope *= 1.0 if nodes == 2 else float(nodes * nodes)
     near, all_of = 1.6, 3.0  # 1 + max W N of a node; both ends and one between
     if pair.once:
         near = all_of = 1.0
@@ -245,11 +245,11 @@ def add_row_sums(rates, limit, mass, cells, data, c, nodes, spins):
     if spins:
         r = cells[c, nodes + 1]
         spun = min(delta * thick * math.sqrt(mass[b] / mass[r]), 1.0)
-        rates[r] += all_of * limit * thick * thick * (1.0 + (1.0 + delta) / spun)
+        rates[r] += all_of * slope * thick * thick * (1.0 + (1.0 + delta) / spun)
     for a in range(nodes):
-        rates[cells[c, a]] += near * limit * (1.0 + delta + spun)
+        rates[cells[c, a]] += near * slope * (1.0 + delta + spun)
     if delta > 0.0:
-        rates[b] += all_of * limit * (1.0 + (1.0 + spun) / delta)
+        rates[b] += all_of * slope * (1.0 + (1.0 + spun) / delta)
 
 
 @functools.cache
@@ -265,7 +265,7 @@ def kernels(depth, pieces, nodes, functions, spins):
     """
     rows, paired = nodes + (2 if spins else 1), pairing(spins)
     _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
-    reject_step = foresight(depth, spins)
+    depth_ahead = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -292,12 +292,8 @@ def kernels(depth, pieces, nodes, functions, spins):
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         buffer, z, q = np.empty((limit * pieces, columns)), np.empty((nodes + 1, 3)), np.empty((3, 3))
-        by_y, by_u, pushes, arms = (
-            np.empty((3, 3)),
-            np.empty((3, 3)),
-            np.empty((pieces, nodes, 3)),
-            np.empty((nodes, 3)),
-        )
+        by_y, by_u = np.empty((3, 3)), np.empty((3, 3))
+        pushes, arms = np.empty((pieces, nodes, 3)), np.empty((nodes, 3))
         damped = np.empty_like(blocks if spins == 2 else blocks[:0])
         damped[:] = 0.0
         blocks[:] = 0.0
@@ -337,7 +333,7 @@ def kernels(depth, pieces, nodes, functions, spins):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            deep = reject_step(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
+            deep = depth_ahead(False, reach, speed, x, mass, cells, data, c, nodes, functions).depth
             if deep > 0.0:
                 pair = pair_of(data, c, nodes)
                 limit = SHALLOW * pair.damping * speed * (1.0 + pair.friction) + pair.friction

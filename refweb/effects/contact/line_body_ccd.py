@@ -89,10 +89,8 @@ def passing(depth, nodes, functions, spins=0):
                 for n in range(parts):
                     spot = within(x, cells, data, c, nodes, functions, (n + 0.5) / parts)
                     slope = steepest * math.sqrt(dot(spot.d, spot.d)) if steepest else abs(dot(spot.gradient, spot.d))
-                    deepest_seen, largest = (
-                        max(deepest_seen, spot.depth),
-                        max(largest, spot.depth + 0.5 * slope / parts),
-                    )
+                    deepest_seen = max(deepest_seen, spot.depth)
+                    largest = max(largest, spot.depth + 0.5 * slope / parts)
                 if largest < limit:
                     return True
                 if not deepest_seen < limit:

@@ -129,9 +129,9 @@ def direction(axis, y, pair, spins):
 
 
 @kernel(forceinline=True)
-def delassus(tangent, direction, light, lighter):
+def delassus(first, second, light, lighter):
     """J M⁻¹ Jᵀ between two directions [1/kg], by that of the places and that of the rotation along the axes."""
-    p, q, r, s = tangent.axis, direction.axis, tangent.arm, direction.lever
+    p, q, r, s = first.axis, second.axis, first.arm, second.lever
     places = p[0] * q[0] * light[0] + p[1] * q[1] * light[1] + p[2] * q[2] * light[2]
     return places + r[0] * s[0] * lighter[0] + r[1] * s[1] * lighter[1] + r[2] * s[2] * lighter[2]
 
@@ -147,11 +147,11 @@ def mixture(c, p, s, q):
 
 
 @kernel(forceinline=True)
-def set_direction(touches, n, i, row):
+def set_direction(touches, n, i, given):
     """Write direction i of a contact."""
     for k in range(3):
-        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = row.axis[k], row.lever[k]
-        touches[n, ARMS + 3 * i + k] = row.arm[k]
+        touches[n, AXES + 3 * i + k], touches[n, LEVERS + 3 * i + k] = given.axis[k], given.lever[k]
+        touches[n, ARMS + 3 * i + k] = given.arm[k]
 
 
 @kernel(forceinline=True)
@@ -178,22 +178,21 @@ def set_touch(touches, n, touch, cells, v, inverse, spins, functions):
         near * near * inverse[a, 2] + far * far * inverse[b, 2] + inverse[body, 2],
     )
     lighter = (inverse[spin, 0], inverse[spin, 1], inverse[spin, 2]) if spins else (0.0, 0.0, 0.0)
-    normal, tangent, second = (
-        direction(g, y, pair, spins), direction(e, y, pair, spins), direction(cross(g, e), y, pair, spins)
-    )  # fmt: skip
-    first, last = delassus(tangent, tangent, light, lighter), delassus(second, second, light, lighter)
-    mixed = delassus(tangent, second, light, lighter)
+    normal = direction(g, y, pair, spins)
+    tangent, binormal = direction(e, y, pair, spins), direction(cross(g, e), y, pair, spins)
+    first, last = delassus(tangent, tangent, light, lighter), delassus(binormal, binormal, light, lighter)
+    mixed = delassus(tangent, binormal, light, lighter)
     if abs(mixed) > 1e-15 * (first + last):
         angle = 0.5 * math.atan2(2.0 * mixed, first - last)
         cosine, sine = math.cos(angle), math.sin(angle)
-        tangent, second = mixture(cosine, tangent, sine, second), mixture(cosine, second, -sine, tangent)
-        first, last = delassus(tangent, tangent, light, lighter), delassus(second, second, light, lighter)
+        tangent, binormal = mixture(cosine, tangent, sine, binormal), mixture(cosine, binormal, -sine, tangent)
+        first, last = delassus(tangent, tangent, light, lighter), delassus(binormal, binormal, light, lighter)
     set_direction(touches, n, 0, normal)
     set_direction(touches, n, 1, tangent)
-    set_direction(touches, n, 2, second)
+    set_direction(touches, n, 2, binormal)
     touches[n, OWN], touches[n, OWN + 1], touches[n, OWN + 2] = delassus(normal, normal, light, lighter), first, last
     touches[n, MIXED] = delassus(normal, tangent, light, lighter)
-    touches[n, MIXED + 1] = delassus(normal, second, light, lighter)
+    touches[n, MIXED + 1] = delassus(normal, binormal, light, lighter)
     for i in range(3):
         touches[n, START + i] = along(touches, n, i, v)
         touches[n, FORCES + i] = 0.0

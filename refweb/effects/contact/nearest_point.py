@@ -163,7 +163,7 @@ def near(pieces, nodes, functions, within=in_sphere):
     """The kernel that finds the lines near bodies, of signature `refweb.kernels.NEAR`.
 
     A line is taken whole. ``within`` is `in_sphere`, or for elements with two nodes
-    `refweb.effects.contact.contact_points. in_reach`; the other arguments are those of
+    `refweb.effects.contact.contact_points.in_reach`; the other arguments are those of
     `refweb.effects.contact.sphere.kernels`.
     """
 

@@ -114,11 +114,8 @@ def pairing(spins):
         pair = pair_of(data, c, nodes)
         if spins < 2:
             return pair
-        turned, at, axes = (
-            matrix_at(x, cells[c, nodes + 1], cells[c, nodes + 2]),
-            AWAY + 3 * nodes + _MOBILITY,
-            pair.axes,
-        )
+        turned = matrix_at(x, cells[c, nodes + 1], cells[c, nodes + 2])
+        at, axes = AWAY + 3 * nodes + _MOBILITY, pair.axes
         return Pair(
             pair.stiffness,
             pair.exponent,

@@ -104,8 +104,8 @@ def foresight(depth, spins=0):
     within, deepest, *_ = places(depth, spins)
 
     @kernel()
-    def reject_step(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
-        stiffness_sum, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
+    def depth_ahead(careful, reach, speed, x, mass, cells, data, c, nodes, functions):
+        reduced_mass, body, pair = 0.0, mass[cells[c, nodes]], pair_of(data, c, nodes)
         xi, deep = deepest(x, cells, data, c, nodes, functions)
         first = within(x, cells, data, c, nodes, functions, 0.0).depth
         last = within(x, cells, data, c, nodes, functions, 1.0).depth
@@ -116,17 +116,17 @@ def foresight(depth, spins=0):
         if max(deep, nearest) + reach <= 0.0:
             return Foreseen(0.0, length)
         for a in range(nodes):
-            stiffness_sum += mass[cells[c, a]]
-        stiffness_sum = stiffness_sum * body / (stiffness_sum + body) if body > 0.0 else stiffness_sum
+            reduced_mass += mass[cells[c, a]]
+        reduced_mass = reduced_mass * body / (reduced_mass + body) if body > 0.0 else reduced_mass
         more = min(0.5 * reach, thickness(pair.shape))
         if speed > 0.0:
             power = pair.exponent + 1.0
-            more = min(more, (0.5 * power * stiffness_sum * speed * speed / pair.stiffness) ** (1.0 / power))
+            more = min(more, (0.5 * power * reduced_mass * speed * speed / pair.stiffness) ** (1.0 / power))
         if not careful:
             more = min(SHALLOW * more, deep if deep > 0.0 else math.inf)
         return Foreseen(max(deep, 0.0) + more, length)
 
-    return reject_step
+    return depth_ahead
 
 
 @kernel(forceinline=True)
@@ -152,14 +152,14 @@ def add_stiffness(blocks, touch, definite, nodes, functions, z):
 
 
 @kernel(forceinline=True)
-def add_row_sums(rates, reject_step, speed, mass, cells, data, c, nodes, spins):
+def add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins):
     """Add the row sums of the stiffness of an element's contacts; nothing passes through between two steps.
 
     Half the bound are steps of a tenth of the body's thickness. A body that turns has a rotation among its unknowns, of
     the lever that its light ends make of its moment of inertia; it is scaled as the body is.
     """
     scale = 1.0 if nodes == 2 else float(nodes * nodes)  # curved elements: row sums of shares and of their slopes
-    deep, length, pair = reject_step.depth, reject_step.length, pair_of(data, c, nodes)
+    deep, length, pair = ahead.depth, ahead.length, pair_of(data, c, nodes)
     steep = scale * pair.stiffness * slope_of_power(pair.exponent, deep)
     delta = lightness(mass, cells, c, nodes)
     b, thick, steepest = cells[c, nodes], thickness(pair.shape), SPREAD * steep
@@ -199,7 +199,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     """
     arity, paired = nodes + 1 + spins, pairing(spins)
     _, _, contacts, touch_of, (limit, columns) = places(depth, spins)
-    reject_step = foresight(depth, spins)
+    depth_ahead = foresight(depth, spins)
 
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
@@ -260,7 +260,7 @@ def kernels(depth, pieces, nodes, functions, spins=0):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            ahead = reject_step(True, reach, speed, x, mass, cells, data, c, nodes, functions)
+            ahead = depth_ahead(True, reach, speed, x, mass, cells, data, c, nodes, functions)
             if ahead.depth > 0.0:
                 add_row_sums(rates, ahead, speed, mass, cells, data, c, nodes, spins)
 

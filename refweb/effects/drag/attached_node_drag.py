@@ -41,8 +41,8 @@ def turned(touches, n, moment):
 def at_arm(touches, n, force, moment, inverse):
     """Acceleration of a node by a force and a moment on the body that carries it."""
     row, turning, a = int(touches[n, BODY]), turned(touches, n, moment), inverse[int(touches[n, SPIN]), 0]
-    impulse = inverse[row, 0] * force[0], inverse[row, 1] * force[1], inverse[row, 2] * force[2]
-    return speed_at(arm(touches, n), impulse, (a * turning[0], a * turning[1], a * turning[2]))
+    change = inverse[row, 0] * force[0], inverse[row, 1] * force[1], inverse[row, 2] * force[2]
+    return speed_at(arm(touches, n), change, (a * turning[0], a * turning[1], a * turning[2]))
 
 
 @kernel()

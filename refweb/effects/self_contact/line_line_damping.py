@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from ...kernels import BOUND, FORCE, STIFFNESS, kernel
-from .line_line_penalty import MOST, OF_REACH, add_all_second, add_forces, pushed, reject_step, steepest, stored
+from .line_line_penalty import MOST, OF_REACH, add_all_second, add_forces, depth_ahead, pushed, steepest, stored
 from .pair import DAMPING, LENGTH, OTHER, SCALE, TOUCH
 from .search import near_pairs
 
@@ -101,7 +101,7 @@ def add_bounds(reach, speed, x, mass, rates, cells, data, viscous):
     """Add the row sums of ∂F/∂v, or of ∂F/∂x, to the rates."""
     rates_here, largest = np.zeros(rates.size), np.zeros(rates.size)
     for c in range(cells.shape[0]):
-        depth = reject_step(reach, speed, x, mass, cells, data, c)
+        depth = depth_ahead(reach, speed, x, mass, cells, data, c)
         if depth > 0.0:
             now = (1.875 * stored(x, cells, data, c) / data[c, SCALE]) ** 0.4
             depth = min(depth, max(2.0 * now, SHALLOW * depth))

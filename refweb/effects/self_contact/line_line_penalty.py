@@ -321,7 +321,7 @@ def room_left(limit, touch, scale, stored_now, moving):
 
 
 @kernel(forceinline=True)
-def reject_step(reach, speed, x, mass, cells, data, c):
+def depth_ahead(reach, speed, x, mass, cells, data, c):
     """c² − D that pair c may come to within a reach at some speed, see `refweb.effects.contact.penalty.foresight`."""
     geometry, touch = place_of(x, cells, data, c), data[c, TOUCH]
     square = nearest(geometry.p, geometry.u, geometry.w)[2]
@@ -342,7 +342,7 @@ def reject_step(reach, speed, x, mass, cells, data, c):
 def note_pairs(reach, speed, x, mass, cells, data, rates_here, largest):
     """Write the sum and the largest of the bounds of all pairs of each row."""
     for c in range(cells.shape[0]):
-        depth = reject_step(reach, speed, x, mass, cells, data, c)
+        depth = depth_ahead(reach, speed, x, mass, cells, data, c)
         if depth > 0.0:
             value = 2.0 * steepest(data[c, TOUCH], data[c, SCALE], data[c, LENGTH], data[c, OTHER], depth)
             for n in range(4):

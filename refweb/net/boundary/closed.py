@@ -127,9 +127,9 @@ def _joined(points, triangles):
     return points[first], part[triangles].astype(np.int64)
 
 
-def _edge(points, text_a, text_b):
-    text_a, text_b = (", ".join(f"{x:.6g}" for x in points[i]) for i in (text_a, text_b))
-    return f"from ({text_a}) to ({text_b})"
+def _edge(points, start, end):
+    start, end = (", ".join(f"{x:.6g}" for x in points[i]) for i in (start, end))
+    return f"from ({start}) to ({end})"
 
 
 def _neighbours(points, triangles):

@@ -173,11 +173,8 @@ class Mesh(Shape):
 
         wide = vars(self).setdefault("_wide", {})  # kept as long as this: kernels read it where it stands
         if thickness not in wide:
-            points, triangles, size = (
-                self.solid.points,
-                self.solid.triangles,
-                float(np.ptp(self.solid.points, axis=0).max()),
-            )
+            points, triangles = self.solid.points, self.solid.triangles
+            size = float(np.ptp(points, axis=0).max())
             spacing = max((size + 2.0 * thickness) / WIDE, field.spacing)
             cells = max(int(np.ceil(size / spacing)), 1)
             around = int(np.ceil(1.1 * thickness * cells / size)) + 2
