@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import tomllib
+import types
 from functools import cache
 
 import numpy as np
@@ -383,7 +384,8 @@ def handed(monkeypatch):
         seen, solver = [], central_difference.CentralDifference(scene_of(*effects).build())
         solver.prepare()
         with monkeypatch.context() as patched:
-            patched.setattr(central_difference, "advance_rows", lambda *given: seen.append(given) or 1)
+            called = types.SimpleNamespace(call=lambda *given: seen.append(given) or 1)
+            patched.setattr(central_difference, "advance_rows", called)
             solver.advance(solver.start(), [1e-3])
         counts = [len(table) for given in seen[0] if isinstance(given, Record) for table in tables(given)]
         return dict(zip(LISTED, counts, strict=True))

@@ -53,6 +53,8 @@ class Kernel:
     ----------
     py_func : function
         What is compiled.
+    prepared : bool
+        Whether there is machine code of all that it may reach, whatever the features of a run.
     apart : frozenset of str, optional
         Features of a run that reaches it, for one that is called by its address; else None.
     """
@@ -155,6 +157,10 @@ class Kernel:
             prepare([self])
         return self._entry(*arguments)
 
+    def call(self, *arguments):
+        """Call it in a run that has prepared it with its features: kernels for others may not be compiled."""
+        return self._entry(*arguments)
+
     @functools.cached_property
     def callees(self):
         """Kernels that are called by their address, by it or by what is compiled into it, a list."""
@@ -232,7 +238,7 @@ def prepare(kernels, features=None):
             for tell in watchers if item.name in new else ():
                 tell(new[item.name], len(new))
             item.address()
-    for item in kernels:
+    for item in kernels if features is None else ():
         item.prepared = True
 
 

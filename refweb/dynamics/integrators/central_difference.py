@@ -130,7 +130,7 @@ class CentralDifference(Integrator):
         self.prepare()
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
-        return safe_step(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
+        return safe_step.call(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
 
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""
@@ -169,7 +169,7 @@ class CentralDifference(Integrator):
         extremes = Extremes.at_start(np.zeros(len(signs)), np.full(len(signs), -1))
         work, total = np.zeros(len(system.families) + 1), np.zeros(len(system.families) + 3)
         where = np.zeros(2, dtype=np.int64)
-        begin(x, v, force, where, self._model, self._observed, extremes, work, total)
+        begin.call(x, v, force, where, self._model, self._observed, extremes, work, total)
         first = len(signs) - len(sums)
         extremes.values[first:] = sums @ total
         events = self._events.copy()
@@ -181,7 +181,7 @@ class CentralDifference(Integrator):
         extremes.recent[:, 2] = extremes.values
         per_family = np.delete(total[:-2], np.flatnonzero(system.working > 0))
         ledger = MomentumBalance.empty()
-        open_balance(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
+        open_balance.call(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
         return ExplicitState(
             time=0.0,
             x=x,
@@ -260,12 +260,12 @@ class CentralDifference(Integrator):
         records = self._scheme, self._model, self._observed, running, Workspace.of(self._model, running)
         clock = running.clock
         if len(self._model.guard.families) or len(self._model.walls.families):
-            look_anew(self._model.guard)
+            look_anew.call(self._model.guard)
         if self._taken != (id(course), course.nsteps):
             forget(self._model, course.nsteps > 0)
         try:
             while True:
-                more = advance_rows(times[done:], breath, DRIFT, *records, history.values[done:])
+                more = advance_rows.call(times[done:], breath, DRIFT, *records, history.values[done:])
                 now = clock[0]
                 if more == HELD:
                     self._refuse_passing(course, now)
@@ -319,7 +319,7 @@ class CentralDifference(Integrator):
             state, running.clock["begun"] = state.copy(), begun
             copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
             changing, workspace = self._model.reels.lengths.size > 0, Workspace.of(model, copy)
-            run_steps(count, float(course.step), changing, self._scheme, model, self._observed, copy, workspace)
+            run_steps.call(count, float(course.step), changing, self._scheme, model, self._observed, copy, workspace)
             return state
 
         return after
