@@ -15,21 +15,16 @@ all its digits, which it loses when positions are the unknowns.
 `LINES`            ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
 `IMPULSE`          ``(t, x, cells, data, total)``: adds ∫F dt [N s], F the sum of the forces of all cells, to ``total
                    (3,)``, but for a constant
-`DETECT`           ``(h, x, v, inverse, cells, data, touches, begin)``: writes what touches to rows of ``touches``
-                   from ``begin`` on, for a kick of size h from velocities v, ``inverse (rows, 3)`` being 1/m, 0 where
-                   a support holds; the row behind them, also where ``touches`` has no room for all
-`WARM_START`       ``(number, memory, f, touches, begin, end)``: adds to f the forces of what touched in the step
-                   before this one, of a ``number`` > 0
-`GAUSS_SEIDEL`     ``(h, number, f, inverse, touches, count)``: solves contacts one after the other and adds what
-                   their forces change by to f; the largest change of a velocity in a kick [m/s]
-`COMMIT`           ``(number, memory, v, touches, begin, end, out)``: notes forces in the ``memory`` of a step, and
-                   writes the power of each cell to ``out`` [W], with the force that a body feels [N] where families
-                   show it
+`DETECT`           ``(x, cells, data, contacts, parts, begin)``: writes the contacts of all cells, see `CONTACT`, from
+                   ``begin`` on; the number behind them, also where ``contacts`` has no space for all
+`LAW`              ``(h, number, n, f, inverse, contacts, parts)``: finds the force of contact n in a kick of size h,
+                   sweep ``number``, and adds its change to f; the change of the velocity [m/s]. ``inverse (rows, 3)``
+                   is 1/m, 0 where a support holds
 `NEAR`             ``(skin, x, cells, data, chosen)``: writes the numbers of all cells that may touch when they come
                    nearer by ``skin`` [m] to ``chosen``; their number
 `MEETS`            ``(margin, path, kick, drift, x, v, f, inverse, cells, data, met)``: whether lines of any cell come
                    nearer than ``margin`` [m] in a drift behind a kick, in which rows come nearer by ``path`` [m] at
-                   most, with ``inverse`` as in `DETECT`; its rows are written to ``met``
+                   most, with ``inverse`` as in `LAW`; its rows are written to ``met``
 `CCD_NEIGHBOURS`   ``(margin, path, kick, drift, x, v, f, inverse, cells, data, due, chosen, met)``: the same of cells
                    that are looked at when their turn comes: ``due`` has the way of all drifts after which that is,
                    behind them that way itself, what it may come to with those that are ``chosen``, the last of which
@@ -47,7 +42,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numba import types
+from numba import from_dtype, types
 
 from .compiled.kernel import kernel
 from .compiled.records import Cube, IntegerMatrix, Integers, Matrix, Record, Vector
@@ -83,12 +78,49 @@ BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_
 IMPULSE = ENERGY
 LINES = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
-DETECT = types.int64(
-    _f, _array(_f, 2), _array(_f, 2), _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 2), types.int64
+PART = np.dtype([("row", np.int64), ("jacobian", float, (3, 3)), ("transpose", float, (3, 3))])
+"""A row that a contact moves; for each direction, J (what its velocity adds to the relative velocity u) and Jᵀ (what a
+force adds to that on the row), which are equal but for rotations."""
+CONTACT = np.dtype(
+    [
+        ("cell", np.int64),
+        ("tag", np.int64),
+        ("term", np.int64),
+        ("first", np.int64),
+        ("count", np.int64),
+        ("group", np.int64),
+        ("tangent", float, (3,)),
+        ("drag", float, (2,)),
+        ("normal_force", float),
+        ("damping", float),
+        ("friction", float),
+        ("slip_velocity", float),
+        ("wind", float, (3,)),
+        ("velocity", float, (3,)),
+        ("force", float, (3,)),
+        ("theta", float, (2,)),
+        ("delassus", float, (3, 3)),
+        ("basis", float, (3, 3)),
+    ]
 )
-GAUSS_SEIDEL = types.float64(_f, types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64)
-WARM_START = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64)
-COMMIT = types.void(types.int64, _array(_f, 2), _array(_f, 2), _array(_f, 2), types.int64, types.int64, _array(_f, 2))
+"""A contact: three directions along which a force acts on some rows.
+
+Its ``cell`` among those of the force ``term``, and a ``tag`` that tells it from others of the cell; its parts, a
+``count`` from the ``first`` on, see `PART`; a ``basis`` that stays from step to step, by rows the directions.
+
+Numbers of its law: the push N₀ [N], damping d [s/m], friction μ and slip velocity v_s [m/s]; of drag the ``tangent`` of
+the line, c_n and c_t [kg/m], and the ``wind`` [m/s]. Contacts that share a row may be one ``group``, of so many from
+the first of them on: the others have 0 there, and no parts.
+
+The solver writes the rest: the ``velocity`` u⁻ ahead of the kick [m/s], the ``force`` along each direction [N],
+``theta`` of the normal and of the tangents, and the block ``delassus`` J M⁻¹ Jᵀ [1/kg].
+"""
+MEMORY = np.dtype([("tag", np.int64), ("step", np.int64), ("force", float, (3,))])
+"""A contact as it is remembered until the next step: its tag, the number of the step, and its force by ``basis``."""
+CONTACTS, PARTS = types.Array(from_dtype(CONTACT), 1, "C"), types.Array(from_dtype(PART), 1, "C")
+MEMORIES = types.Array(from_dtype(MEMORY), 2, "C")
+DETECT = types.int64(MATRIX, INDICES, MATRIX, CONTACTS, PARTS, types.int64)
+LAW = types.float64(_f, types.int64, types.int64, MATRIX, MATRIX, CONTACTS, PARTS)
 _drift = (_f, _f, _f, _f, MATRIX, MATRIX, MATRIX, MATRIX, INDICES, MATRIX)
 MEETS = types.boolean(*_drift, INTEGERS)
 CCD_NEIGHBOURS = types.boolean(*_drift, VECTOR, INTEGERS, INTEGERS)
@@ -98,19 +130,23 @@ NEAR = types.int64(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), INTEGERS)
 
 Indices = Annotated[np.ndarray, INDICES]
 """Annotation of cells."""
+ContactArray = Annotated[np.ndarray, CONTACTS]
+PartArray = Annotated[np.ndarray, PARTS]
+"""Annotations of contacts and of their parts."""
 IndexTable = Annotated[Arrays, INDICES]
 MatrixTable = Annotated[Arrays, MATRIX]
 VectorTable = Annotated[Arrays, VECTOR]
 IntegerTable = Annotated[Arrays, INTEGERS]
+ContactTable = Annotated[Arrays, CONTACTS]
+PartTable = Annotated[Arrays, PARTS]
+MemoryTable = Annotated[Arrays, MEMORIES]
 """Annotations of tables of arrays in records."""
 ForceTable = Annotated[Functions, FORCE]
 EnergyTable = Annotated[Functions, ENERGY]
 BoundTable = Annotated[Functions, BOUND]
 LinesTable = Annotated[Functions, LINES]
-MeetTable = Annotated[Functions, DETECT]
-KeptTable = Annotated[Functions, WARM_START]
-SweepTable = Annotated[Functions, GAUSS_SEIDEL]
-GiveTable = Annotated[Functions, COMMIT]
+DetectTable = Annotated[Functions, DETECT]
+LawTable = Annotated[Functions, LAW]
 MeetsTable = Annotated[Functions, MEETS]
 WatchTable = Annotated[Functions, CCD_NEIGHBOURS]
 ImpulseTable = EnergyTable

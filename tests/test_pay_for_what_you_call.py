@@ -248,7 +248,7 @@ TABLES = {
     "rupture": {"strength": 1e9},
     "fold": {"ratio": 0.5, "gap": 0.0},
 }
-SOLVED = ("what touches", "forces before", "sweep", "power")
+SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
 LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}

@@ -232,7 +232,7 @@ class Arrays:
             self._items[index, 0] = 0
 
     def __del__(self):
-        if sys.is_finalizing():
+        if sys is None or sys.is_finalizing():
             return
         for index in range(len(self)):
             self._give_back(index)

@@ -25,7 +25,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import blind_to_carried
 from ..errors import InputError
 from ..registry import INTEGRATORS, load
 from ..settings import Dynamic
@@ -68,9 +67,6 @@ def decided(scene, system):
     if net.order > 1 or net.consistent_minus_lumped is not None:
         what = f"order {net.order}" if net.order > 1 else "a consistent mass"
         return Choice(given_to(scene, "cvode", family=family), f"{what} is not for explicit steps")
-    if losing := blind_to_carried(system):
-        why = f"[{losing[0].name}] has losses, and bodies carry nodes, which explicit steps do not take together"
-        return Choice(given_to(scene, "cvode", family=family), why)
     bound = _bound(system)
     corners = np.searchsorted(system.corners, scene.solve.duration)
     steps = max(scene.solve.duration / (0.5 * bound), float(corners))

@@ -29,8 +29,6 @@ TENSION, STRAIN, POWER = range(3)
 """Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
 
 
-CELL = 0
-"""Column of what touches that has the number of the cell, in all families whose kicks are solved for."""
 OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
 """Columns of what families of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
 a loss; the first of three of the force on the body that `Family.felt` names [N]; and their number."""
@@ -42,28 +40,22 @@ force on the body [N]; the element of that depth, −1 where nothing touches; an
 
 
 class ImplicitContactKernels(NamedTuple):
-    """Kernels that solve for losses where an explicit method kicks velocities.
+    """Kernels that solve for losses where an explicit method kicks velocities, see `refweb.effects.contact_solver`.
 
     Attributes
     ----------
-    detect, recall, sweep, commit : kernel
-        What touches, its forces in the step before, one sweep over it, and its power; signatures are in
-        `refweb.kernels`. Families that stand together and have the same ``sweep`` are swept together.
-    width : int
-        Number of columns of what touches.
-    memory : int
-        Number of columns that a cell has in the memory of a step.
-    carried : bool
-        Whether they know of nodes that bodies carry; to others these stand still.
+    detect, law : kernel
+        Detection of contacts, and their law; signatures are in `refweb.kernels`.
+    slots : int
+        Number of contacts of a cell that are remembered until the next step.
+    parts : int
+        Largest number of rows that a contact moves where no body carries a node.
     """
 
     detect: Callable
-    recall: Callable
-    sweep: Callable
-    commit: Callable
-    width: int
-    memory: int
-    carried: bool = False
+    law: Callable
+    slots: int
+    parts: int = 4
 
 
 class Crossing(NamedTuple):
@@ -213,12 +205,6 @@ class Family:
     def dead(self):
         """True for a load that follows from time alone, with a power and a potential."""
         return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
-
-
-def blind_to_carried(system):
-    """Families of a system with nodes that bodies carry, whose kicks are solved as if these stood still."""
-    solved = [family for family in system.families if family.rubbing is not None and not family.rubbing.carried]
-    return [family for family in solved if system.carried[family.cells].any()]
 
 
 def pairs_of(system):

@@ -1,4 +1,4 @@
-"""Losses where things touch, solved for contact by contact, where an explicit method kicks velocities.
+"""Losses where things touch and drag, solved for contact by contact, where an explicit method kicks velocities.
 
 A kick of size h leaves positions where they are. Of the velocities v⁻ ahead of it and v⁺ behind it, the impulses
 of contacts that act at once are to follow: with the relative velocity u = J v of a contact, its force F(u) of
@@ -23,6 +23,11 @@ takes the slip away instead of turning it round: θ(z) = 1/(1 − e⁻ᶻ) − 1
 power at v = ½ (v⁻ + v⁺), and this power is what is booked: it closes the book whether sweeps have converged or not.
 Where it would be positive at a contact, whose slip turns round within the kick, θ is ½ there: F(u)·u is never positive.
 
+All kinds of contact are one record, `refweb.kernels.CONTACT`: lines on bodies, bodies on bodies, lines on lines, and
+nodes in a fluid. A force term has a kernel that detects its contacts and another that is their law, the force of one of
+them where all others stay; friction with damping is `friction_law`. Where bodies carry nodes by ``[[attach]]``, a force
+on such a node is one on the body and a moment: rows of the node are replaced by those of the body, see `carry`.
+
 References
 ----------
 .. [1] M. Jean, "The non-smooth contact dynamics method", Comput. Methods Appl. Mech. Engrg. 177 (1999) 235–257,
@@ -31,24 +36,174 @@ References
 
 from __future__ import annotations
 
-import functools
 import math
 
-from ..kernels import COMMIT, GAUSS_SEIDEL, WARM_START, kernel
-from .base import CELL, FELT
+from ..kernels import LAW, ContactArray, Integers, Matrix, PartArray, kernel
+from ..net.rotation import RigidRotations, matrix_at, times, times_transposed
+from .base import FELT
+from .vectors import cross, dot, solve
 
-ROWS, SHARES, AXES, LEVERS, START = 1, 5, 7, 16, 25
-"""Columns of what touches, behind its cell: rows of the nodes, the body and its rotation, −1 without; shares of the
-nodes; the normal and two tangents; what the velocity of the rotation adds to u along each; u⁻ along each [m/s]."""
-OWN, MIXED, PUSH, DAMPING, FRICTION, SLIP = 28, 31, 33, 34, 35, 36
-"""J M⁻¹ Jᵀ of each direction [1/kg], and of the normal with each tangent; N₀ [N], d [s/m], μ and v_s [m/s]."""
-FORCES, THETA, SLOT, ARMS, WIDTH = 37, 40, 42, 43, 52
-"""F along each direction [N], θ of the normal and of the tangents, slot in the memory of a cell; what a force along
-each direction adds to the moment on the body; number of columns."""
-SLOTS, NOTED = 3, 4
-"""Contacts that a cell has at most, and what is remembered of each: the number of the step, and F [N]."""
 SETTLING = 1
 """Number of sweeps after which θ stays: forces of the step before are known, and a second changes nothing."""
+UNMIXED = 1e-15
+"""Share of J M⁻¹ Jᵀ along the tangents below which their mixed term is rounding."""
+
+
+# Contacts
+
+
+@kernel(forceinline=True)
+def set_part(part, row, i, rate, force):
+    """Write what a row has of direction i of a contact in J and in Jᵀ."""
+    part.row = row
+    for k in range(3):
+        part.jacobian[i, k], part.transpose[i, k] = rate[k], force[k]
+
+
+@kernel(forceinline=True)
+def set_basis(contact, normal):
+    """Write the normal of a contact, and two tangents."""
+    e = cross(normal, (1.0, 0.0, 0.0) if abs(normal[0]) < 0.6 else (0.0, 1.0, 0.0))
+    size = math.sqrt(dot(e, e))
+    e = e[0] / size, e[1] / size, e[2] / size
+    h = cross(normal, e)
+    for k in range(3):
+        contact.basis[0, k], contact.basis[1, k], contact.basis[2, k] = normal[k], e[k], h[k]
+
+
+@kernel(forceinline=True)
+def direction(contact, i):
+    """Direction i of a contact."""
+    return contact.basis[i, 0], contact.basis[i, 1], contact.basis[i, 2]
+
+
+@kernel(forceinline=True)
+def relative_velocity(contact, parts, v):
+    """Components of u along the directions [m/s], of velocities v (rows, 3)."""
+    p = q = s = 0.0
+    for m in range(contact.first, contact.first + contact.count):
+        row, rate = parts[m].row, parts[m].jacobian
+        for k in range(3):
+            p, q, s = p + rate[0, k] * v[row, k], q + rate[1, k] * v[row, k], s + rate[2, k] * v[row, k]
+    return p, q, s
+
+
+@kernel(forceinline=True)
+def acceleration(contact, parts, f, inverse):
+    """Components of du/dt along the directions [m/s²] by forces f."""
+    p = q = s = 0.0
+    for m in range(contact.first, contact.first + contact.count):
+        row, rate = parts[m].row, parts[m].jacobian
+        for k in range(3):
+            a = inverse[row, k] * f[row, k]
+            p, q, s = p + rate[0, k] * a, q + rate[1, k] * a, s + rate[2, k] * a
+    return p, q, s
+
+
+@kernel(forceinline=True)
+def apply_force(contact, parts, p, q, s, f):
+    """Add a force along the three directions to those on all rows."""
+    for m in range(contact.first, contact.first + contact.count):
+        row, by = parts[m].row, parts[m].transpose
+        for k in range(3):
+            f[row, k] += p * by[0, k] + q * by[1, k] + s * by[2, k]
+
+
+@kernel(forceinline=True)
+def set_delassus(contact, parts, inverse):
+    """Write J M⁻¹ Jᵀ."""
+    d00 = d01 = d02 = d11 = d12 = d22 = 0.0
+    for m in range(contact.first, contact.first + contact.count):
+        row, rate, by = parts[m].row, parts[m].jacobian, parts[m].transpose
+        for k in range(3):
+            p, q, s = by[0, k] * inverse[row, k], by[1, k] * inverse[row, k], by[2, k] * inverse[row, k]
+            d00, d01, d02 = d00 + rate[0, k] * p, d01 + rate[0, k] * q, d02 + rate[0, k] * s
+            d11, d12, d22 = d11 + rate[1, k] * q, d12 + rate[1, k] * s, d22 + rate[2, k] * s
+    block = contact.delassus
+    block[0, 0], block[1, 1], block[2, 2] = d00, d11, d22
+    block[0, 1] = block[1, 0] = d01
+    block[0, 2] = block[2, 0] = d02
+    block[1, 2] = block[2, 1] = d12
+
+
+@kernel(forceinline=True)
+def turn_tangents(vectors, cosine, sine):
+    """Turn the second and third of some vectors (3, 3) in their plane."""
+    for k in range(3):
+        first, second = vectors[1, k], vectors[2, k]
+        vectors[1, k], vectors[2, k] = cosine * first + sine * second, cosine * second - sine * first
+
+
+@kernel(leaf=True)
+def prepare(h, n, v, inverse, contacts, parts):
+    """Write what the solver asks of contact n, with tangents between which J M⁻¹ Jᵀ has no mixed term."""
+    contact = contacts[n]
+    if contact.group == 0:
+        return
+    set_delassus(contact, parts, inverse)
+    block = contact.delassus
+    if contact.normal_force > 0.0 and abs(block[1, 2]) > UNMIXED * (block[1, 1] + block[2, 2]):
+        angle = 0.5 * math.atan2(2.0 * block[1, 2], block[1, 1] - block[2, 2])
+        cosine, sine = math.cos(angle), math.sin(angle)
+        turn_tangents(contact.basis, cosine, sine)
+        for m in range(contact.first, contact.first + contact.count):
+            turn_tangents(parts[m].jacobian, cosine, sine)
+            turn_tangents(parts[m].transpose, cosine, sine)
+        set_delassus(contact, parts, inverse)
+    u = relative_velocity(contact, parts, v)
+    for i in range(3):
+        contact.velocity[i], contact.force[i] = u[i] - contact.wind[i], 0.0
+    contact.theta[0], contact.theta[1] = 1.0, 1.0
+    if contact.damping > 0.0:
+        contact.theta[0] = fitted(h * block[0, 0] * contact.normal_force * contact.damping)
+
+
+@kernel(forceinline=True)
+def add_part(contact, parts, row, i, rate, force):
+    """Add what a row has of direction i of a contact to its part, which is new where it has none."""
+    m, end = contact.first, contact.first + contact.count
+    while m < end and parts[m].row != row:
+        m += 1
+    if m == end:
+        contact.count += 1
+        for j in range(3):
+            set_part(parts[m], row, j, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    for k in range(3):
+        parts[m].jacobian[i, k] += rate[k]
+        parts[m].transpose[i, k] += force[k]
+
+
+@kernel(apart=("carried",))
+def carry(
+    n: int, x: Matrix, carriers: Integers, turns: RigidRotations, contacts: ContactArray, parts: PartArray
+) -> None:
+    """Let bodies feel contact n at the nodes that they carry.
+
+    Such a node, at the arm a from the centre of mass, has the velocity v + ω × a, and a force p on it is p and the
+    moment a × p on the body. In the rows of `refweb.net.rotation` ω is W times the velocity of the rotation, W along
+    the axes of space. The force stands at the node as well, which has no velocity of its own.
+    """
+    contact = contacts[n]
+    for m in range(contact.first, contact.first + contact.count):
+        number = carriers[parts[m].row]
+        if number < 0:
+            continue
+        b = turns.carried[number, 1]
+        row, spin, turn = turns.rows[b, 0], turns.rows[b, 1], turns.rows[b, 2]
+        turned, w = matrix_at(x, spin, turn), turns.mobility[b]
+        mobility = (w[0, 0], w[0, 1], w[0, 2]), (w[1, 0], w[1, 1], w[1, 2]), (w[2, 0], w[2, 1], w[2, 2])
+        arm = times(turned, (turns.arms[number, 0], turns.arms[number, 1], turns.arms[number, 2]))
+        for i in range(3):
+            g = parts[m].transpose[i, 0], parts[m].transpose[i, 1], parts[m].transpose[i, 2]
+            moment = cross(arm, g)
+            add_part(contact, parts, row, i, g, g)
+            turning = times(turned, times(mobility, times_transposed(turned, moment)))
+            add_part(contact, parts, spin, i, turning, moment)
+            for k in range(3):
+                parts[m].jacobian[i, k] = 0.0
+
+
+# The law of damping and friction
 
 
 @kernel()
@@ -75,34 +230,32 @@ def slip_size(b, c, y, z, slip):
 
 
 @kernel(forceinline=True)
-def solve_normal(touches, n, h, rate):
+def solve_normal(contact, h, rate):
     """(force along the normal, N) where the others alone would speed the contact up by ``rate`` [m/s²]."""
-    push, damping, weight = touches[n, PUSH], touches[n, DAMPING], touches[n, OWN]
-    if damping == 0.0:
-        return 0.0, push
+    push, weight = contact.normal_force, contact.delassus[0, 0]
     while True:
-        theta = touches[n, THETA]
-        start = touches[n, START] + theta * h * rate
-        u = start / (1.0 + theta * h * weight * push * damping)
-        damped = damping * u
+        theta = contact.theta[0]
+        start = contact.velocity[0] + theta * h * rate
+        u = start / (1.0 + theta * h * weight * push * contact.damping)
+        damped = contact.damping * u
         if damped < -1.0:
             damped = -1.0
         force = -push * damped
-        if theta == 0.5 or damped * (touches[n, START] + 0.5 * h * (rate + weight * force)) >= 0.0:
+        if theta == 0.5 or damped * (contact.velocity[0] + 0.5 * h * (rate + weight * force)) >= 0.0:
             return force, push * (1.0 + damped)
-        touches[n, THETA] = 0.5
+        contact.theta[0] = 0.5
 
 
 @kernel(forceinline=True)
-def solve_tangents(touches, n, h, drag, first, last, settling):
+def solve_tangents(contact, h, drag, first, last, settling):
     """Friction along both tangents, of μ N = ``drag``, where the others alone would speed it up by first and last."""
-    slip, first_weight, second = touches[n, SLIP], h * touches[n, OWN + 1], h * touches[n, OWN + 2]
-    u, w = touches[n, START + 1], touches[n, START + 2]
+    slip, first_weight, second = contact.slip_velocity, h * contact.delassus[1, 1], h * contact.delassus[2, 2]
+    u, w = contact.velocity[1], contact.velocity[2]
     if settling:
         r = slip_size(u + h * first, w + h * last, first_weight * drag, second * drag, slip)
-        touches[n, THETA + 1] = fitted(max(first_weight, second) * drag / r)
+        contact.theta[1] = fitted(max(first_weight, second) * drag / r)
     while True:
-        theta = touches[n, THETA + 1]
+        theta = contact.theta[1]
         b, c, y, z = u + theta * h * first, w + theta * h * last, theta * first_weight * drag, theta * second * drag
         r = slip_size(b, c, y, z, slip)
         b, c = b / (r + y), c / (r + z)
@@ -112,97 +265,99 @@ def solve_tangents(touches, n, h, drag, first, last, settling):
         mean, more = u + 0.5 * (h * first + first_weight * force[0]), w + 0.5 * (h * last + second * force[1])
         if b * mean + c * more >= 0.0:
             return force
-        touches[n, THETA + 1] = 0.5
+        contact.theta[1] = 0.5
 
 
-@kernel()
-def turned_from(memory, c, at, touches, n):
-    """Components along the directions of a contact of the vector that a row of a memory holds."""
-    p = q = s = 0.0
-    for k in range(3):
-        p += memory[c, at + k] * touches[n, AXES + k]
-        q += memory[c, at + k] * touches[n, AXES + 3 + k]
-        s += memory[c, at + k] * touches[n, AXES + 6 + k]
-    return p, q, s
+@kernel(LAW, leaf=True)
+def friction_law(h, number, n, f, inverse, contacts, parts):
+    """Law of a contact that pushes: damping along its normal, friction along its tangents."""
+    contact = contacts[n]
+    if not contact.normal_force > 0.0:
+        return 0.0
+    before = contact.force[0], contact.force[1], contact.force[2]
+    rate = acceleration(contact, parts, f, inverse)
+    p, normal, change = 0.0, contact.normal_force, 0.0
+    if contact.damping > 0.0:
+        weight = contact.delassus[0, 0]
+        p, normal = solve_normal(contact, h, rate[0] - weight * before[0])
+        change = h * weight * abs(p - before[0])
+    q = s = 0.0
+    drag = contact.friction * normal
+    if drag > 0.0:
+        first_weight, second = contact.delassus[1, 1], contact.delassus[2, 2]
+        first = rate[1] + contact.delassus[1, 0] * (p - before[0]) - first_weight * before[1]
+        last = rate[2] + contact.delassus[2, 0] * (p - before[0]) - second * before[2]
+        q, s = solve_tangents(contact, h, drag, first, last, number < SETTLING)
+        change = max(change, h * first_weight * abs(q - before[1]), h * second * abs(s - before[2]))
+    contact.force[0], contact.force[1], contact.force[2] = p, q, s
+    apply_force(contact, parts, p - before[0], q - before[1], s - before[2], f)
+    return change
 
 
-@functools.cache
-def sweeping(moved, apply_force):
-    """The kernel that solves contacts in turn.
-
-    Parameters
-    ----------
-    moved : kernel
-        ``(touches, n, i, f, inverse)``: component along direction i of the acceleration by forces f at contact n.
-    apply_force : kernel
-        ``(touches, n, p, q, s, f)``: adds a force along the three directions of contact n to f.
-    """
-
-    @kernel(GAUSS_SEIDEL)
-    def sweep(h, number, f, inverse, touches, count):
-        """Solve contacts in turn, backwards where ``number`` is odd; the largest change of a velocity [m/s]."""
-        largest = 0.0
-        for m in range(count):
-            n = count - 1 - m if number % 2 else m
-            if not touches[n, PUSH] > 0.0:
-                continue
-            was = touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2]
-            p, normal = 0.0, touches[n, PUSH]
-            if touches[n, DAMPING] > 0.0:
-                weight, rate = touches[n, OWN], moved(touches, n, 0, f, inverse)
-                p, normal = solve_normal(touches, n, h, rate - weight * was[0])
-                largest = max(largest, h * weight * abs(p - was[0]))
-            q = s = 0.0
-            drag = touches[n, FRICTION] * normal
-            if drag > 0.0:
-                first_weight, second = touches[n, OWN + 1], touches[n, OWN + 2]
-                first = moved(touches, n, 1, f, inverse) + touches[n, MIXED] * (p - was[0]) - first_weight * was[1]
-                last = moved(touches, n, 2, f, inverse) + touches[n, MIXED + 1] * (p - was[0]) - second * was[2]
-                q, s = solve_tangents(touches, n, h, drag, first, last, number < SETTLING)
-                largest = max(largest, h * first_weight * abs(q - was[1]), h * second * abs(s - was[2]))
-            touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2] = p, q, s
-            apply_force(touches, n, p - was[0], q - was[1], s - was[2], f)
-        return largest
-
-    return sweep
+# The steps of the solver
 
 
-@functools.cache
-def warm_start(along, apply_force):
-    """The kernels that begin with the forces of the step before, and that note them with their power.
+@kernel(leaf=True)
+def gauss_seidel(h, number, f, inverse, contacts, parts, count, laws):
+    """Solve contacts in turn, backwards where ``number`` is odd; the largest change of a velocity [m/s]."""
+    largest = 0.0
+    for m in range(count):
+        n = count - 1 - m if number % 2 else m
+        largest = max(largest, laws[contacts[n].term](h, number, n, f, inverse, contacts, parts))
+    return largest
 
-    Parameters
-    ----------
-    along : kernel
-        ``(touches, n, i, rows)``: component along direction i of u, of velocities (rows, 3).
-    apply_force : kernel
-        See `sweeping`.
-    """
 
-    @kernel(WARM_START)
-    def recall(number, memory, f, touches, begin, end):
-        """Begin with the forces of the step before: what sticks then takes few sweeps."""
-        for n in range(begin, end):
-            c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
-            if memory[c, at] == number - 1:
-                force = turned_from(memory, c, at + 1, touches, n)
-                touches[n, FORCES], touches[n, FORCES + 1], touches[n, FORCES + 2] = force
-                apply_force(touches, n, force[0], force[1], force[2], f)
+@kernel(forceinline=True)
+def slot_of(memory, contact):
+    """Slot of a contact in the memory of its cell: that of its tag, a free one, or that of the oldest step."""
+    slots, oldest = memory.shape[1], contact.tag % memory.shape[1]
+    for s in range(slots):
+        slot = (contact.tag + s) % slots
+        step = memory[contact.cell, slot].step
+        if step == 0 or memory[contact.cell, slot].tag == contact.tag:
+            return slot
+        if step < memory[contact.cell, oldest].step:
+            oldest = slot
+    return oldest
 
-    @kernel(COMMIT)
-    def commit(number, memory, v, touches, begin, end, out):
-        """Write the power of each cell at the velocities v, with the force that a body feels; remember forces."""
-        out[:] = 0.0
-        for n in range(begin, end):
-            c, at = int(touches[n, CELL]), NOTED * int(touches[n, SLOT])
-            memory[c, at] = number
-            for k in range(3):
-                memory[c, at + 1 + k] = 0.0
-                for i in range(3):
-                    memory[c, at + 1 + k] += touches[n, FORCES + i] * touches[n, AXES + 3 * i + k]
-            for k in range(out.shape[1] - FELT):
-                out[c, FELT + k] -= memory[c, at + 1 + k]
-            for i in range(3):
-                out[c, 0] += touches[n, FORCES + i] * along(touches, n, i, v)
 
-    return recall, commit
+@kernel(leaf=True)
+def forget(memory):
+    """Forget the forces of all steps."""
+    for c in range(memory.shape[0]):
+        for slot in range(memory.shape[1]):
+            memory[c, slot].step = 0
+
+
+@kernel(leaf=True)
+def warm_start(number, memory, f, contacts, parts, begin, end):
+    """Begin with the forces of the step before ``number``: what sticks then takes few sweeps."""
+    for n in range(begin, end):
+        contact = contacts[n]
+        if contact.group == 0:
+            continue
+        past = memory[contact.cell, slot_of(memory, contact)]
+        if past.tag != contact.tag or past.step != number - 1 or number == 1:
+            continue
+        a, b, c = direction(contact, 0), direction(contact, 1), direction(contact, 2)
+        p, q, s = solve(a, b, c, (past.force[0], past.force[1], past.force[2]))
+        contact.force[0], contact.force[1], contact.force[2] = p, q, s
+        apply_force(contact, parts, p, q, s, f)
+
+
+@kernel(leaf=True)
+def commit(number, memory, v, contacts, parts, begin, end, out):
+    """Write the power of each cell at the velocities v, with the force that a body feels; remember forces."""
+    out[:] = 0.0
+    for n in range(begin, end):
+        contact = contacts[n]
+        if contact.group == 0:
+            continue
+        p, q, s = contact.force[0], contact.force[1], contact.force[2]
+        past = memory[contact.cell, slot_of(memory, contact)]
+        past.tag, past.step = contact.tag, number
+        for k in range(3):
+            past.force[k] = p * contact.basis[0, k] + q * contact.basis[1, k] + s * contact.basis[2, k]
+        out[contact.cell, 0] += dot((p, q, s), relative_velocity(contact, parts, v))
+        for k in range(out.shape[1] - FELT):
+            out[contact.cell, FELT + k] -= past.force[k]

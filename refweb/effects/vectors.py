@@ -13,3 +13,16 @@ def cross(a, b):
 @kernel()
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel()
+def add(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel()
+def solve(a, b, c, r):
+    """Numbers p, q, s with p a + q b + s c = r, by Cramer's rule."""
+    bc = cross(b, c)
+    inverse = 1.0 / dot(a, bc)
+    return inverse * dot(r, bc), inverse * dot(r, cross(c, a)), inverse * dot(r, cross(a, b))

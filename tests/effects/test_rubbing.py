@@ -5,12 +5,13 @@ from dataclasses import replace
 import nets
 import numpy as np
 import pytest
+from contact_kicks import Solved
 from scipy.optimize import brentq
 
 import refweb
 from refweb.dynamics.integrators.central_difference import CentralDifference
-from refweb.effects.base import CONTACT_COLUMNS, FELT, OWN
-from refweb.effects.contact_solver import CELL, DAMPING, FRICTION, ROWS, SHARES, THETA, fitted
+from refweb.effects.base import CONTACT_COLUMNS
+from refweb.effects.contact_solver import fitted
 
 GRAVITY = 9.81
 SLIPS = (1e-9, 1e-4, 1e-2, 1.0)
@@ -66,28 +67,21 @@ class Kick:
         self.h = float(10.0 ** rng.uniform(-5, -1))
         self.f = loaded * 10.0 * rng.standard_normal(shown)
         (self.family,) = (one for one in system.families if one.rubbing is not None)
-        meet, _, sweep, give, width, memory, _ = self.family.rubbing
-        self.touches, total, self.sweeps = np.zeros((40, width)), self.f.copy(), 0
-        where = self.family.cells, self.family.data, self.touches
-        self.count = meet(self.h, self.x, self.v, self.inverse, *where, 0)
-        for self.sweeps in range(1000):
-            change = sweep(self.h, self.sweeps, total, self.inverse, self.touches, self.count)
-            if not change > 1e-15 * np.abs(self.v).max():
-                break
-        self.own, self.after = total - self.f, self.v + self.h * self.inverse * total
-        self.mean, out = 0.5 * (self.v + self.after), np.ones((len(self.family.cells), CONTACT_COLUMNS))
-        give(1, np.zeros((len(out), memory)), self.mean, self.touches, 0, self.count, out)
-        self.power, self.felt = out[:, OWN].sum(), out[:, FELT:].sum(axis=0)
+        solved = Solved(system, self.x, self.v, self.h, self.f, self.mass)
+        self.contacts, self.rows, self.sweeps = solved.contacts, solved.rows, solved.sweeps
+        self.own, self.after, self.mean = solved.forces, solved.after, solved.mean
+        self.power, self.felt = solved.power, solved.felt
 
     def by_law(self, column):
         """The forces of all contacts as the law has them at the velocities that each sees, with its own θ."""
-        total, touches = np.zeros_like(self.f), self.touches[: self.count]
+        total = np.zeros_like(self.f)
         for n, rows in enumerate(self.family.cells):
-            own = touches[:, CELL] == n
-            nodes = np.where(touches[:, SHARES] == 1.0, touches[:, ROWS], touches[:, ROWS + 1])
-            at_node = (touches[:, SHARES : SHARES + 2] == 1.0).any(axis=1) & np.isin(nodes, rows[:2])
-            for touch in touches[own if own.any() else at_node]:  # lines that end at a node touch there as one
-                theta = touch[column]
+            own = self.contacts["cell"] == n
+            at_node = [
+                self.rows(contact)[1] == rows[2] and self.rows(contact)[0] in rows[:2] for contact in self.contacts
+            ]
+            for contact in self.contacts[own if own.any() else at_node]:  # lines that end at a node touch there as one
+                theta = contact["theta"][column]
                 seen = (1.0 - theta) * self.v + theta * self.after
                 one = self.family.cells[n : n + 1], self.family.data[n : n + 1], np.zeros((1, CONTACT_COLUMNS))
                 self.family.force(0.0, self.x, seen, total, *one)
@@ -97,8 +91,8 @@ class Kick:
 def kicks(shape, slip, **more):
     """Kicks of 25 random states, half of them under other forces, that touch."""
     made = [Kick(shape, seed, seed % 2 == 0, slip_velocity=slip, **more) for seed in range(25)]
-    made = [kick for kick in made if kick.count]
-    assert len(made) > 20 and max(kick.count for kick in made) > 4  # some share a node, all a body
+    made = [kick for kick in made if len(kick.contacts)]
+    assert len(made) > 20 and max(len(kick.contacts) for kick in made) > 4  # some share a node, all a body
     return made
 
 
@@ -132,16 +126,16 @@ def test_momenta_are_kept(shape):
         assert np.abs(axes @ moment).max() <= 1e-11 * most
 
 
-@pytest.mark.parametrize("column, loss", [(THETA + 1, dict(friction=0.5)), (THETA, dict(damping=0.3))])
+@pytest.mark.parametrize("column, loss", [(1, dict(friction=0.5)), (0, dict(damping=0.3))])
 def test_forces_are_those_of_the_law(column, loss):
     """All at once, with the velocities that contacts see, of which θ says the share of those behind the kick."""
     found = [kick for kick in kicks("sphere", 1.0, **loss) if kick.sweeps < 500]
     assert len(found) > 10
     for kick in found:
-        theta = kick.touches[: kick.count, column]
+        theta = kick.contacts["theta"][:, column]
         assert (theta >= 0.5).all() and (theta <= 1.0).all()
         np.testing.assert_allclose(kick.by_law(column), kick.own, rtol=0, atol=1e-8 * np.abs(kick.own).max())
-    assert (found[0].touches[: found[0].count, [DAMPING, FRICTION]] > 0.0).any(axis=0).sum() == 1
+    assert sum((found[0].contacts[name] > 0.0).any() for name in ("damping", "friction")) == 1
 
 
 def test_a_loss_alone_is_exact():

@@ -18,9 +18,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...compiled.kernel import prepare
-from ...effects.base import blind_to_carried
 from ...errors import EnergyDriftError, InputError, IntegrationError, SolverError
-from ...kernels import MATRIX, Arrays
+from ...kernels import CONTACT, CONTACTS, PART, PARTS, Arrays
 from .averages import begin_averages
 from .ccd import look_anew
 from .dense_output import LOOKS
@@ -98,15 +97,10 @@ class CentralDifference(Integrator):
             raise InputError(
                 f"node {bare[0]} has no mass, which {self.method} needs: give density > 0 or a [[point_mass]]"
             )
-        for family in blind_to_carried(system):
-            raise InputError(
-                f"[{family.name}] has losses that {self.method} solves for node by node, which a body that carries "
-                'nodes by [[attach]] does not allow: use method = "cvode", or leave them out'
-            )
         self._outs = outs = tuple(system.per_cell())
         self._model = Model.of(system, outs)
         self._observed = Observed.of(probes, sums, outs, self._model.contacts)
-        self._touches = Arrays(MATRIX, [np.empty((0, self._model.implicit_contacts.width))])
+        self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
         self._events, self._least_energy, self._taken, self._prepared = (
             event_rows(events),
             least_energy(net),
@@ -243,7 +237,7 @@ class CentralDifference(Integrator):
         clock["least_energy"] = self._least_energy
         changing = len(self._model.reels.lengths)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
-        carried = course.power, np.zeros((2, changing)), course.crossings, self._touches
+        carried = course.power, np.zeros((2, changing)), course.crossings, *self._contacts
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
 
     def advance(self, course: ExplicitState, times):

@@ -184,7 +184,7 @@ def run_steps(
             show_near(nearby, families)
         add_forces_to_bodies(x, f, turns)
         if rubbing.size:
-            contact_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.touches, model)
+            contact_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.contacts, running.parts, model)
         elif viscous.size:
             viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
         else:

@@ -1,4 +1,4 @@
-"""Families whose kicks an explicit step solves for: their record, and what is done for all of them in turn.
+"""Force terms whose kicks an explicit step solves for: their record, and the detection of their contacts.
 
 Losses of contact act where its push does, and that push has just been found: of lines with a body only those that show
 a depth there are looked at.
@@ -8,24 +8,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from ... import kernels as k
-from ...effects.base import CELL
+from ...effects.contact_solver import carry, prepare
 from ...kernels import (
+    CONTACT,
+    DETECT,
     INTEGERS,
-    MATRIX,
+    LAW,
+    MEMORIES,
+    MEMORY,
+    PART,
     Arrays,
+    DetectTable,
     Functions,
-    GiveTable,
     Integers,
     IntegerTable,
-    KeptTable,
-    MatrixTable,
-    MeetTable,
+    LawTable,
+    MemoryTable,
     Record,
-    SweepTable,
     kernel,
 )
 from .neighbour_list import near_of, rows_of
+
+CARRIED = 3
+"""Parts that one of a carried node becomes: its own, that of the body, and that of its rotation."""
 
 
 class ImplicitContacts(Record):
@@ -34,52 +39,51 @@ class ImplicitContacts(Record):
     Attributes
     ----------
     families : ndarray of int
-        Their numbers; ``last`` are the places among these where runs of families with one sweep end.
-    meets, recalls, sweeps, gives, memories : table
-        Their kernels, see `refweb.effects.base.ImplicitContactKernels`, and what is remembered of the step before,
-        within a row.
-    depths, elements : ndarray of int, List
-        Which ``outs`` of `refweb.dynamics.integrators.records.Families` has depths, −1 for those that have none, and
-        for each cell the row in it.
+        Their numbers.
+    detects, laws : table
+        Their kernels, see `refweb.effects.base.ImplicitContactKernels`.
+    memories : table
+        Forces of the step before, within a row: `refweb.kernels.MEMORY` for each cell and slot.
+    depths : ndarray of int
+        The ``outs`` of `refweb.dynamics.integrators.records.Families` that has depths, −1 for those that have none.
+    elements : table
+        For each cell the row in it.
+    parts : int
+        Largest number of parts of a contact.
     pieces : int
         Number of cells of a line, which are looked at together.
-    width : int
-        Number of columns of what touches.
+    carriers : ndarray of int
+        Number of each row among the nodes that bodies carry, −1 for others; empty where no node is carried.
     """
 
     families: Integers
-    meets: MeetTable
-    recalls: KeptTable
-    sweeps: SweepTable
-    gives: GiveTable
-    memories: MatrixTable
-    last: Integers
+    detects: DetectTable
+    laws: LawTable
+    memories: MemoryTable
     depths: Integers
     elements: IntegerTable
+    parts: int
     pieces: int
-    width: int
+    carriers: Integers
 
     @classmethod
-    def of(cls, system):
-        """Those of a system."""
+    def of(cls, system, turns):
+        """Those of a system; ``turns`` are its `refweb.net.rotation.RigidRotations`."""
         families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
         terms = [system.families[i] for i in families]
-        rubbing = [family.rubbing for family in terms]
-        sweeps = [kernels_.sweep for kernels_ in rubbing]
-        last = [i for i, sweep in enumerate(sweeps) if sweeps[i + 1 : i + 2] != [sweep]]
-        depths = [depths_of(system, family) for family in terms]
+        depths = [depths_of(system, term) for term in terms]
+        carriers = np.full(system.rows if len(turns.carried) else 0, -1)
+        carriers[turns.carried[:, 0]] = np.arange(len(turns.carried))
         return cls(
             families=np.array(families, dtype=np.int64),
-            meets=Functions(k.DETECT, [kernels_.detect for kernels_ in rubbing]),
-            recalls=Functions(k.WARM_START, [kernels_.recall for kernels_ in rubbing]),
-            sweeps=Functions(k.GAUSS_SEIDEL, sweeps),
-            gives=Functions(k.COMMIT, [kernels_.commit for kernels_ in rubbing]),
-            last=np.array(last, dtype=np.int64),
-            memories=Arrays(MATRIX, [np.zeros((len(f.cells), f.rubbing.memory)) for f in terms]),
+            detects=Functions(DETECT, [term.rubbing.detect for term in terms]),
+            laws=Functions(LAW, [term.rubbing.law for term in terms]),
+            memories=Arrays(MEMORIES, [np.zeros((len(f.cells), f.rubbing.slots), dtype=MEMORY) for f in terms]),
             depths=np.array([number for number, _ in depths], dtype=np.int64),
             elements=Arrays(INTEGERS, [elements for _, elements in depths]),
+            parts=(1 if len(turns.carried) == 0 else CARRIED) * max((term.rubbing.parts for term in terms), default=0),
             pieces=system.net.subdivide,
-            width=max((kernels_.width for kernels_ in rubbing), default=0),
+            carriers=carriers,
         )
 
 
@@ -113,25 +117,42 @@ def lines_in_touch(depths, elements, pieces):
 
 
 @kernel()
-def meet_all(h, x, v, inverse, families, implicit_contacts, touches, ends):
-    """Write all that touches, and to ``ends`` the rows that each family's end at; ``touches``, or a larger one."""
+def detect(m, x, families, implicit_contacts, contacts, parts, begin):
+    """Write the contacts of family m from ``begin`` on; the number behind them."""
+    i, elements = implicit_contacts.families[m], implicit_contacts.depths[m]
+    if elements < 0:
+        return implicit_contacts.detects[m](x, families.cells[i], families.data[i], contacts, parts, begin)
+    chosen = lines_in_touch(families.outs[elements], implicit_contacts.elements[m], implicit_contacts.pieces)
+    cells, data = rows_of(chosen, families.cells[i], families.data[i])
+    end = implicit_contacts.detects[m](x, cells, data, contacts, parts, begin)
+    for n in range(begin, min(end, contacts.size)):
+        contacts[n].cell = chosen[contacts[n].cell]
+    return end
+
+
+@kernel()
+def detect_all(h, x, v, inverse, model, space, parts_space, ends):
+    """Write all contacts, and to ``ends`` the number behind those of each family; (contacts, their parts).
+
+    ``space`` and ``parts_space`` hold arrays for these, and get larger ones where they have no space for all.
+    """
+    implicit_contacts = model.implicit_contacts
     while True:
-        count = 0
+        contacts, parts, count = space[0], parts_space[0], 0
         for m in range(implicit_contacts.families.size):
-            i, begin = implicit_contacts.families[m], count
-            if implicit_contacts.depths[m] < 0:
-                count = implicit_contacts.meets[m](
-                    h, x, v, inverse, families.cells[i], families.data[i], touches, count
-                )
-            else:
-                chosen = lines_in_touch(
-                    families.outs[implicit_contacts.depths[m]], implicit_contacts.elements[m], implicit_contacts.pieces
-                )
-                some, some_data = rows_of(chosen, families.cells[i], families.data[i])
-                count = implicit_contacts.meets[m](h, x, v, inverse, some, some_data, touches, count)
-                for n in range(begin, min(count, touches.shape[0])):
-                    touches[n, CELL] = chosen[int(touches[n, CELL])]
+            begin = count
+            count = detect(m, x, model.families, implicit_contacts, contacts, parts, begin)
             ends[m] = count
-        if count <= touches.shape[0]:
-            return touches
-        touches = np.empty((2 * count, implicit_contacts.width))
+            for n in range(begin, min(count, contacts.size)):
+                contacts[n].term = m
+        if count <= contacts.size:
+            break
+        contacts, parts = np.empty(2 * count, dtype=CONTACT), np.empty(2 * count * implicit_contacts.parts, dtype=PART)
+        for n in range(contacts.size):
+            contacts[n].first = implicit_contacts.parts * n
+        space[0], parts_space[0] = contacts, parts
+    for n in range(count):
+        if implicit_contacts.carriers.size:
+            carry(n, x, implicit_contacts.carriers, model.inertia.turns, contacts, parts)
+        prepare(h, n, v, inverse, contacts, parts)
+    return contacts, parts

@@ -113,6 +113,8 @@ class Outside(Record):
         Reference positions [m], about their mean.
     mass : ndarray, shape (linear rows,)
         Lumped mass [kg].
+    inverse_reach : ndarray, shape (rows of rotation,)
+        Momentum of the parts of a body over its angular momentum, at least [1/m].
     axes : ndarray, shape (axes, 3)
         Unit vectors along which angular momentum is kept.
     rounding : float
@@ -126,6 +128,7 @@ class Outside(Record):
     pushing: Integers
     places: Matrix
     mass: Vector
+    inverse_reach: Vector
     axes: Matrix
     rounding: float
 
@@ -145,9 +148,20 @@ class Outside(Record):
             pushing=np.array(pushing, dtype=np.int64),
             places=net.points[:linear] - net.points[:linear].mean(axis=0),
             mass=net.mass[:linear],
+            inverse_reach=_inverse_reach(net),
             axes=kept_axes(system),
             rounding=float(ROUNDINGS * net.line_data[:, AXIAL_STIFFNESS].sum()),
         )
+
+
+def _inverse_reach(net):
+    """Inverse distance from the centre of a body to its furthest part, by row of rotation [1/m]."""
+    inverse_reach = np.zeros(net.spins)
+    for body in net.bodies:
+        if body.spin is not None:
+            furthest = max([body.extent, *np.linalg.norm(body.points, axis=1)])
+            inverse_reach[body.spin - (len(net.points) - net.spins)] = 1.0 / furthest
+    return inverse_reach
 
 
 def kept_axes(system):
@@ -281,6 +295,9 @@ def note_momentum(
         for k in range(3):
             now[k] += p[r, k]
             moving += abs(p[r, k])
+    for r in range(outside.inverse_reach.size):
+        for k in range(3):
+            moving += outside.inverse_reach[r] * abs(p[outside.mass.size + r, k])
     left = 0.0
     for k in range(3):
         row[k], row[3 + k] = now[k], support[k]

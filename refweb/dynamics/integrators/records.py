@@ -19,6 +19,7 @@ from ...kernels import (
     VECTOR,
     Arrays,
     BoundTable,
+    ContactTable,
     Cube,
     EnergyTable,
     ForceTable,
@@ -30,6 +31,7 @@ from ...kernels import (
     LinesTable,
     Matrix,
     MatrixTable,
+    PartTable,
     Record,
     Vector,
     VectorTable,
@@ -311,7 +313,8 @@ class Model(Record):
     @classmethod
     def of(cls, system, outs):
         """Make the record of a `refweb.system.system.System`, whose families write their values to ``outs``."""
-        forces = Inertia.of(system), Families.of(system, outs), ImplicitContacts.of(system)
+        inertia = Inertia.of(system)
+        forces = inertia, Families.of(system, outs), ImplicitContacts.of(system, inertia.turns)
         changes = Motions.of(system), Reels.of(system), system.corners, Outside.of(system)
         return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
 
@@ -345,8 +348,8 @@ class Running(Record):
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)
         What has met, see `refweb.dynamics.integrators.integrator.IntegratorState`.
-    touches : table
-        One array, space for what touches and is solved for.
+    contacts, parts : table
+        One array each, space for contacts that are solved for and for their parts.
     """
 
     clock: ClockArray
@@ -363,4 +366,5 @@ class Running(Record):
     power: Vector
     length_force: Matrix
     crossings: Matrix
-    touches: MatrixTable
+    contacts: ContactTable
+    parts: PartTable

@@ -7,12 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kernels import Cube, ForceTable, IndexTable, Matrix, MatrixTable, copy_rows, kernel, sum_of
+from ...effects.contact_solver import commit, forget, gauss_seidel, warm_start
+from ...kernels import (
+    ContactTable,
+    Cube,
+    ForceTable,
+    IndexTable,
+    Matrix,
+    MatrixTable,
+    PartTable,
+    copy_rows,
+    kernel,
+    sum_of,
+)
 from ...net.net import LENGTH
 from ...net.rotation import RigidRotations, add_forces_to_bodies, advance_rotation, note_turns, update_attached_nodes
 from .contacts import feel
 from .energy_balance import act
-from .implicit_contacts import meet_all
+from .implicit_contacts import detect_all
 
 if TYPE_CHECKING:
     from .records import Families, Model, Reels, Running
@@ -155,18 +167,20 @@ def contact_kick(
     inverse: Matrix,
     half: Matrix,
     extra: Matrix,
-    memories: MatrixTable,
+    space: ContactTable,
+    parts_space: PartTable,
     model: Model,
 ) -> None:
     """Kick as `viscous_kick` does, with losses of contact that are solved for: they need no bound.
 
     Other forces that depend on velocity are iterated with them. The step is that of a ``number`` of its row, of which
-    the first begins without a memory of another. It writes the power of what rubs; ``memories`` holds what touches.
+    the first begins without a memory of another. The power of each loss is written; ``space`` and ``parts_space`` hold
+    the contacts.
     """
-    families, implicit_contacts, turns = model.families, model.implicit_contacts, model.inertia.turns
+    families, implicit, turns = model.families, model.implicit_contacts, model.inertia.turns
     forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
-    ends = np.zeros(implicit_contacts.families.size, dtype=np.int64)
-    touches = memories[0] = meet_all(h, x, v, inverse, families, implicit_contacts, memories[0], ends)
+    ends = np.zeros(implicit.families.size, dtype=np.int64)
+    contacts, parts = detect_all(h, x, v, inverse, model, space, parts_space, ends)
     count, begin = ends[-1], 0
     copy_rows(v, half)
     flat_half, flat_extra, flat_inverse = half.reshape(-1), extra.reshape(-1), inverse.reshape(-1)
@@ -176,14 +190,14 @@ def contact_kick(
         fastest = max(fastest, abs(flat_v[q]), h * flat_inverse[q] * abs(flat_f[q]))
     for m in range(ends.size):
         if number == 1:
-            implicit_contacts.memories[m][:] = 0.0
-        implicit_contacts.recalls[m](number, implicit_contacts.memories[m], f, touches, begin, ends[m])
+            forget(implicit.memories[m])
+        warm_start(number, implicit.memories[m], f, contacts, parts, begin, ends[m])
         begin = ends[m]
     change, stalled, patience = math.inf, STALLED, 1 if number > 1 else SWEEPS
     if viscous.size:
         stalled, patience = STILL, SWEEPS
     for n in range(ROUNDS if viscous.size else SWEEPS if count else 0):
-        before, change = change, 0.0
+        before = change
         if viscous.size:
             for q in range(flat_f.size):
                 flat_f[q] -= flat_extra[q]
@@ -194,12 +208,7 @@ def contact_kick(
             add_forces_to_bodies(x, extra, turns)
             for q in range(flat_f.size):
                 flat_f[q] += flat_extra[q]
-        begin = 0
-        for m in implicit_contacts.last:
-            change = max(
-                change, implicit_contacts.sweeps[m](h, n, f, inverse, touches[begin : ends[m]], ends[m] - begin)
-            )
-            begin = ends[m]
+        change = gauss_seidel(h, n, f, inverse, contacts, parts, count, implicit.laws)
         if viscous.size:
             for q in range(flat_v.size):
                 if flat_inverse[q] > 0.0:
@@ -211,10 +220,8 @@ def contact_kick(
     copy_rows(half, v)
     update_attached_nodes(x, v, turns)
     begin = 0
-    for m in range(implicit_contacts.families.size):
-        implicit_contacts.gives[m](
-            number, implicit_contacts.memories[m], v, touches, begin, ends[m], outs[implicit_contacts.families[m]]
-        )
+    for m in range(implicit.families.size):
+        commit(number, implicit.memories[m], v, contacts, parts, begin, ends[m], outs[implicit.families[m]])
         begin = ends[m]
 
 

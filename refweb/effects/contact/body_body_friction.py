@@ -13,28 +13,8 @@ import math
 
 from ...kernels import DETECT, STIFFNESS, kernel
 from ...net.rotation import times, times_transposed
-from ..base import CELL, ImplicitContactKernels
-from ..contact_solver import (
-    ARMS,
-    AXES,
-    DAMPING,
-    FORCES,
-    FRICTION,
-    LEVERS,
-    MIXED,
-    NOTED,
-    OWN,
-    PUSH,
-    ROWS,
-    SLIP,
-    SLOT,
-    START,
-    THETA,
-    WIDTH,
-    fitted,
-    sweeping,
-    warm_start,
-)  # fmt: skip
+from ..base import ImplicitContactKernels
+from ..contact_solver import direction, friction_law, set_basis, set_part
 from ..vectors import cross, dot
 from .body_body_detection import (
     DOWN,
@@ -44,72 +24,20 @@ from .body_body_detection import (
     SHARE,
     SIDE,
     SIDES,
+    SLOT,
     SPINS,
     frame_of,
     law_of,
     meeting,
     vector_at,
 )
-from .body_body_detection import SLOT as WHICH
 from .body_body_penalty import force_of, push, slopes_of
 from .contact_points import hessian_times
 from .friction import facing, friction_force, turned_by
-from .line_body_friction import direction, mixture
+from .line_body_friction import levers
 
-LEVERS_OF_SECOND, ARMS_OF_SECOND, WHOLE = WIDTH, WIDTH + 9, WIDTH + 18
-"""Columns of what touches, behind those of `refweb.effects.contact_solver`: as there of the second body, whose row of
-rotation stands last among ``ROWS``; and their number."""
 SLOTS = 3
 """Number of contacts of a part that are remembered."""
-
-
-@kernel(forceinline=True)
-def rows_of(touches, n):
-    """Rows of both bodies and of their rotations, −1 without."""
-    return int(touches[n, ROWS]), int(touches[n, ROWS + 1]), int(touches[n, ROWS + 2]), int(touches[n, ROWS + 3])
-
-
-@kernel(forceinline=True)
-def along(touches, n, i, rows):
-    """Component along direction i of u, of velocities ``rows (rows, 3)``."""
-    a, b, spin, row_b = rows_of(touches, n)
-    at, lever, second, total = AXES + 3 * i, LEVERS + 3 * i, LEVERS_OF_SECOND + 3 * i, 0.0
-    for k in range(3):
-        total += touches[n, at + k] * (rows[a, k] - rows[b, k])
-        if spin >= 0:
-            total += touches[n, lever + k] * rows[spin, k]
-        if row_b >= 0:
-            total += touches[n, second + k] * rows[row_b, k]
-    return total
-
-
-@kernel(forceinline=True)
-def moved(touches, n, i, f, inverse):
-    """Component along direction i of the acceleration by forces f."""
-    a, b, spin, row_b = rows_of(touches, n)
-    at, lever, second, total = AXES + 3 * i, LEVERS + 3 * i, LEVERS_OF_SECOND + 3 * i, 0.0
-    for k in range(3):
-        total += touches[n, at + k] * (inverse[a, k] * f[a, k] - inverse[b, k] * f[b, k])
-        if spin >= 0:
-            total += touches[n, lever + k] * inverse[spin, k] * f[spin, k]
-        if row_b >= 0:
-            total += touches[n, second + k] * inverse[row_b, k] * f[row_b, k]
-    return total
-
-
-@kernel(forceinline=True)
-def apply_force(touches, n, p, q, s, f):
-    """Add a force along the three directions to the rows of a contact."""
-    a, b, spin, row_b = rows_of(touches, n)
-    for k in range(3):
-        force = p * touches[n, AXES + k] + q * touches[n, AXES + 3 + k] + s * touches[n, AXES + 6 + k]
-        f[a, k] += force
-        f[b, k] -= force
-        if spin >= 0:
-            f[spin, k] += p * touches[n, ARMS + k] + q * touches[n, ARMS + 3 + k] + s * touches[n, ARMS + 6 + k]
-        if row_b >= 0:
-            at = ARMS_OF_SECOND + k
-            f[row_b, k] += p * touches[n, at] + q * touches[n, at + 3] + s * touches[n, at + 6]
 
 
 @kernel()
@@ -132,71 +60,34 @@ def turned_velocity(v, data, cells, c, s, frame):
     return times_transposed(frame.axes, w)
 
 
-@kernel(forceinline=True)
-def delassus(touches, n, i, j, inverse):
-    """J M⁻¹ Jᵀ between two directions of a contact [1/kg]."""
-    a, b, spin, row_b = rows_of(touches, n)
-    total = 0.0
-    for k in range(3):
-        total += touches[n, AXES + 3 * i + k] * touches[n, AXES + 3 * j + k] * (inverse[a, k] + inverse[b, k])
-        if spin >= 0:
-            total += touches[n, ARMS + 3 * i + k] * touches[n, LEVERS + 3 * j + k] * inverse[spin, k]
-        if row_b >= 0:
-            at = touches[n, ARMS_OF_SECOND + 3 * i + k] * touches[n, LEVERS_OF_SECOND + 3 * j + k]
-            total += at * inverse[row_b, k]
-    return total
-
-
-@kernel(forceinline=True)
-def set_direction(touches, n, i, first, second):
-    """Write direction i of a contact, as either body has it."""
-    for k in range(3):
-        touches[n, AXES + 3 * i + k] = first.axis[k]
-        touches[n, LEVERS + 3 * i + k], touches[n, ARMS + 3 * i + k] = -first.lever[k], -first.arm[k]
-        touches[n, LEVERS_OF_SECOND + 3 * i + k] = second.lever[k]
-        touches[n, ARMS_OF_SECOND + 3 * i + k] = second.arm[k]
-
-
 @kernel()
-def set_touch(touches, n, contacts, m, x, v, inverse, cells, data, c):
-    """Write all that sweeps ask of contact m of pair c.
-
-    The two tangents are those between which J M⁻¹ Jᵀ has no mixed term.
-    """
+def set_contact(contact, parts, points, m, x, cells, data, c):
+    """Write contact m of pair c: its rows are those of both bodies, and of their rotations."""
     law, frame_a, frame_b = law_of(data, c), frame_of(x, cells, data, c, 0), frame_of(x, cells, data, c, 1)
-    spins = int(data[c, SIDES + SPINS]), int(data[c, SIDES + SIDE + SPINS])
-    touches[n, CELL], touches[n, ROWS], touches[n, ROWS + 1] = c, cells[c, 0], cells[c, 1]
-    touches[n, ROWS + 2] = cells[c, 2] if spins[0] else -1
-    touches[n, ROWS + 3] = cells[c, 4] if spins[1] else -1
-    y, z = place_of(contacts, m, 0), place_of(contacts, m, 1)
-    steep, g = facing(vector_at(contacts, m, NORMAL))
-    g = g if steep > 0.0 else (1.0, 0.0, 0.0)  # nothing pushes
-    e = cross(g, (1.0, 0.0, 0.0) if abs(g[0]) < 0.6 else (0.0, 1.0, 0.0))
-    size = math.sqrt(dot(e, e))
-    e = e[0] / size, e[1] / size, e[2] / size
-    h = cross(g, e)
-    set_direction(touches, n, 0, direction(g, y, frame_a, spins[0]), direction(g, z, frame_b, spins[1]))
-    tangent_a, tangent_b = direction(e, y, frame_a, spins[0]), direction(e, z, frame_b, spins[1])
-    binormal_a, binormal_b = direction(h, y, frame_a, spins[0]), direction(h, z, frame_b, spins[1])
-    set_direction(touches, n, 1, tangent_a, tangent_b)
-    set_direction(touches, n, 2, binormal_a, binormal_b)
-    first, last = delassus(touches, n, 1, 1, inverse), delassus(touches, n, 2, 2, inverse)
-    mixed = delassus(touches, n, 1, 2, inverse)
-    if abs(mixed) > 1e-15 * (first + last):
-        angle = 0.5 * math.atan2(2.0 * mixed, first - last)
-        c1, s1 = math.cos(angle), math.sin(angle)
-        set_direction(touches, n, 1, mixture(c1, tangent_a, s1, binormal_a), mixture(c1, tangent_b, s1, binormal_b))
-        set_direction(touches, n, 2, mixture(c1, binormal_a, -s1, tangent_a), mixture(c1, binormal_b, -s1, tangent_b))
+    spins_a, spins_b = int(data[c, SIDES + SPINS]), int(data[c, SIDES + SIDE + SPINS])
+    y, z = place_of(points, m, 0), place_of(points, m, 1)
+    steep, g = facing(vector_at(points, m, NORMAL))
+    set_basis(contact, g if steep > 0.0 else (1.0, 0.0, 0.0))  # where nothing pushes any will do
+    contact.cell, contact.tag, contact.group = c, int(points[m, SLOT]), 1
+    contact.normal_force, contact.damping = push(law, points, m, SHARE) * steep, law.damping * steep
+    contact.friction, contact.slip_velocity, contact.wind[:] = law.friction, law.slip_velocity, 0.0
     for i in range(3):
-        touches[n, OWN + i] = delassus(touches, n, i, i, inverse)
-        touches[n, START + i], touches[n, FORCES + i] = along(touches, n, i, v), 0.0
-    touches[n, MIXED], touches[n, MIXED + 1] = delassus(touches, n, 0, 1, inverse), delassus(touches, n, 0, 2, inverse)
-    touches[n, PUSH], touches[n, DAMPING] = push(law, contacts, m, SHARE) * steep, law.damping * steep
-    touches[n, FRICTION], touches[n, SLIP], touches[n, THETA + 1] = law.friction, law.slip_velocity, 1.0
-    touches[n, SLOT] = contacts[m, WHICH]
-
-
-sweep, (recall, commit) = sweeping(moved, apply_force), warm_start(along, apply_force)
+        e = direction(contact, i)
+        at = contact.first
+        set_part(parts[at], cells[c, 0], i, e, e)
+        rate, force = (-e[0], -e[1], -e[2]), (-e[0], -e[1], -e[2])
+        set_part(parts[at + 1], cells[c, 1], i, rate, force)
+        at += 2
+        if spins_a:
+            lever, arm = levers(e, y, frame_a, spins_a)
+            rate, force = (-lever[0], -lever[1], -lever[2]), (-arm[0], -arm[1], -arm[2])
+            set_part(parts[at], cells[c, 2], i, rate, force)
+            at += 1
+        if spins_b:
+            rate, force = levers(e, z, frame_b, spins_b)
+            set_part(parts[at], cells[c, 4], i, rate, force)
+            at += 1
+    contact.count = at - contact.first
 
 
 @functools.cache
@@ -248,14 +139,12 @@ def kernels(first, second):
         slopes(x, v, blocks, cells, data, True)
 
     @kernel(DETECT)
-    def meeting_all(h, x, v, inverse, cells, data, touches, begin):
+    def detect_all(x, cells, data, contacts, parts, begin):
         space, count = space_of(data), begin
         for c in range(cells.shape[0]):
             for m in range(detect(0.0, x, cells, data, c, space)):
-                if count < touches.shape[0]:
-                    set_touch(touches, count, space.contacts, m, x, v, inverse, cells, data, c)
-                    z = h * touches[count, OWN] * touches[count, PUSH] * touches[count, DAMPING]
-                    touches[count, THETA] = fitted(z)
+                if count < contacts.size:
+                    set_contact(contacts[count], parts, space.contacts, m, x, cells, data, c)
                 count += 1
         return count
 
@@ -263,5 +152,5 @@ def kernels(first, second):
         force,
         stiffness,
         damping,
-        lambda parts: ImplicitContactKernels(meeting_all, recall, sweep, commit, WHOLE, NOTED * SLOTS * parts),
+        lambda parts: ImplicitContactKernels(detect_all, friction_law, SLOTS * parts),
     )

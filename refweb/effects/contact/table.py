@@ -252,15 +252,9 @@ class Contact(Table):
         force, stiffness, bound, damping = kernels(depth, *element, spins)
         pairs, rubbing = self._pairs(net, bodies, spins), None
         if net.order == 1:  # explicit steps take no other elements
-            nodes = pairs["cells"][:, :2]
-            if np.isin(nodes, net.carried).any():
-                from ..attached_nodes import columns
-                from . import attached_node_friction as kicks
+            from . import line_body_friction
 
-                pairs["data"] = np.hstack([pairs["data"], columns(net, nodes)])
-            else:
-                from . import line_body_friction as kicks
-            rubbing = kicks.kernels(depth, net.subdivide, element[2], spins)
+            rubbing = line_body_friction.kernels(depth, net.subdivide, element[2], spins)
         return Family(
             **pairs,
             force=force,

@@ -40,15 +40,14 @@ def drag_on(t, u, normal, tangential):
 
 
 @kernel()
-def add_slope(t, u, normal, tangential, matrix):
-    """Add −∂F/∂u to a matrix (3, 3)."""
+def slope_of(t, u, normal, tangential):
+    """Rows of −∂F/∂u."""
     along, n, size = split(t, u)
     inverse = normal / size if size > 0.0 else 0.0
-    beside = 2.0 * tangential * abs(along) - normal * size
-    for i in range(3):
-        for j in range(3):
-            matrix[i, j] += inverse * n[i] * n[j] + beside * t[i] * t[j]
-        matrix[i, i] += normal * size
+    a, b, c = normal * size, inverse, 2.0 * tangential * abs(along) - normal * size
+    p, q, s = b * n[0] * n[1] + c * t[0] * t[1], b * n[0] * n[2] + c * t[0] * t[2], b * n[1] * n[2] + c * t[1] * t[2]
+    first, second, third = b * n[0] * n[0] + c * t[0] * t[0], b * n[1] * n[1] + c * t[1] * t[1], b * n[2] * n[2]
+    return (a + first, p, q), (p, a + second, s), (q, s, a + third + c * t[2] * t[2])
 
 
 @kernel()
@@ -96,8 +95,10 @@ def kernels(nodes):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
             e, _ = direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            u, normal, tangential = relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL]
-            add_slope(e, u, normal, tangential, blocks[c])
+            slope = slope_of(e, relative(v, cells, data, c), data[c, NORMAL], data[c, TANGENTIAL])
+            for i in range(3):
+                for j in range(3):
+                    blocks[c, i, j] = slope[i][j]
 
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):

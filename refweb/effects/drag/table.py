@@ -16,7 +16,7 @@ from ...net.net import REFERENCE
 from ...tables import Several, Table, field, real, table, vector
 from ..base import Family, without
 from .force import kernels
-from .implicit_drag import rubbing
+from .implicit_drag import implicit_drag
 
 SPHERE = 0.47
 """Coefficient of a sphere, at Reynolds numbers from 10³ to 3·10⁵."""
@@ -156,12 +156,7 @@ class Drag(Table):
         return 0.5 * self.density * coefficient * (settings.area or math.pi * body.shape.grown().radius ** 2)
 
     def _family(self, net, cells, data, elements=None):
-        blows, kick = any(self.wind), rubbing
-        if np.isin(cells[:, 0], net.carried).any():
-            from ..attached_nodes import columns
-            from .attached_node_drag import carrying as kick
-
-            data = np.hstack([data, columns(net, cells[:, :1])])
+        blows = any(self.wind)
         force, stiffness, damping, bound = kernels(cells.shape[1])
         return Family(
             name="drag",
@@ -174,7 +169,7 @@ class Drag(Table):
             observed=1,
             power=0,
             damping=damping,
-            rubbing=kick(cells.shape[1]),
+            rubbing=implicit_drag(cells.shape[1]),
             symmetric=False,
             at_rest=blows,
             elements=elements,

@@ -38,22 +38,9 @@ import math
 
 import numpy as np
 
-from ...kernels import BOUND, COMMIT, DETECT, FORCE, STIFFNESS, WARM_START, kernel
-from ..base import CELL, ImplicitContactKernels
-from ..contact_solver import (
-    DAMPING,
-    FORCES,
-    MIXED,
-    OWN,
-    PUSH,
-    ROWS,
-    START,
-    THETA,
-    sweeping,
-)  # fmt: skip
-from ..contact_solver import FRICTION as DRAG
-from ..contact_solver import SLIP as CREEP
-from ..contact_solver import WIDTH as BEHIND
+from ...kernels import BOUND, DETECT, FORCE, STIFFNESS, kernel
+from ..base import ImplicitContactKernels
+from ..contact_solver import friction_law, set_part
 from ..vectors import cross, dot
 from .line_line_penalty import bound as press_bound
 from .line_line_penalty import pushed
@@ -64,13 +51,8 @@ ALIKE = 0.01
 """Share of (2r)²/(L L') that keeps the slip of lines along each other finite: it takes half of it from friction."""
 STEP = 1e-6
 """Step of differences, over the distance of touch."""
-ALONG, KEYS, WHOLE = BEHIND, BEHIND + 24, BEHIND + 30
-"""Columns of what touches, behind those of `refweb.effects.contact_solver`: what four nodes add to the slip along
-either
-direction; the numbers of both elements; and what forces along either are along û, and along ŵ."""
-SLOTS, NOTED = 8, 5
-"""Pairs of an element that are remembered, and what of each: both elements, the number of the step, forces along û and
-ŵ [N]."""
+SLOTS = 8
+"""Pairs of an element that are remembered."""
 
 
 @kernel(forceinline=True)
@@ -236,77 +218,29 @@ def bound(reach, speed, x, mass, rates, cells, data):
 # Kicks
 
 
-@kernel(forceinline=True)
-def along(touches, n, i, rows):
-    """Component along direction i, 1 or 2, of u, of velocities ``rows (rows, 3)``."""
-    at, total = ALONG + 12 * (i - 1), 0.0
-    for m in range(4):
-        r = int(touches[n, ROWS + m])
-        for k in range(3):
-            total += touches[n, at + 3 * m + k] * rows[r, k]
-    return total
-
-
-@kernel(forceinline=True)
-def moved(touches, n, i, f, inverse):
-    """Component along direction i, 1 or 2, of the acceleration by forces f; 0 along the normal."""
-    if i == 0:
-        return 0.0
-    at, total = ALONG + 12 * (i - 1), 0.0
-    for m in range(4):
-        r = int(touches[n, ROWS + m])
-        for k in range(3):
-            total += touches[n, at + 3 * m + k] * inverse[r, k] * f[r, k]
-    return total
-
-
-@kernel(forceinline=True)
-def apply_force(touches, n, p, q, s, f):
-    """Add forces along both directions to the rows of a contact; there is none along the normal."""
-    for m in range(4):
-        r = int(touches[n, ROWS + m])
-        for k in range(3):
-            f[r, k] += q * touches[n, ALONG + 3 * m + k] + s * touches[n, ALONG + 12 + 3 * m + k]
-
-
-@kernel(forceinline=True)
-def delassus(rows, i, j, cells, c, inverse):
-    """J M⁻¹ Jᵀ between two components [1/kg]."""
-    total = 0.0
-    for m in range(4):
-        for k in range(3):
-            total += rows[i, m, k] * rows[j, m, k] * inverse[cells[c, m], k]
-    return total
-
-
 @kernel()
-def set_touch(touches, at, c, cell, normal, cells, data, v, inverse, rows, shares):
-    """Write all that sweeps ask of pair c, which shows its power at a ``cell``."""
-    touches[at, CELL], touches[at, PUSH], touches[at, DAMPING] = cell, normal, 0.0
-    touches[at, DRAG], touches[at, CREEP] = data[c, FRICTION], data[c, SLIP]
-    touches[at, KEYS], touches[at, KEYS + 1] = data[c, NAMES], data[c, NAMES + 1]
-    first, last = delassus(rows, 0, 0, cells, c, inverse), delassus(rows, 1, 1, cells, c, inverse)
-    angle = 0.5 * math.atan2(2.0 * delassus(rows, 0, 1, cells, c, inverse), first - last)
-    cosine, sine = math.cos(angle), math.sin(angle)
+def set_contact(contact, parts, cell, c, normal, cells, data, rows, shares):
+    """Write the contact of pair c, which shows its power at a ``cell``, by what `slip_rows` writes.
+
+    Its basis has the directions along û and ŵ, or along the components of threads, and a normal without force.
+    """
+    contact.cell, contact.tag, contact.count, contact.group = cell, int(data[c, NAMES + 1]), 4, 1
+    contact.normal_force, contact.damping, contact.wind[:] = normal, 0.0, 0.0
+    contact.friction, contact.slip_velocity = data[c, FRICTION], data[c, SLIP]
     for m in range(4):
-        touches[at, ROWS + m] = cells[c, m]
-        for k in range(3):
-            p, q = rows[0, m, k], rows[1, m, k]
-            rows[0, m, k], rows[1, m, k] = cosine * p + sine * q, cosine * q - sine * p
-            touches[at, ALONG + 3 * m + k], touches[at, ALONG + 12 + 3 * m + k] = rows[0, m, k], rows[1, m, k]
-    for j in range(2):
-        p, q = shares[0, j], shares[1, j]
-        touches[at, KEYS + 2 + 2 * j], touches[at, KEYS + 3 + 2 * j] = cosine * p + sine * q, cosine * q - sine * p
+        part = parts[contact.first + m]
+        set_part(part, cells[c, m], 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        for i in range(2):
+            rate = rows[i, m, 0], rows[i, m, 1], rows[i, m, 2]
+            set_part(part, cells[c, m], 1 + i, rate, rate)
     for i in range(2):
-        touches[at, OWN + 1 + i] = delassus(rows, i, i, cells, c, inverse)
-        touches[at, START + 1 + i] = along(touches, at, 1 + i, v)
-        touches[at, MIXED + i] = touches[at, FORCES + 1 + i] = 0.0
-    touches[at, OWN] = touches[at, START] = touches[at, FORCES] = 0.0
-    touches[at, THETA] = touches[at, THETA + 1] = 1.0
+        contact.basis[0, i] = contact.basis[1 + i, 2] = 0.0
+        contact.basis[1 + i, 0], contact.basis[1 + i, 1] = shares[i, 0], shares[i, 1]
+    contact.basis[0, 2] = 1.0
 
 
 @kernel(DETECT)
-def detect(h, x, v, inverse, cells, data, touches, begin):
+def detect(x, cells, data, contacts, parts, begin):
     rows, shares = np.empty((2, 4, 3)), np.empty((2, 2))
     count, chosen = begin, np.empty((0, 2), dtype=np.int64)
     if cells.shape[1] != 4:
@@ -314,55 +248,12 @@ def detect(h, x, v, inverse, cells, data, touches, begin):
     for c in range(cells.shape[0]):
         normal = slip_rows(x, cells, data, c, rows, shares)
         if normal > 0.0:
-            if count < touches.shape[0]:
+            if count < contacts.size:
                 cell = chosen[c, 0] if chosen.shape[0] else c
-                set_touch(touches, count, c, cell, normal, cells, data, v, inverse, rows, shares)
+                set_contact(contacts[count], parts, cell, c, normal, cells, data, rows, shares)
             count += 1
     return count
 
 
-@kernel(forceinline=True)
-def slot_of(memory, touches, n, number):
-    """(row, first column) of what is remembered of a pair; a new one takes the place that is oldest."""
-    row, oldest, at = int(touches[n, KEYS]) % memory.shape[0], math.inf, 0
-    for slot in range(SLOTS):
-        slot_begin = NOTED * slot
-        if (
-            memory[row, slot_begin + 2] > 0.0
-            and memory[row, slot_begin] == touches[n, KEYS]
-            and (memory[row, slot_begin + 1] == touches[n, KEYS + 1])
-        ):
-            return row, slot_begin
-        if memory[row, slot_begin + 2] < oldest:
-            oldest, at = memory[row, slot_begin + 2], slot_begin
-    return row, at
-
-
-@kernel(WARM_START)
-def recall(number, memory, f, touches, begin, end):
-    for n in range(begin, end):
-        row, at = slot_of(memory, touches, n, number)
-        same = memory[row, at] == touches[n, KEYS] and memory[row, at + 1] == touches[n, KEYS + 1]
-        if same and memory[row, at + 2] == number - 1 and number > 1:
-            # of F = Σ Fᵢ (what direction i is along û and ŵ), the components again
-            a, b, c, d = touches[n, KEYS + 2], touches[n, KEYS + 3], touches[n, KEYS + 4], touches[n, KEYS + 5]
-            determinant, first, second = a * d - b * c, memory[row, at + 3], memory[row, at + 4]
-            q, s = (d * first - b * second) / determinant, (a * second - c * first) / determinant
-            touches[n, FORCES + 1], touches[n, FORCES + 2] = q, s
-            apply_force(touches, n, 0.0, q, s, f)
-
-
-@kernel(COMMIT)
-def commit(number, memory, v, touches, begin, end, out):
-    out[:, 0] = 0.0
-    for n in range(begin, end):
-        row, at = slot_of(memory, touches, n, number)
-        q, s = touches[n, FORCES + 1], touches[n, FORCES + 2]
-        memory[row, at], memory[row, at + 1], memory[row, at + 2] = touches[n, KEYS], touches[n, KEYS + 1], number
-        memory[row, at + 3] = q * touches[n, KEYS + 2] + s * touches[n, KEYS + 3]
-        memory[row, at + 4] = q * touches[n, KEYS + 4] + s * touches[n, KEYS + 5]
-        out[int(touches[n, CELL]), 0] += q * along(touches, n, 1, v) + s * along(touches, n, 2, v)
-
-
-KICKS = ImplicitContactKernels(detect, recall, sweeping(moved, apply_force), commit, WHOLE, SLOTS * NOTED)
+KICKS = ImplicitContactKernels(detect, friction_law, SLOTS)
 """How explicit kicks solve for it."""
