@@ -13,11 +13,15 @@ class InputError(ValueError):
 
 
 class SolverError(RuntimeError):
-    """A solver that found no answer; the message says what, where and when."""
+    """A solver that found no answer; the message says what, where and when, ``code`` which kind of finding it is."""
+
+    code = "solver"
 
 
 class IntegrationError(SolverError):
     """A method of dynamics cannot finish a scene; another method may."""
+
+    code = "integration"
 
 
 class EnergyDriftError(IntegrationError):
@@ -25,6 +29,8 @@ class EnergyDriftError(IntegrationError):
 
     ``drift`` says how far, over the largest energy or momentum.
     """
+
+    code = "balance-drift"
 
     def __init__(self, message, drift=float("inf")):
         super().__init__(message)
@@ -36,6 +42,8 @@ class PenetrationError(SolverError):
 
     ``stiffness`` is what each of these bodies is to have instead [N/m^p], by name.
     """
+
+    code = "deep-contact"
 
     def __init__(self, message, stiffness):
         super().__init__(message)

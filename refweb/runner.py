@@ -11,6 +11,7 @@ import numpy as np
 
 from . import memory
 from .errors import InputError, PenetrationError, in_file
+from .findings import NOTE, REFUSAL, Finding, read_findings
 from .messages import short
 from .results.folder import Folder, check_folder, fingerprint, is_alive
 from .results.progress import followed
@@ -109,23 +110,24 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
 
 def _solve(scene, out, progress, announce, kept=None, summary=None):
     """Solve a scene, with a stiffer contact as often as one that refweb chose is too soft; see `_attempt`."""
-    clock, scene, messages = Clock(), scene.settled(), []
+    clock, scene, repeats = Clock(), scene.settled(), []
     with followed(progress) as tell:
         while True:
             try:
-                return _attempt(scene, out, tell, announce, clock, messages, kept, summary)
+                return _attempt(scene, out, tell, announce, clock, repeats, kept, summary)
             except PenetrationError as soft:
-                messages.append(str(soft))
+                table = "self_contact" if "self_contact" in soft.stiffness else "contact"
+                repeats.append(Finding("repeated", str(soft), table, NOTE))
                 scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
-                if len(messages) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
+                if len(repeats) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
                     scene = scene.replace(chosen=())
 
 
-def _attempt(scene, out, tell, announce, clock, messages, kept=None, summary=None):
+def _attempt(scene, out, tell, announce, clock, repeats, kept=None, summary=None):
     """Solve a scene as it stands.
 
-    ``messages`` are warnings to begin with; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run that goes
-    on.
+    ``repeats`` are the findings of attempts before; ``kept`` and ``summary`` are checkpoint and ``run.json`` of a run
+    that goes on.
     """
     system = scene.build()
     if out is None:
@@ -134,9 +136,9 @@ def _attempt(scene, out, tell, announce, clock, messages, kept=None, summary=Non
         announce(scene, system)
     solution = Solution(scene, web=web_of(system), versions=versions())
     if kept is None:
-        solution.warnings += [*messages, *notices(scene, system)]
+        solution.findings += [*repeats, *notices(scene, system)]
     else:
-        solution.warnings += _before(kept, summary, system, solution.versions)
+        solution.findings += _before(kept, summary, system, solution.versions)
     simulation = simulation_of(scene, system, solution, kept)
     solution.columns = simulation.columns
     row = None if kept is None else int(kept["row"])
@@ -157,7 +159,7 @@ def _attempt(scene, out, tell, announce, clock, messages, kept=None, summary=Non
         if folder is not None:
             solution.path = folder.path.absolute()
         solution.cost["by_effect"] = _cpu_by_effect(system, solution)
-        solution.warnings += simulation.remarks()
+        solution.findings += simulation.remarks()
         if folder is not None:
             folder.close()
             folder.summary(solution.summary())
@@ -194,11 +196,11 @@ def _before(kept, summary, system, versions):
     known = {"row", "accuracy", "repeated", "missing", "shares", "run"}
     if not known <= kept.keys() or kept.get("positions", np.zeros(0)).shape != (system.rows, 3):
         raise InputError("checkpoint.npz is not that of a run that scene.toml leads to: use refweb run")
-    yield from summary["warnings"]
+    yield from (finding for finding in read_findings(summary) if finding.severity != REFUSAL)
     begun = summary["versions"]
     if differing := [name for name in versions if begun.get(name) != versions[name]]:
         changes = ", ".join(f"{name} {versions[name]} after {begun.get(name)}" for name in differing)
-        yield f"resumed with {changes}: what follows may differ in its last digits"
+        yield Finding("resumed", f"resumed with {changes}: what follows may differ in its last digits", "", NOTE)
 
 
 def simulation_of(scene, system, solution, kept=None):
@@ -214,20 +216,22 @@ def simulation_of(scene, system, solution, kept=None):
 
 
 def notices(scene, system):
-    """Notices on a scene before it is solved, each a text."""
+    """Findings on a scene before it is solved."""
     if system.net.web.kind == "file":
         from .net.mesh_file import remarks
 
         yield from remarks(system.net.web)
     for body in system.net.bodies:
-        yield from (f'body "{body.name}": {text}' for text in body.shape.remarks())
+        for text in body.shape.remarks():
+            yield Finding("surface", f'body "{body.name}": {text}', "body")
     if not system.contact and any(not body.carried for body in system.net.bodies):
-        yield "the scene has a [[body]] but no [contact]: the web does not feel it"
+        yield Finding("body-not-felt", "the scene has a [[body]] but no [contact]: the web does not feel it", "body")
     yield from _idle(system, getattr(scene.solve, "load_steps", (0.0, *system.corners)))
     if scene.solve.kind == "static" and (parts := system.unsupported_parts):
         axes = ", ".join(sorted({"xyz"[part.axis] for part in parts}))
         nodes = np.unique(np.concatenate([part.rows for part in parts]))
-        yield f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
+        text = f"{len(nodes)} nodes have no support along {axes}: their position there is not unique"
+        yield Finding("no-support", text, "supports")
 
 
 def _idle(system, times):
@@ -242,7 +246,8 @@ def _idle(system, times):
         if acts.any() and not (acts & ~system.fixed).any():  # a node that a free body carries moves with it
             rows = np.flatnonzero(acts.any(axis=1))
             names = ", ".join(map(system.row_name, rows[:4])) + (", ..." if len(rows) > 4 else "")
-            yield f"the {family.name} on {names} acts only on supports, which carry it: it moves nothing"
+            text = f"the {family.name} on {names} acts only on supports, which carry it: it moves nothing"
+            yield Finding("idle-load", text, family.name)
 
 
 def _cpu_by_effect(system, solution):

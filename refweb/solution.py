@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import InputError
+from .findings import read_findings
 from .messages import nearest, short
 from .results.folder import read_summary
 from .results.solution import OTHER_ERRORS, SolutionData, read_results
@@ -296,8 +297,9 @@ def load(folder) -> Solution:
     scene = scene_of(folder, summary)
     try:
         solution = Solution(scene, path=folder)
-        for key in ("status", "message", "web", "events", "solver", "cost", "versions", "warnings"):
+        for key in ("status", "message", "web", "events", "solver", "cost", "versions"):
             setattr(solution, key, summary[key])
+        solution.findings = read_findings(summary)
         solution.bodies, solution.horizon = summary.get("bodies", {}), summary.get("horizon", {})
         solution.pairs, solution.lines, solution.passage = (
             summary.get(key, {}) for key in ("pairs", "lines", "passage")

@@ -19,5 +19,5 @@ def run(arguments):
     system = scene.build()
     simulation_of(scene, system, Solution(scene))
     print_scene(scene, system)
-    for text in notices(scene, system):
-        print(f"warning: {text}")
+    for finding in notices(scene, system):
+        print(f"warning: {finding.text}")

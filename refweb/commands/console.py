@@ -73,7 +73,7 @@ def print_scene(scene, system):
         if len(system.corners) > FEW_CORNERS:
             from ..dynamics.breakpoints import remarks_on_corners
 
-            corners = [("corners", remark) for remark in remarks_on_corners(scene.replace(solve=solve), system)]
+            corners = [("corners", finding.text) for finding in remarks_on_corners(scene.replace(solve=solve), system)]
     if solve.kind == "dynamic" and INTEGRATORS[solve.method].knob == "safety":
         from ..dynamics.expected_cost import expected_cost
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import EnergyDriftError
+from ..findings import NOTE, Finding
 from .budget import Spent
 
 ATTEMPTS, MOST_ATTEMPTS, PAYS = 3, 8, 0.5
@@ -98,7 +99,8 @@ def run_within_drift(simulation, folder, tell):
                     raise
                 standing.repeated, standing.drift = standing.repeated + 1, error.drift
                 standing.knob *= simulation.integrator.retry
-                solution.warnings.append(f"{error}; repeated with {name} = {standing.knob:g}")
+                message = f"{error}; repeated with {name} = {standing.knob:g}"
+                solution.findings.append(Finding("repeated", message, "solve", NOTE))
                 simulation.again(folder)
                 continue
             tell("finding errors by step refinement", 1.0)
@@ -120,7 +122,8 @@ def run_within_drift(simulation, folder, tell):
         if folder is not None:
             folder.keep_twin(solution.twin_end)
     elif twin:
-        solution.warnings.append(f"no errors are known: the step-refinement run failed: {twin.failure}")
+        message = f"no errors are known: the step-refinement run failed: {twin.failure}"
+        solution.findings.append(Finding("no-error", message, "accuracy"))
     if scene.throw is not None:
         solution.throw = _throw(simulation, run, ended, rows, known)
 
@@ -169,7 +172,7 @@ def reach_digits(simulation, digits, folder, tell):
         knob = reached * simulation.integrator.next_knob(max(falling))
         if (expected := budget.expected(simulation.integrator, knob)) > budget.total - budget.spent:
             why = f"the next run would take some {expected:.2g} s"
-            solution.warnings.append(_over(simulation, digits, knob, why, price))
+            solution.findings.append(_over(simulation, digits, knob, why, price))
             break
         earlier, before, steps = before, missing, solution.solver["nsteps"]
         standing.missing, standing.knob = before, knob
@@ -177,7 +180,7 @@ def reach_digits(simulation, digits, folder, tell):
         try:
             run_within_drift(simulation, folder, tell)
         except Spent as spent:
-            solution.warnings.append(_over(simulation, digits, standing.knob, f"a run was ended: {spent}", price))
+            solution.findings.append(_over(simulation, digits, standing.knob, f"a run was ended: {spent}", price))
             before = standing.missing = earlier
             standing.knob, standing.repeated, standing.drift, budget.kept = reached, 0, np.inf, False
             simulation.again(folder)
@@ -191,13 +194,16 @@ def reach_digits(simulation, digits, folder, tell):
         why = "still higher accuracy would help, but is not tried" if falls else STAYS
         known = f"its ± is {share:.3g} times what they allow with {setting}; {why}"
         known = known if np.isfinite(share) else "its ± is not known"
-        solution.warnings.append(f"{name} does not have the {digits} digits asked for: {known}")
+        text = f"{name} does not have the {digits} digits asked for: {known}"
+        solution.findings.append(Finding("digits-not-reached", text, "accuracy"))
 
 
 def _over(simulation, digits, knob, why, price):
-    """Text that accuracy is raised no further, and the cost of doing so."""
+    """Finding that accuracy is raised no further, with the cost of doing so."""
     budget, name = simulation.budget, simulation.integrator.knob
-    return (
+    return Finding(
+        "digits-not-reached",
         f"with {name} = {knob:.3g} {why}, more than what was left of the budget of {budget.total:.3g} s of CPU time: "
-        f"digits = {digits} would take some {price:.2g} s more; raise [accuracy] budget, or ask for fewer digits"
+        f"digits = {digits} would take some {price:.2g} s more; raise [accuracy] budget, or ask for fewer digits",
+        "accuracy",
     )

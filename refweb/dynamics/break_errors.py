@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..findings import Finding
+
 
 def add_errors_of_breaks(solution, run, refined, share):
     """Add ± to the times of breaks, as far as a run and its twin break the same lines in the same order.
@@ -44,10 +46,11 @@ def _warn_of_near(solution, count):
     """Warn of the first of so many breaks that the next may come before."""
     for first, later in zip(solution.breaks[:count], solution.breaks[1:count], strict=False):
         if 0.0 < later["time"] - first["time"] < first["error"] + later["error"]:
-            solution.warnings.append(
+            text = (
                 f"lines {first['line']} and {later['line']} break within ± of each other at t = {later['time']:.6g} s: "
                 "the run and its refinement have them in this order, which is not proven"
             )
+            solution.findings.append(Finding("breaks-in-doubt", text, "rupture"))
             return
 
 
@@ -62,10 +65,11 @@ def _end_of_knowledge(solution, run, refined, n):
         else "is none"
         for breaks in (run, refined)
     ]
-    solution.warnings.append(
+    text = (
         f"the order of breaks is beyond the horizon from t = {since:.6g} s on: break {n + 1} {words[0]}, in the "
         f"twin it {words[1]}; what is found from then on has no ±"
     )
+    solution.findings.append(Finding("breaks-in-doubt", text, "rupture"))
     for name, result in solution.reduced.items():
         if result.time >= since:
             solution.reduced[name] = result._replace(error=None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..findings import Finding
 from ..registry import INTEGRATORS
 from .schedule import FEW_CORNERS, row_times
 
@@ -12,7 +13,7 @@ TOLD = 1.5
 
 
 def remarks_on_corners(scene, system):
-    """Warn that breakpoints of tables shorten the steps of a run: a list of at most one sentence.
+    """Warn that breakpoints of tables shorten the steps of a run: a list of at most one finding.
 
     Parameters
     ----------
@@ -29,11 +30,12 @@ def remarks_on_corners(scene, system):
     apart = f"steps end at {len(corners)} corners of time tables, {end / len(corners):.3g} s apart on average"
     integrator = INTEGRATORS[scene.solve.method].integrator_of(scene.solve, system)
     if not hasattr(integrator, "steps_in"):
-        return [f"{apart}: {scene.solve.method} takes at least as many steps"]
+        return [Finding("tables", f"{apart}: {scene.solve.method} takes at least as many steps")]
     rows = row_times(scene)
     plain = integrator.steps_in(np.diff(rows)).sum()
     steps = integrator.steps_in(np.diff(np.union1d(rows, corners))).sum()
     if len(corners) < plain and steps < TOLD * plain:
         return []
     work = f"{steps / plain:.3g} times the work"
-    return [f"{apart}: {steps:.3g} steps, where stability and rows need {plain:.3g}, {work}"]
+    text = f"{apart}: {steps:.3g} steps, where stability and rows need {plain:.3g}, {work}"
+    return [Finding("tables", text)]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..findings import Finding
 from ..messages import short
 from ..net.rigid_body import matrix_of, row_names
 from ..net.rotation import quaternion_of
@@ -56,23 +57,26 @@ def start_of(scene, system):
 def remarks_on(start, system):
     """Remarks on a start: jumps of motion, and bodies inside of the web."""
     before = np.zeros((system.rows, 3)) if start.x is None else start.x
-    refined = before.copy()
-    system.drive(0.0, refined)
-    inner = [(family.contact, system.energy_of(family, 0.0, refined)) for family in system.families if family.internal]
-    moved = np.flatnonzero((refined != before).any(axis=1))
+    driven = before.copy()
+    system.drive(0.0, driven)
+    inner = [(family.contact, system.energy_of(family, 0.0, driven)) for family in system.families if family.internal]
+    moved = np.flatnonzero((driven != before).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)
         by = "[[motion]]" if system.drives and not system.carried[moved[0]] else "[[attach]]"
-        yield f"{by} has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
-    off = np.linalg.norm(np.where(system.fixed, refined, 0.0)[: system.net.nodes], axis=1)
+        text = f"{by} has moved node {moved[0]} at t = 0 already: the web starts with {stored:.4g} J"
+        yield Finding("moved-at-start", text, by.strip("[]"))
+    off = np.linalg.norm(np.where(system.fixed, driven, 0.0)[: system.net.nodes], axis=1)
     off[np.unique([row for drive in system.drives for row in drive.cells.ravel()]).astype(int)] = 0.0
     if off.max() > OFF * np.ptp(system.net.points, axis=0).max():
         worst = int(off.argmax())
-        yield f"node {worst} is held where the start has it, {off[worst]:.4g} m off its place in this scene"
+        text = f"node {worst} is held where the start has it, {off[worst]:.4g} m off its place in this scene"
+        yield Finding("moved-at-start", text, "supports")
     pushed = np.concatenate([np.zeros(0), *(energy for contact, energy in inner if contact)])
     if pushed.max(initial=0.0) > 0.0:
         line = system.net.line[int(pushed.argmax()) % len(system.net.line)]
-        yield f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
+        text = f"a body overlaps the web at the start, most at line {line}: contact starts with {pushed.sum():.4g} J"
+        yield Finding("starts-in-body", text, "body")
 
 
 def equilibrium(system, progress=None):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..effects.base import pairs_of
 from ..errors import InputError, IntegrationError, SolverError
+from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
@@ -85,7 +86,7 @@ class Simulation:
         elif scene.start_folder is not None:
             self.begin, self.begin_of_twin = stored(system, scene.start_folder)
             if self.begin_of_twin is None and self.begin.v is not None and self.begin.v.any():
-                solution.warnings.append(NO_TWIN)
+                solution.findings.append(Finding("no-error", NO_TWIN, "accuracy"))
         system = self.begin.torn(system)
         solution.broken_before = np.unique(system.net.line[system.net.broken]).tolist()
         self.scene, self.system, self.solution = scene, system, solution
@@ -99,9 +100,9 @@ class Simulation:
         if kept is None and len(system.corners) > FEW_CORNERS:
             from .breakpoints import remarks_on_corners
 
-            solution.warnings += remarks_on_corners(scene, system)
+            solution.findings += remarks_on_corners(scene, system)
         if scene.solve.start != "equilibrium" and kept is None:
-            solution.warnings += remarks_on(self.begin, system)
+            solution.findings += remarks_on(self.begin, system)
 
     @property
     def columns(self):
@@ -154,7 +155,7 @@ class Simulation:
 
     def _fall_back(self, ways, error, folder):
         """Forget what was computed, and begin with another method; `SolverError` where there is none."""
-        self.solution.warnings.append(ways.give_over(error))
+        self.solution.findings.append(Finding("method-changed", ways.give_over(error), "solve", NOTE))
         self.scene, self.solution.reduced, self.solution.solver = ways.scene, {}, dict(SOLVER)
         self._stand()
         self.again(folder)
@@ -165,12 +166,11 @@ class Simulation:
 
         equilibrium_ = equilibrium(self.system, lambda text: tell(f"equilibrium, {text}", 0.0))
         self.begin, state = Start(equilibrium_.x), State(self.system, 0.0, equilibrium_.x)
-        if text := remark_on_open(state, equilibrium_):
-            self.solution.warnings.append(f"of the equilibrium it starts from: {text}")
-        self.solution.warnings += [
-            text for _, text in on_stability(state, equilibrium_, "the equilibrium it starts from")
-        ]
-        self.solution.warnings += remarks_on(self.begin, self.system)
+        for finding in remark_on_open(state, equilibrium_):
+            text = f"of the equilibrium it starts from: {finding.text}"
+            self.solution.findings.append(finding._replace(text=text))
+        self.solution.findings += on_stability(state, equilibrium_, "the equilibrium it starts from")
+        self.solution.findings += remarks_on(self.begin, self.system)
         if self.overlaps is not None and any(body.fixed for body in self.system.net.bodies):
             from ..statics.body_penetration import Passage
 
@@ -342,7 +342,8 @@ class Simulation:
             yield from self._silent.remarks()
         for name in self._unfilled:
             end = self._tables[-1][-1, 0]
-            yield f"{name} is the mean of the whole run: it ended at t = {end:.6g} s, before a window was full"
+            text = f"{name} is the mean of the whole run: it ended at t = {end:.6g} s, before a window was full"
+            yield Finding("short-window", text, "observe")
         yield from self._unseen()
 
     def _unseen(self):
@@ -352,9 +353,11 @@ class Simulation:
             if entry["time"] is None and (result := self.solution.reduced.get(event.observe)) is not None:
                 start = self._tables[0][0, 1 + names.index(event.observe)]
                 if (start - event.value) * (result.value - event.value) < 0.0:
-                    yield (
+                    yield Finding(
+                        "event-not-seen",
                         f'event "{event.name}" is not seen: {event.observe} passes {event.value:g} and comes back '
-                        f"within a step, about t = {result.time:.6g} s: lower [output] interval"
+                        f"within a step, about t = {result.time:.6g} s: lower [output] interval",
+                        "event",
                     )
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..findings import Finding
 from ..results.solution import Result
 from .budget import check_budget
 from .history import SPREAD
@@ -234,7 +235,8 @@ def add_errors(simulation, run, twin, rows):
     first_run, refined = run.course, twin.course
     if first_run.stopped != refined.stopped:
         which = ["the run", "its step refinement, the second run of a smaller error"][:: 1 if first_run.stopped else -1]
-        solution.warnings.append("no errors are known: an event ends {}, but not {}".format(*which))
+        text = "no errors are known: an event ends {}, but not {}".format(*which)
+        solution.findings.append(Finding("no-error", text, "event"))
         return 0.0
     factor = 1.0 / (1.0 - simulation.integrator.error_share(first_run, refined))
     drifts = simulation.watch.drifts(first_run, refined, np.diff(rows[-2:, 0]).sum())

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..findings import Finding
 from ..messages import quote
 from ..tables import Table, choice, table, text
 from .groups import members
@@ -90,9 +91,11 @@ def remarks(web):
     pairs, of, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     for pair in np.flatnonzero(count > 1)[:1]:
         first, second = np.flatnonzero(of.ravel() == pair)[:2]
-        yield (
+        yield Finding(
+            "mesh-file",
             f"{int((count - 1).sum())} lines join two nodes that another line joins, {first} and {second} among them: "
-            "each carries load; leave one out if the file has it twice by mistake"
+            "each carries load; leave one out if the file has it twice by mistake",
+            "web",
         )
     used = np.unique(web.lines)
     size = np.ptp(web.points[used], axis=0).max() or 1.0
@@ -103,9 +106,11 @@ def remarks(web):
     joined = set(map(tuple, pairs.tolist()))
     apart = [pair for pair in (tuple(sorted(map(int, pair))) for pair in apart) if pair not in joined]
     if apart:
-        yield (
+        yield Finding(
+            "mesh-file",
             f"{len(apart)} pairs of nodes are at one place and no line joins them, {apart[0][0]} and {apart[0][1]} "
-            "among them: the web comes apart there; merge them where the file is made"
+            "among them: the web comes apart there; merge them where the file is made",
+            "web",
         )
 
 

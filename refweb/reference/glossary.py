@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import textwrap
 
+from ..findings import CODES
+
 GLOSSARY = {
     "Web and lines": {
         "web": "The cable net: nodes, lines, cells, supports and groups.",
@@ -151,8 +153,9 @@ GLOSSARY = {
         "machine code": "Compiled kernels, kept in the user's cache folder.",
         "kernel": "Function compiled by numba.",
     },
+    "Codes of findings": CODES,
 }
-"""Terms with their meanings, by subject."""
+"""Terms with their meanings, by subject; codes are those of ``findings`` in ``run.json``."""
 
 
 def explained(name, width=100):

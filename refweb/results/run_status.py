@@ -8,6 +8,7 @@ import os
 import time
 
 from ..errors import SolverError
+from ..findings import REFUSAL, Finding
 
 
 @functools.cache
@@ -78,6 +79,8 @@ def recorded(target, clock, done=None):
         raise
     except SolverError as error:
         target.status, target.message = "failed", str(error)
+        if hasattr(target, "findings"):
+            target.findings.append(Finding(error.code, str(error), severity=REFUSAL))
         raise
     except Exception as error:
         target.status, target.message = "failed", f"{type(error).__name__}: {error}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ..findings import texts
 from ..messages import nearest
 
 if TYPE_CHECKING:
@@ -114,8 +115,8 @@ class SolutionData:
         Versions of refweb, Python and the libraries that solved it, by name.
     status : {"running", "solved", "failed", "interrupted"}
         How it ended; ``message`` says why.
-    warnings : list of str
-        What a reader of the results has to know.
+    findings : list of refweb.findings.Finding
+        Remarks, warnings and refusals: what a reader of the results has to know, by code.
     table : dict of str to ndarray, optional
         The history, where it is held in memory; of load steps always.
     path : pathlib.Path, optional
@@ -169,7 +170,7 @@ class SolutionData:
     versions: dict = field(default_factory=dict)
     status: str = "running"
     message: str = ""
-    warnings: list = field(default_factory=list)
+    findings: list = field(default_factory=list)
     events: list = field(default_factory=list)
     throw: dict = field(default_factory=dict)
     breaks: list | None = None
@@ -183,6 +184,11 @@ class SolutionData:
     pairs: dict = field(default_factory=dict)
     lines: dict = field(default_factory=dict)
     passage: dict = field(default_factory=dict)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Texts of the findings, but for the refusal that ``message`` has."""
+        return texts(self.findings)
 
     @property
     def results(self) -> dict[str, Result]:
@@ -224,6 +230,7 @@ class SolutionData:
             "seed": self.scene.seed,
             **({"chosen": list(self.scene.chosen)} if self.scene.chosen else {}),
             "warnings": self.warnings,
+            "findings": [finding._asdict() for finding in self.findings],
             **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
             **({"pairs": self.pairs} if self.pairs else {}),

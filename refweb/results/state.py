@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.base import OWN
+from ..findings import Finding
 from ..net.tension_laws import LINEAR, SMOOTH, Law
 from .columns import static_energies
 
@@ -137,7 +138,8 @@ class State:
 def strength_remark(utilisation):
     """A warning where the largest stress over strength, (value, line), exceeds 1."""
     if utilisation is not None and utilisation[0] > 1.0:
-        yield f"line {utilisation[1]} breaks: stress over strength is {utilisation[0]:.3g}"
+        text = f"line {utilisation[1]} breaks: stress over strength is {utilisation[0]:.3g}"
+        yield Finding("over-strength", text, "cable")
 
 
 MUCH = 0.2
@@ -147,9 +149,11 @@ MUCH = 0.2
 def strain_remark(strain):
     """A warning where the largest strain, (value, line), exceeds `MUCH`."""
     if strain[0] > MUCH:
-        yield (
+        yield Finding(
+            "large-strain",
             f"line {strain[1]} is strained by {100.0 * strain[0]:.3g} %, above {100.0 * MUCH:g} %: no cable stretches "
-            "that far, and its law does not describe it; lower what acts on it, or raise modulus or area"
+            "that far, and its law does not describe it; lower what acts on it, or raise modulus or area",
+            "cable",
         )
 
 
@@ -158,7 +162,9 @@ def floor_remark(net, stress):
     if (smooth := net.laws == SMOOTH).any():
         floor = float((Law("smooth").floor(*net.line_data[smooth, 1:4].T) / net.area[smooth]).max())
         if floor > 0.01 * stress:
-            yield (
+            yield Finding(
+                "law-floor",
                 f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "
-                'slack lines push; lower smoothing or use law = "tension-only"'
+                'slack lines push; lower smoothing or use law = "tension-only"',
+                "cable",
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..findings import Finding
 from ..net.tension_laws import LINEAR, NAMES, TENSION_ONLY
 from ..results.state import floor_remark, strain_remark, strength_remark
 
@@ -14,17 +15,18 @@ class Remarks:
     def __init__(self):
         self._made, self._steps = {}, 0
 
-    def record(self, step, remarks):
-        """Take the remarks of a load step, pairs of a kind and a text."""
+    def record(self, step, findings):
+        """Take the findings of a load step."""
         self._steps += 1
-        for kind, text in remarks:
-            self._made.setdefault(kind, []).append((step, text))
+        for finding in findings:
+            self._made.setdefault(finding.code, []).append((step, finding))
 
-    def texts(self):
-        """Each kind as it was last made, with its load steps unless it was made at all of them."""
+    def findings(self):
+        """Each code as it was last found, with its load steps unless it was found at all of them."""
         for made in self._made.values():
             steps = ", ".join(f"{step:g}" for step, _ in made[:8]) + (", ..." if len(made) > 8 else "")
-            yield made[-1][1] + (f" (load step {steps})" if len(made) < self._steps else "")
+            at = f" (load step {steps})" if len(made) < self._steps else ""
+            yield made[-1][1]._replace(text=made[-1][1].text + at)
 
 
 def open_rows(state, equilibrium):
@@ -33,40 +35,46 @@ def open_rows(state, equilibrium):
 
 
 def remark_on_open(state, equilibrium):
-    """Remark on positions that an equilibrium leaves open; empty where there are none."""
+    """Find positions that an equilibrium leaves open: one finding or none."""
     open_ = open_rows(state, equilibrium)
     if not len(open_):
-        return ""
+        return
     some = ", ".join(map(str, open_[:4])) + (", ..." if len(open_) > 4 else "")
     how = "are in parts that only slack lines hold"
     if np.isin(open_, state.slack_nodes).all():
         how = "hang on slack lines only"
     elif equilibrium.floating.parts is None:
         how = "can move at no cost"
-    return f"{len(open_)} nodes {how}, their positions are not unique: {some}"
+    yield Finding("loose-nodes", f"{len(open_)} nodes {how}, their positions are not unique: {some}")
 
 
 def on_stability(state, equilibrium, subject="the equilibrium"):
-    """Remarks on the stability of an equilibrium, and on other equilibria: pairs of a kind and a text."""
+    """Findings on the stability of an equilibrium, and on other equilibria."""
     stability = equilibrium.stability
     if stability is None:
         return
     if stability.sign == -1:
-        yield "saddle", f"{subject} is a saddle ({stability.why}): {_way_out(state, stability)}"
+        yield Finding("unstable", f"{subject} is a saddle ({stability.why}): {_way_out(state, stability)}")
         return
     if stability.sign is None:
-        yield "stability", f"whether {subject} is stable is not decided: {stability.why}"
+        yield Finding("stability-in-doubt", f"whether {subject} is stable is not decided: {stability.why}")
     pushing = "bars" if _bars_push(state) else "slack lines"
     if equilibrium.may_turn_over:
         pull = (state.element_tension[state.system.net.laws == LINEAR] >= 0.0).all()
         lowest = equilibrium.stats.get("above_lowest") == 0.0
         which = "none of them lower" if lowest else "and lower ones, which ± does not know"
-        yield "others", f"{'bars can' if pull else 'bars'} push: there may be other equilibria, {which}"
+        yield Finding(
+            "lowest-in-doubt", f"{'bars can' if pull else 'bars'} push: there may be other equilibria, {which}"
+        )
     elif equilibrium.stats.get("above_lowest", 0.0) is None:
-        yield "others", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
+        yield Finding(
+            "lowest-in-doubt", f"{pushing} push: there may be other equilibria, and lower ones, which ± does not know"
+        )
     elif equilibrium.stats.get("unsure"):
         lower = f"{equilibrium.stats['above_lowest']:.3g} J"
-        yield "others", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
+        yield Finding(
+            "lowest-in-doubt", f"{pushing} push: another state may be lower by up to {lower}, which ± does not know"
+        )
 
 
 def _way_out(state, stability):
@@ -86,34 +94,29 @@ def _way_out(state, stability):
 
 
 def remarks_on(state, stats, utilisation, equilibrium):
-    """Remarks on an equilibrium: pairs of a kind and a text."""
+    """Findings on an equilibrium."""
     net = state.system.net
-    for text in floor_remark(net, float(state.stress.max())):
-        yield "floor", text
+    yield from floor_remark(net, float(state.stress.max()))
     yield from on_stability(state, equilibrium)
-    if text := remark_on_open(state, equilibrium):
-        yield "slack", text
+    yield from remark_on_open(state, equilibrium)
     if state.system.dead and (others := np.flatnonzero(net.laws != TENSION_ONLY)).size < len(net.laws) and others.size:
         law = list(NAMES)[net.laws[others[0]]]
-        yield (
-            "bound",
+        yield Finding(
+            "not-proven",
             f'line {net.line[others[0]]} can push (law = "{law}"): ± are estimates, as the proven '
             'bound asks for law = "tension-only" on all lines',
         )
     if starts := equilibrium.stats.get("starts"):
         apart = max(starts) - min(starts)
         if apart > 1e-9 * max(map(abs, starts)):
-            yield (
-                "starts",
+            yield Finding(
+                "two-equilibria",
                 f"two starts lead to two equilibria, {apart:.3g} J apart: this is the lower one, a third may be "
                 'lower still; law = "tension-only" has no such states',
             )
-    for text in strength_remark(utilisation):
-        yield "strength", text
-    for text in strain_remark((float(state.strain.max()), int(state.strain.argmax()))):
-        yield "strain", text
-    for text in collapse_remark(state):
-        yield "collapse", text
+    yield from strength_remark(utilisation)
+    yield from strain_remark((float(state.strain.max()), int(state.strain.argmax())))
+    yield from collapse_remark(state)
 
 
 def _bars_push(state):
@@ -136,7 +139,8 @@ def collapse_remark(state):
     driven = np.concatenate([[], *(drive.cells[:, 0] for drive in system.drives)]).astype(int)
     far, size = float(moved.max() - moved[driven].max(initial=0.0)), float(np.linalg.norm(np.ptp(points, axis=0)))
     if far > size and state.strain.max() < 1.0:
-        yield (
+        yield Finding(
+            "collapse",
             f"the web collapses: node {int(moved.argmax())} moves by {moved.max():.4g} m, and the whole web measures "
-            f"{size:.4g} m; lines that do not push cannot keep the shape of what nothing holds: add supports or lines"
+            f"{size:.4g} m; lines that do not push cannot keep the shape of what nothing holds: add supports or lines",
         )

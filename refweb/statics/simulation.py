@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import SolverError
+from ..findings import Finding
 from ..net.tension_laws import SMOOTH
 from ..registry import STATICS, load
 from ..results.columns import FIRST, static_energies
@@ -70,12 +71,12 @@ class Simulation:
 
     def remarks(self):
         """Remarks for a reader of the results."""
-        yield from self._remarks.texts()
+        yield from self._remarks.findings()
         yield from self.system.remarks()
         if self._passage is not None and self.rows:
             yield from self._passage.overlaps.remarks()
         if self._lines is not None and self.rows:
-            yield f"lines may have passed through lines: {self._lines.why}"
+            yield Finding("lines-in-doubt", f"lines may have passed through lines: {self._lines.why}", "self_contact")
 
     def _smoothing(self):
         """Function that finds the error of smoothing, None where there is none to be found."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..findings import Finding
 from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
@@ -11,29 +12,29 @@ from ..statics.remarks import remark_on_open
 from .pencil import STRAIN
 
 
-def remarks_on(spectrum_here, state, equilibrium):
-    """Remarks on the modes of an equilibrium: pairs of a kind and a text."""
+def remarks_on(computed, state, equilibrium):
+    """Findings on the modes of an equilibrium."""
     net = state.system.net
-    if spectrum_here.unstable:
-        yield (
+    if computed.unstable:
+        yield Finding(
             "unstable",
-            f"{spectrum_here.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium "
+            f"{computed.unstable} modes have ω² < 0, an imaginary frequency, written as negative: the equilibrium "
             "is a saddle and the web leaves it by itself",
         )
-    if spectrum_here.zero:
-        yield "zero", f"{spectrum_here.zero} directions have no stiffness: they have no frequency and are not listed"
-    if text := remark_on_open(state, equilibrium):
-        yield "slack", text
+    if computed.zero:
+        text = f"{computed.zero} directions have no stiffness: they have no frequency and are not listed"
+        yield Finding("no-stiffness", text)
+    yield from remark_on_open(state, equilibrium)
     kinked = (net.laws != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
     if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
-        yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
-    for text in floor_remark(net, float(state.stress.max())):
-        yield "floor", text
+        text = f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
+        yield Finding("kink", text)
+    yield from floor_remark(net, float(state.stress.max()))
 
 
 def left_out(system):
     """Effects that the modes of a system leave out."""
     if any(family.damping is not None and family not in system.rotating for family in system.families):
-        yield "forces that depend on velocity, such as damping, are left out"
+        yield Finding("left-out", "forces that depend on velocity, such as damping, are left out")
     if free := [body.name for body in system.net.bodies if not body.fixed]:
-        yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"
+        yield Finding("left-out", f"free bodies wait, and the web does not feel them: {', '.join(free)}", "body")

@@ -143,7 +143,7 @@ def modes(scene, number=10, out=None, force=False, progress: bool | Callable | N
             _follow(result, rest, number, tell)
     finally:
         result.table = as_history(COLUMNS, [row for computed in result.spectra for row in _rows(computed)])
-        result.warnings += left_out(system)
+        result.findings += left_out(system)
         if out is not None:
             result.save(out, force)
     return result
@@ -188,7 +188,7 @@ def _follow(result, rest, number, tell):
             {"step": computed.step, "results": _results(computed), "solver": stats, **_described(computed)}
         )
         remarks.record(computed.step, remarks_on(computed, result.state, equilibrium))
-        result.warnings = [*remarks.texts(), *rest.remarks()]
+        result.findings = [*remarks.findings(), *rest.remarks()]
 
 
 def _results(computed):

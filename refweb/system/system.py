@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from ..effects.base import BreakLimits, Constraint, Family, LineDrive, PrescribedMotion
+from ..findings import Finding
 from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
@@ -114,8 +115,9 @@ class System:
         return self.library.why if "library" in self.__dict__ else None
 
     def remarks(self):
-        """Remarks on the factorizations, each a text."""
-        return self.library.remarks if "library" in self.__dict__ else []
+        """Findings on the factorizations."""
+        remarks = self.library.remarks if "library" in self.__dict__ else []
+        return [Finding("slow-library", text, "solve") for text in remarks]
 
     @cached_property
     def laid(self):

@@ -12,6 +12,7 @@ import pytest
 import refweb
 from refweb.dynamics import method_choice
 from refweb.dynamics.breakpoints import remarks_on_corners
+from refweb.findings import texts
 from refweb.results.files import as_toml
 
 BEGIN = 0.0123
@@ -197,7 +198,7 @@ def trembling(corners, **solve):
 def test_more_corners_than_steps_are_told(solve):
     """The steps told are those taken, and those without the table; it is a warning of the run as well."""
     given, plain = trembling(1500, **solve), trembling(1500, **solve).replace(effects=())
-    (told,) = remarks_on_corners(given, given.build())
+    (told,) = texts(remarks_on_corners(given, given.build()))
     solution, without = refweb.run(given), refweb.run(plain)
     taken, asked = solution.solver["nsteps"], without.solver["nsteps"]
     found = re.fullmatch(
@@ -223,7 +224,9 @@ def test_few_corners_are_not_told(capsys, tmp_path):
         out = capsys.readouterr().out
         assert ("corners" in out) == said and bool(remarks_on_corners(given, given.build())) == said
     implicit = trembling(1500, method="cvode")
-    assert remarks_on_corners(implicit, implicit.build())[0].endswith("on average: cvode takes at least as many steps")
+    assert remarks_on_corners(implicit, implicit.build())[0].text.endswith(
+        "on average: cvode takes at least as many steps"
+    )
 
 
 def test_auto_counts_corners(monkeypatch):

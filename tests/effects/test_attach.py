@@ -403,7 +403,7 @@ def test_who_is_not_felt_is_told():
     tied = bridled().replace(effects=[e for e in bridled().effects if not isinstance(e, refweb.Contact)])
     beside = tied.replace(effects=[*tied.effects, refweb.Body(name="aside", radius=0.1, mass=1.0, position=(9, 9, 9))])
     for scene, told in ((tied, False), (beside, True)):
-        assert any("the web does not feel it" in text for text in notices(scene, scene.build())) == told
+        assert any("the web does not feel it" in finding.text for finding in notices(scene, scene.build())) == told
 
 
 def test_a_node_on_a_fixed_body_is_a_support():

@@ -99,7 +99,7 @@ def check_solver(solver):
 
 def test_run_json(written, web):
     run = read_json(written)
-    keys = "status message scene web results steps events solver cost versions seed warnings"
+    keys = "status message scene web results steps events solver cost versions seed warnings findings"
     assert list(run) == keys.split()
     assert (run["status"], run["message"], run["scene"], run["seed"]) == ("solved", "", "Loaded hexagons", 7)
     assert list(run["web"]) == ["nodes", "lines", "cells", "cable_length", "area", "mass"]

@@ -35,6 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError, PenetrationError, SolverError
+from ...findings import Finding
 from ...net.net import AXIAL_STIFFNESS
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
@@ -192,11 +193,14 @@ class Deepest(NamedTuple):
     def remarks(self, what="the web"):
         """Remarks for a reader of the results; ``what`` is all that it might have touched."""
         if self.overlap <= 0.0:
-            yield f'body "{self.body.name}" never touches {what}, though there is a [contact]'
+            yield Finding(
+                "never-touched", f'body "{self.body.name}" never touches {what}, though there is a [contact]', "contact"
+            )
         elif self.too_deep:
             remedy = "there it starts" if self.at_start else self._remedy()
             share = 100.0 * self.overlap / size_of(self.body)
-            yield f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
+            text = f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
+            yield Finding("deep-contact", text, "contact")
 
     def _remedy(self):
         if self.fixed:
@@ -275,10 +279,12 @@ class Overlaps:
         length = float(net.natural_length[net.line == deepest.line].max())
         share = push_along(body, deepest.overlap, length)
         if share > max(TOLD, self._contact.friction_of(body)):
-            yield (
+            yield Finding(
+                "push-along-lines",
                 f'body "{body.name}" is up to {deepest.overlap:.3g} m deep in elements of {length:.3g} m: where it '
                 f"slides along one, contact may push it forth and back by {100.0 * share:.2g} % of each push on "
-                "average, to which no ± is open; a larger stiffness or subdivide makes that less"
+                "average, to which no ± is open; a larger stiffness or subdivide makes that less",
+                "contact",
             )
 
     def remarks(self):

@@ -15,6 +15,7 @@ import math
 from typing import NamedTuple
 
 from ...errors import SolverError
+from ...findings import Finding
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
 from .overlap import AIM, CORE, DEEPER, allowed, first_between, rounded_up, size_of, too_soft
@@ -111,7 +112,7 @@ class DeepestPair(NamedTuple):
         if self.overlap > self.allowed:
             remedy = "there they start" if self.overlap <= self.initial else self._remedy
             share = 100.0 * self.overlap / min(map(size_of, self.bodies))
-            yield f"{self._where}, {share:.3g} % of the smaller; {remedy}"
+            yield Finding("deep-contact", f"{self._where}, {share:.3g} % of the smaller; {remedy}", "contact")
 
     @property
     def _remedy(self):

@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...findings import Finding
+
 
 def named(system, met):
     """'line 1 ... body "a"', of what has met: a line by its nodes, and a body by its row."""
@@ -62,4 +64,4 @@ class BodyPassage:
     def remarks(self):
         """Remarks for a reader of the results."""
         if np.isfinite(self._met[0]):
-            yield f"lines may have passed through bodies, {self.status()}"
+            yield Finding("passage-in-doubt", f"lines may have passed through bodies, {self.status()}", "contact")

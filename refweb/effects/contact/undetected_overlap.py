@@ -11,6 +11,7 @@ import itertools
 
 import numpy as np
 
+from ...findings import Finding
 from ...net.skeleton import ARC, FROM, KIND, OWNS, POINT, THICKNESS, THIRD, TO
 
 PLACES = 9
@@ -70,12 +71,14 @@ class Silent:
         """Remarks for a reader of the results."""
         for n, (deep, time) in itertools.islice(self._overlaps.items(), MOST):
             a, b = self._pairs[n]
-            yield (
+            yield Finding(
+                "undetected-overlap",
                 f'bodies "{a.name}" and "{b.name}" are {deep:.3g} m deep in each other at t = {time:.6g} s and do not '
-                "feel it: between_bodies = true in [contact] lets bodies touch"
+                "feel it: between_bodies = true in [contact] lets bodies touch",
+                "body",
             )
         if (more := len(self._overlaps) - MOST) > 0:
-            yield f"{more} more pairs of bodies are in each other"
+            yield Finding("undetected-overlap", f"{more} more pairs of bodies are in each other", "body")
 
 
 def _depth(body, body_b, places, x):

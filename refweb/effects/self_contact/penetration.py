@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from ...errors import PenetrationError, SolverError
+from ...findings import Finding
 from ...net.net import AXIAL_STIFFNESS, LENGTH
 
 AIM = 0.8
@@ -142,7 +143,7 @@ class Passage:
     def remarks(self):
         """Remarks for a reader of the results."""
         if (status := self.status()) != "certified":
-            yield f"lines may have passed through lines, {status}"
+            yield Finding("lines-in-doubt", f"lines may have passed through lines, {status}", "self_contact")
 
     def _enough(self, overlap, elements, v):
         """Stiffness that may hold what overlaps so far [N/m].

@@ -1,0 +1,83 @@
+"""Findings: remarks, warnings and refusals of a run, each with a code that programs can ask for."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+NOTE, WARNING, REFUSAL = "note", "warning", "refusal"
+"""Severities: what a run has done by itself, what limits its results, and why it has none."""
+CODES = {
+    "balance-drift": "Energy or momentum does not follow from what acts.",
+    "body-not-felt": "A body and no contact: the web does not feel it.",
+    "breaks-in-doubt": "Breaks within ± of each other, or in another order in the step-refinement run.",
+    "collapse": "Lines that do not push have let the web collapse.",
+    "deep-contact": "A contact is deeper than is allowed of a body.",
+    "digits-not-reached": "The digits asked for are not reached.",
+    "event-not-seen": "A threshold is passed and passed back within a step.",
+    "idle-load": "Something acts on supports alone and moves nothing.",
+    "integration": "A method of dynamics cannot finish.",
+    "kink": "Elements between slack and taut, of which no vibration is linear.",
+    "large-strain": "A strain beyond what the law describes.",
+    "law-floor": "The smooth law lets slack lines push.",
+    "left-out": "Effects that natural frequencies leave out.",
+    "lines-in-doubt": "Lines may have passed through lines.",
+    "loose-nodes": "Positions that the equilibrium leaves open.",
+    "lowest-in-doubt": "Other equilibria may be lower.",
+    "mesh-file": "Lines of a file that lie on each other, or nodes that coincide.",
+    "method-changed": 'Method = "auto" goes on with another method.',
+    "moved-at-start": "Nodes that are elsewhere at the start than their places.",
+    "never-touched": "A body with contact that nothing touches.",
+    "no-error": "± of results is not known.",
+    "no-stiffness": "Directions without stiffness, which have no frequency.",
+    "no-support": "Parts that no support holds along an axis.",
+    "not-proven": "± of statics is an estimate and no proven bound.",
+    "over-strength": "A line is stressed above its strength.",
+    "passage-in-doubt": "Lines may have passed through bodies.",
+    "push-along-lines": "Contact pushes a body along lines, to which ± is blind.",
+    "repeated": "A run was repeated with other settings.",
+    "resumed": "A run goes on with other versions of libraries.",
+    "short-window": "A mean whose window was not full at the end.",
+    "slow-library": "A library that makes the run fast is not there.",
+    "solver": "A solver has found no answer.",
+    "stability-in-doubt": "The stability of the equilibrium is not decided.",
+    "starts-in-body": "A body that starts inside of the web, or the web in a body.",
+    "surface": "Repairs of the surface of a body.",
+    "tables": "Breakpoints of tables shorten the steps.",
+    "two-equilibria": "Two starts lead to two equilibria.",
+    "undetected-overlap": "Bodies in each other that do not touch each other.",
+    "unstable": "The equilibrium is a saddle.",
+}
+"""Meaning of each code."""
+
+
+class Finding(NamedTuple):
+    """A remark, a warning or a refusal.
+
+    Attributes
+    ----------
+    code : str
+        One of `CODES`.
+    text : str
+        What a reader has to know.
+    table : str
+        Name of the table of the scene that it is about; empty for none.
+    severity : {"warning", "note", "refusal"}
+        What it is.
+    """
+
+    code: str
+    text: str
+    table: str = ""
+    severity: str = WARNING
+
+
+def texts(findings):
+    """Texts of all findings but refusals, which the message of a run has."""
+    return [finding.text for finding in findings if finding.severity != REFUSAL]
+
+
+def read_findings(summary):
+    """Findings of the content of ``run.json``; of a folder that has warnings alone, these without a code."""
+    if "findings" in summary:
+        return [Finding(**entry) for entry in summary["findings"]]
+    return [Finding("", text) for text in summary["warnings"]]
