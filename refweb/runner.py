@@ -233,9 +233,9 @@ def notices(scene, system):
 def _idle(system, times):
     """Warnings of what acts from outside on supports alone, at some times."""
     for family in system.families:
-        if family.internal or family.angular_velocity is not None:
+        if family.balance.internal or family.frame.angular_velocity is not None:
             continue
-        times = sorted({*times, *family.times})
+        times = sorted({*times, *family.timing.times})
         between = [0.5 * (before + after) for before, after in itertools.pairwise(times)]
         felt = [system.force_of(family, t, np.zeros((system.rows, 3))) != 0.0 for t in (*times, *between)[:MOST_TIMES]]
         acts = np.any(felt, axis=0)

@@ -50,7 +50,7 @@ class Solved:
     """
 
     def __init__(self, system, x, v, h, f=None, mass=None, sweeps=1000):
-        net, self.families = system.net, [family for family in system.families if family.rubbing is not None]
+        net, self.families = system.net, [family for family in system.families if family.velocity.implicit is not None]
         mass = net.mass if mass is None else mass
         inverse = np.where(system.supported, 0.0, 1.0 / np.where(mass > 0.0, mass, 1.0)[:, None])
         contacts, parts = np.zeros(SPACE, CONTACT), np.zeros(SPACE * PARTS, PART)
@@ -58,7 +58,7 @@ class Solved:
         ends, count = [], 0
         for m, family in enumerate(self.families):
             begin = count
-            count = family.rubbing.detect(x, family.cells, family.data, contacts, parts, begin)
+            count = family.velocity.implicit.detect(x, family.cells, family.data, contacts, parts, begin)
             contacts["term"][begin:count] = m
             ends.append((begin, count))
         assert count <= SPACE
@@ -68,7 +68,7 @@ class Solved:
             if len(turns.carried):
                 contact_solver.carry(n, x, carriers, turns, contacts, parts)
             contact_solver.prepare(h, n, v, inverse, contacts, parts)
-        laws = Functions(LAW, [family.rubbing.law for family in self.families])
+        laws = Functions(LAW, [family.velocity.implicit.law for family in self.families])
         total = np.zeros_like(v) if f is None else f.copy()
         for self.sweeps in range(sweeps):
             change = contact_solver.gauss_seidel(h, self.sweeps, total, inverse, contacts, parts, count, laws)
@@ -80,7 +80,7 @@ class Solved:
             system.drive(0.0, x.copy(), self.after)
         self.mean, self.power, self.felt = 0.5 * (v + self.after), 0.0, np.zeros(3)
         for family, (begin, end) in zip(self.families, ends, strict=True):
-            out, memory = np.ones((len(family.cells), family.observed)), np.zeros((len(family.cells), 8), MEMORY)
+            out, memory = np.ones((len(family.cells), family.columns)), np.zeros((len(family.cells), 8), MEMORY)
             contact_solver.commit(1, memory, self.mean, contacts, parts, begin, end, out)
             self.power += out[:, OWN].sum()
             self.felt += out[:, FELT:].sum(axis=0) if out.shape[1] > FELT else 0.0

@@ -156,7 +156,7 @@ def test_effect(name, i, law, seed):
 
 def check_family(net, system, family, seed):
     """A family alone in its system."""
-    assert family.cells.dtype == np.int32 and len(family.cells) == len(family.data)
+    assert family.cells.dtype == np.int32 and len(family.cells) == len(system.data_of(family, 0.0))
     x, v = state(net, seed)
     d = np.where(system.supported, 0.0, state(net, seed + 100)[0])
     # Steps that cross no kink: the lines of this net are at least 1e-3 of strain from it at these states.
@@ -170,7 +170,7 @@ def check_family(net, system, family, seed):
         assert max(remainder) <= 10 * scale or abs(slope(remainder, steps) - 2) < 0.1
 
     force = system.force(t, x, v)
-    if family.stiffness is None:
+    if family.tangent.stiffness is None:
         np.testing.assert_array_equal(system.force(t, x + d, v), force)
     else:
         K = system.pattern.matrix(system.stiffness(t, x, v))
@@ -183,21 +183,21 @@ def check_family(net, system, family, seed):
         values = np.linalg.eigvalsh(system.pattern.matrix(system.stiffness(t, x, v, definite=True)).toarray())
         assert values[0] >= -1e-12 * values[-1]
 
-    if family.damping is not None:
+    if family.velocity.damping is not None:
         C = system.pattern.matrix(system.damping(t, x, v))
         forces = [system.force(t, x, v + h * d).ravel()[system.free] - force.ravel()[system.free] for h in steps]
         product = C @ d.ravel()[system.free]
         remainder = [np.linalg.norm(f + h * product) for h, f in zip(steps, forces, strict=True)]
         assert max(remainder) <= 1e-13 * np.abs(force).sum() or abs(slope(remainder, steps) - 2) < 0.1
         values = np.linalg.eigvalsh((C + C.T).toarray())
-        assert values[0] >= -1e-12 * values[-1] and (values[-1] > 0.0 or family.power is None)
+        assert values[0] >= -1e-12 * values[-1] and (values[-1] > 0.0 or family.balance.power is None)
 
-    if family.power is not None:
+    if family.balance.power is not None:
         (out,) = system.forces(t, x, v)[1]
-        np.testing.assert_allclose(out[:, family.power].sum(), np.sum(force * v), rtol=1e-12)
-        assert family.book == "work" or out[:, family.power].max() <= 0.0
+        np.testing.assert_allclose(out[:, family.balance.power].sum(), np.sum(force * v), rtol=1e-12)
+        assert family.balance.column == "work" or out[:, family.balance.power].max() <= 0.0
 
-    if family.internal:
+    if family.balance.internal:
         position, moment = net.points + x, len(net.points) - net.spins
         size = np.abs(force).sum()
         assert np.abs(force[:moment].sum(axis=0)).max() <= 1e-14 * size
@@ -205,7 +205,9 @@ def check_family(net, system, family, seed):
         if any(not body.shape.once for body in felt):
             return  # bodies with axes, which do not turn
         moments = np.vstack([np.cross(position, force)[:moment], force[moment:]])
-        if family.damping is None or all(body.spin is not None for body in felt):  # else the supports have a moment
+        if family.velocity.damping is None or all(
+            body.spin is not None for body in felt
+        ):  # else the supports have a moment
             assert np.abs(moments.sum(axis=0)).max() <= 1e-14 * size
         turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
         turn *= np.linalg.det(turn)
@@ -268,10 +270,10 @@ def test_derivatives_in_hard_states(name, i, law, place):
                 return np.sum(one.energy_of(family, t, x + h * d) - one.energy_of(family, t, x - h * d))  # noqa: B023
 
             assert agrees(gain, -2.0 * np.sum(force * d))
-        for part, dx, dv in ((family.stiffness, d, 0.0 * d), (family.damping, 0.0 * d, d)):
+        for part, dx, dv in ((family.tangent.stiffness, d, 0.0 * d), (family.velocity.damping, 0.0 * d, d)):
             if part is None:
                 continue
-            values = one.stiffness(t, x, v) if part is family.stiffness else one.damping(t, x, v)
+            values = one.stiffness(t, x, v) if part is family.tangent.stiffness else one.damping(t, x, v)
             assert np.isfinite(values).all()
 
             def change(h, dx=dx, dv=dv):

@@ -33,28 +33,26 @@ def ruling(integrator, system, reach, speed):
     """
     net = system.net
     moving = np.flatnonzero(~system.supported.all(axis=1) & (net.mass > 0.0))
-    stiff, lossy = (
-        _parts(system, [getattr(family, name) for family in system.families], reach, speed)[:, moving]
-        / net.mass[moving]
-        for name in ("bound", "damping_bound")
-    )
+    families = system.families
+    bounds = [family.tangent.bound for family in families], [family.velocity.bound for family in families]
+    stiff, lossy = (_parts(system, part, reach, speed)[:, moving] / net.mass[moving] for part in bounds)
     both = np.sqrt(lossy.sum(axis=0) ** 2 + 4.0 * stiff.sum(axis=0)) + lossy.sum(axis=0)
     largest = both.max(initial=0.0)
     if not largest > 0.0:
         return Rule(np.inf, "nothing, as nothing vibrates")
     worst = int(both.argmax())
     damped = largest > np.sqrt(2.0) * 2.0 * np.sqrt(stiff[:, worst].sum())
-    family = system.families[int((lossy if damped else stiff)[:, worst].argmax())]
+    family = families[int((lossy if damped else stiff)[:, worst].argmax())]
     row = int(moving[worst])
     if damped:
         by = f"damping at {system.row_name(row)}"
-    elif family.lines:
+    elif family.over_lines:
         of_it = [row, *(node for body in net.bodies if row in (body.row, body.spin) for node in body.carried)]
         at = np.flatnonzero(np.isin(family.cells, of_it).any(axis=1))
         data = net.line_data[at]
         by = f"elasticity of line {net.line[at[(data[:, AXIAL_STIFFNESS] / data[:, LENGTH]).argmax()]]}"
     else:
-        name = "friction" if family.rubbing is not None else family.name
+        name = "friction" if family.velocity.implicit is not None else family.name
         by = f"{name} at {system.row_name(row)}"
     return Rule(integrator.safety * integrator.stretch * 4.0 / largest, by)
 
@@ -63,7 +61,7 @@ def _parts(system, bounds, reach, speed):
     """Parts of each family in the bounds of the row sums, shape (families, rows)."""
     rates, parts, turns = np.zeros(system.rows), [], RigidRotations.of(system.net)
     for family, bound in zip(system.families, bounds, strict=True):
-        before, data = rates.copy(), system.net.line_data if family.lines else family.data
+        before, data = rates.copy(), system.data_of(family, 0.0)
         if bound is not None:
             bound(reach, speed, np.zeros((system.rows, 3)), system.net.mass, rates, family.cells, data)
         parts.append(rates - before)

@@ -51,7 +51,7 @@ def _probes_of_warnings(system, followed, step_size):
         from ..results.observables.overlap import probe_of
 
         by_name |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
-    for i in (i for i, family in enumerate(system.families) if family.crossing is not None):
+    for i in (i for i, family in enumerate(system.families) if family.contact.crossing is not None):
         cells = len(system.families[i].cells)
         by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
     if pairs_of(system):
@@ -71,7 +71,7 @@ def _of_tension(probe):
 
 def _tells_strain(system, scale):
     """Tell if the largest tension times a scale is that of the most strained element in any case."""
-    net, lines = system.net, [family for family in system.families if family.lines]
+    net, lines = system.net, [family for family in system.families if family.over_lines]
     if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
     numbers = np.column_stack([scale * net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, SLACKNESS : SMOOTHING + 1]])

@@ -58,7 +58,11 @@ def remarks_on(start, system):
     before = np.zeros((system.rows, 3)) if start.x is None else start.x
     refined = before.copy()
     system.drive(0.0, refined)
-    inner = [(family.contact, system.energy_of(family, 0.0, refined)) for family in system.families if family.internal]
+    inner = [
+        (family.contact.with_lines, system.energy_of(family, 0.0, refined))
+        for family in system.families
+        if family.balance.internal
+    ]
     moved = np.flatnonzero((refined != before).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)

@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, real, table
-from .base import Family, without
+from .base import Balance, CellElements, Family, Tangent, without
 from .vectors import cross, dot
 
 LARGEST = math.radians(30.0)
@@ -211,10 +211,7 @@ class Bending(Table):
             data=np.column_stack([spring, vectors.reshape(-1, 6)]),
             force=force,
             energy=energy,
-            stiffness=stiffness,
-            bound=bound,
-            book="bending_energy",
-            internal=True,
-            elements=elements,
-            disable_cells=without(0),
+            tangent=Tangent(stiffness, bound),
+            balance=Balance("bending_energy", internal=True),
+            elements=CellElements(elements, without(0)),
         )

@@ -10,7 +10,7 @@ import functools
 from ..errors import InputError
 from ..kernels import ENERGY, FORCE, kernel
 from ..net.net import AXIAL_STIFFNESS
-from .base import STRAIN, TENSION, Family
+from .base import STRAIN, TENSION, Balance, Family, Timing
 
 HELD = "rupture_energy"
 """Column of the numbers of the lines with what a broken element held [J]."""
@@ -52,12 +52,9 @@ def held_energy(net):
     return Family(
         name="rupture",
         cells=net.cells,
-        data=net.line_data,
+        data=None,
         force=force,
         energy=energy,
-        book="rupture_energy",
-        observed=2,
-        lines=True,
-        internal=True,
-        at_rest=False,
+        balance=Balance("rupture_energy", internal=True),
+        timing=Timing(at_rest=False),
     )

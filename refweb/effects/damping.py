@@ -26,7 +26,7 @@ from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
-from .base import POWER, TENSION, Family, column
+from .base import POWER, TENSION, Balance, Family, Tangent, Timing, VelocityForce, column
 from .line_kernels import gradient, law_of, pull_together, strain
 
 
@@ -227,18 +227,12 @@ class Damping(Table):
                 Family(
                     name="damping",
                     cells=net.cells,
-                    data=net.line_data,
+                    data=None,
                     force=force,
-                    stiffness=stiffness,
-                    book="dissipated_energy",
-                    observed=3,
-                    power=POWER,
-                    lines=True,
-                    damping=damping,
-                    damping_bound=bound,
-                    internal=True,
-                    symmetric=False,
-                    at_rest=False,
+                    tangent=Tangent(stiffness, symmetric=False),
+                    velocity=VelocityForce(damping, bound),
+                    balance=Balance("dissipated_energy", POWER, internal=True),
+                    timing=Timing(at_rest=False),
                 )
             )
         if self.rate:
@@ -249,13 +243,9 @@ class Damping(Table):
                     cells=column(nodes),
                     data=self.rate * net.mass[nodes, None],
                     force=drag,
-                    book="dissipated_energy",
-                    observed=1,
-                    power=0,
-                    damping=drag_damping,
-                    damping_bound=drag_bound,
-                    impulse=drag_impulse,
-                    at_rest=False,
+                    velocity=VelocityForce(drag_damping, drag_bound),
+                    balance=Balance("dissipated_energy", 0, impulse=drag_impulse),
+                    timing=Timing(at_rest=False),
                 )
             )
         return families

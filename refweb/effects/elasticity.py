@@ -18,7 +18,7 @@ from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table, table
-from .base import STRAIN, TENSION, Family
+from .base import STRAIN, TENSION, Balance, Family, Tangent
 from .line_kernels import law_of, pull_together, strain
 
 
@@ -173,13 +173,9 @@ class Elasticity(Table):
         return Family(
             name="elasticity",
             cells=net.cells,
-            data=net.line_data,
+            data=None,
             force=force,
             energy=energy,
-            stiffness=stiffness,
-            bound=bound,
-            book="strain_energy",
-            observed=2,
-            lines=True,
-            internal=True,
+            tangent=Tangent(stiffness, bound),
+            balance=Balance("strain_energy", internal=True),
         )

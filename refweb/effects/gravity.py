@@ -6,7 +6,7 @@ import numpy as np
 
 from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from ..tables import Several, Table, table, vector
-from .base import Family, column
+from .base import Balance, Family, column
 
 
 @kernel(FORCE)
@@ -61,7 +61,5 @@ class Gravity(Table):
             data=np.outer(net.mass[heavy], self.acceleration),
             force=force,
             energy=energy,
-            book="potential_energy",
-            impulse=impulse,
-            moment_free=True,
+            balance=Balance("potential_energy", impulse=impulse, moment_free=True),
         )

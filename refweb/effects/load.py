@@ -73,5 +73,5 @@ class Load(Table):
         """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
         data = np.tile(self.force, (len(loaded), 1))
-        kernels = dict(force=force, energy=energy, impulse=impulse)
+        kernels = dict(impulse=impulse, force=force, energy=energy)
         return outer_load(net, "load", column(loaded), data, self.factor, **kernels)

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..tables import Several, Table, real, rows, table
+from .base import Balance, MovingFrame
 from .turning_axes import families
 
 GRAVITATION = 3.986004418e14
@@ -97,4 +98,5 @@ class Orbit(Table):
         n = np.sqrt(GRAVITATION / self.radius) / self.radius if self.mean_motion is None else self.mean_motion
         frame = self._frame()
         pull, speed = n**2 * frame.T @ np.diag([3.0, 0.0, -1.0]) @ frame, n * frame[2]
-        return families(net, speed.tolist(), pull, name="orbit", book="orbit_energy", orbit_radius=self.radius)
+        frame = MovingFrame(tuple(speed.tolist()), self.radius)
+        return families(net, frame, pull, name="orbit", balance=Balance("orbit_energy"))

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table, vector
-from .base import without
+from .base import CellElements, Tangent, without
 from .outer_load import factor_at, outer_load
 
 # Columns of data: p n; dX/dξ; the factor.
@@ -152,11 +152,8 @@ class Pressure(Table):
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         arguments = dict(
             force=force,
-            stiffness=stiffness,
-            bound=bound,
-            symmetric=False,
-            elements=at,
-            disable_cells=without(slice(NORMAL, NORMAL + 3)),
+            tangent=Tangent(stiffness, bound, symmetric=False),
+            elements=CellElements(at, without(slice(NORMAL, NORMAL + 3))),
         )
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **arguments)
 

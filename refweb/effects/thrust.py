@@ -19,7 +19,7 @@ from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import quote
 from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table
-from .base import without
+from .base import CellElements, Tangent, without
 from .line_kernels import direction
 from .outer_load import factor_at, outer_load
 
@@ -122,9 +122,10 @@ class Thrust(Table):
         reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
-        force_kernels = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
-        force_kernels |= dict(elements=np.array([cell]), disable_cells=without(0))
-        return outer_load(net, "thrust", cells, data, self.factor, **force_kernels)
+        parts = dict(
+            force=force, tangent=Tangent(stiffness, bound, False), elements=CellElements(np.array([cell]), without(0))
+        )
+        return outer_load(net, "thrust", cells, data, self.factor, **parts)
 
     def _line(self, web, node):
         """Number of the line that ends at a node."""

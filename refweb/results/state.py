@@ -33,8 +33,8 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, OWN] for i, f in enumerate(self.system.families) if f.contact}
-        felt = self.system.contact_forces.of(per_cell) if any(f.felt for f in self.system.families) else None
+        contact = {i: per_cell[i][:, OWN] for i, f in enumerate(self.system.families) if f.contact.with_lines}
+        felt = self.system.contact_forces.of(per_cell) if any(f.contact.felt for f in self.system.families) else None
         return force, per_cell.tension, contact, felt
 
     def overlap(self, body):
@@ -128,7 +128,7 @@ class State:
         book = {}
         for family in (f for f in self.system.families if f.energy is not None):
             energy = float(self.system.energy_of(family, self.time, self.x).sum())
-            book[family.book] = book.get(family.book, 0.0) + energy
+            book[family.balance.column] = book.get(family.balance.column, 0.0) + energy
         work = -book.pop("work", 0.0)
         book |= {"total_energy": sum(book.values()), "work": work}
         return {name: book[name] for name in static_energies(self.system)}

@@ -63,7 +63,7 @@ def check_speed(system, t):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
     family = system.rotating[0]
-    speed = np.linalg.norm(family.angular_velocity)
+    speed = np.linalg.norm(family.frame.angular_velocity)
     key = "angular_velocity" if family.name == "frame" else "mean_motion"
     raise SolverError(
         f"no equilibrium: [{family.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "

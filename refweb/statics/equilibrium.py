@@ -148,7 +148,7 @@ def force_scale(system, t, x, tension):
     """
     stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
-    outer = [f for f in system.families if not f.lines]
+    outer = [f for f in system.families if not f.over_lines]
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
     return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 

@@ -55,7 +55,7 @@ class LinePassage:
             self.deepest.refuse(float(depth[cell, 0]), f"load step {state.time:g}", cell)
         met, path = np.zeros(4, dtype=np.int64), state.x - self._x
         numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, family.cells, family.data, met
-        if self.why == UNFOLLOWED and family.crossing.meets(*numbers):
+        if self.why == UNFOLLOWED and family.contact.crossing.meets(*numbers):
             self.why = (
                 f"{lines_of(self._system.net, met)} meet on their straight ways to load step {state.time:g}; smaller "
                 "load_steps may tell whether they pass or slide around each other"

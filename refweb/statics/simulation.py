@@ -184,7 +184,7 @@ def _passage_of(scene, system):
 
 def _lines_of(scene, system):
     """The `refweb.statics.line_penetration.LinePassage` of a scene, None without lines that touch lines."""
-    if not any(family.crossing is not None for family in system.families):
+    if not any(family.contact.crossing is not None for family in system.families):
         return None
     from .line_penetration import LinePassage
 

@@ -141,10 +141,9 @@ class Carried:
         self._arrange(system.pattern, system.free)
         state, damped = self._state(x, v), {}
         for i, family in enumerate(self._families):
-            if family.damping is not None:
+            if family.velocity.damping is not None:
                 damped[i] = np.zeros_like(blocks[i])
-                data = system.line_data(t) if family.lines else family.data
-                family.damping(t, x, v, damped[i], family.cells, data, False)
+                family.velocity.damping(t, x, v, damped[i], family.cells, system.data_of(family, t), False)
         for cell, entries in zip(self._cells, self._entries, strict=True):
             T, _, turned, L = self._matrices(cell, state)
             expanded = _beside(L @ blocks[cell.family][cell.at] @ T, blocks, cell)

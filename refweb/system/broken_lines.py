@@ -65,7 +65,7 @@ def torn(system, elements, energies):
     changed.net = replace(net, line_data=numbers)
     broken = np.zeros(len(net.cells), dtype=bool)
     broken[elements] = True
-    changed.families = [_severed(family, broken, numbers) for family in system.families]
+    changed.families = [_severed(family, broken) for family in system.families]
     for kept in ("unsupported_parts", "carriers"):
         changed.__dict__.pop(kept, None)
     changed.arrange()
@@ -81,7 +81,7 @@ def _breakable(system):
 
     changed = copy.copy(system)
     changed.net = net = system.net.with_column(HELD, 0.0)
-    changed.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
+    changed.families = [*system.families]
     changed.families.append(held_energy(net))
     changed.weakness = BreakLimits(np.full(len(net.cells), np.inf))
     return changed
@@ -93,17 +93,16 @@ def with_broken_lines(system):
     return torn(system, elements, np.zeros(len(elements)))
 
 
-def _severed(family, broken, numbers):
-    """A family that does nothing through broken elements; ``numbers`` are those of the lines."""
-    if family.lines:
-        return replace(family, data=numbers)
-    if family.elements is None or family.disable_cells is None:
+def _severed(family, broken):
+    """A family that does nothing through broken elements."""
+    if family.elements.numbers is None or family.elements.disable is None:
         return family
-    left = replace(family, data=_without(family, family.data, broken[family.elements]))
-    if family.crossing is None:
+    left = replace(family, data=_without(family, family.data, broken[family.elements.numbers]))
+    crossing = family.contact.crossing
+    if crossing is None:
         return left
-    beside = _without(family, family.crossing.data, broken[family.crossing.elements])
-    return replace(left, crossing=family.crossing._replace(data=beside))
+    crossing = crossing._replace(data=_without(family, crossing.data, broken[crossing.elements]))
+    return replace(left, contact=family.contact._replace(crossing=crossing))
 
 
 def _without(family, data, ends):
@@ -112,7 +111,7 @@ def _without(family, data, ends):
     if not ends.any():
         return data
     data, end_data = data.copy(), data[ends]
-    family.disable_cells(end_data)
+    family.elements.disable(end_data)
     data[ends] = end_data
     return data
 
@@ -123,11 +122,11 @@ def tear(system, t, x, v, elements):
     What ends is the energy of the system less that of the torn one; of several that break together each has its share
     of that by what it held itself.
     """
-    energy = sum(system.energy_of(f, t, x)[elements] for f in system.families if f.lines and f.energy is not None)
-    stored = [f for f in system.families if f.book not in ("work", "dissipated_energy")]
+    energy = sum(system.energy_of(f, t, x)[elements] for f in system.families if f.over_lines and f.energy is not None)
+    stored = [f for f in system.families if f.balance.column not in ("work", "dissipated_energy")]
     before = sum(system.energy_of(family, t, x).sum() for family in stored)
     changed = torn(system, elements, np.zeros(len(elements)))
-    left = [f for f in changed.families if f.book not in ("work", "dissipated_energy")]
+    left = [f for f in changed.families if f.balance.column not in ("work", "dissipated_energy")]
     lost = before - sum(changed.energy_of(family, t, x).sum() for family in left)
     share = (
         np.abs(energy) / np.abs(energy).sum()

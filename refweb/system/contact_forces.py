@@ -42,11 +42,11 @@ class ContactForces:
         self.rows = pairs = system.rows - self.first
         self._cells, self._pairs = [family.cells for family in system.families], {}
         for i, family in enumerate(system.families):
-            if family.felt:
-                body, partner = (*family.felt, -1)[:2]
-                lines = elements if family.contact and family.energy is not None else 0
-                known.append((i, body, partner, lines, pairs if family.pairs else -1, -1))
-                pairs += len(family.pairs)
+            if family.contact.felt:
+                body, partner = (*family.contact.felt, -1)[:2]
+                lines = elements if family.contact.with_lines and family.energy is not None else 0
+                known.append((i, body, partner, lines, pairs if family.contact.pairs else -1, -1))
+                pairs += len(family.contact.pairs)
         self.families = np.array(known, dtype=np.int64).reshape(len(known), 6)
         for n, pair in enumerate(pairs_of(system)):
             self._pairs[frozenset(body.row for body in pair)] = self.rows + n

@@ -20,7 +20,7 @@ def at_rest(system):
     """
     refuse_broken(system.net)
     waiting = [body.row for body in system.net.bodies if not body.fixed]
-    if not waiting and all(family.at_rest for family in system.families):
+    if not waiting and all(family.timing.at_rest for family in system.families):
         return system
     _ = system.library  # both say what factorizes for either
     rest = copy.copy(system)
@@ -33,7 +33,7 @@ def at_rest(system):
         rest.carriers, rest.carried = system.carriers.waiting(system.net), np.zeros_like(system.carried)
     rest.families = []
     for family in system.families:
-        if not family.at_rest:
+        if not family.timing.at_rest:
             continue
         felt = ~np.isin(family.cells, waiting).any(axis=1)
         if felt.all():

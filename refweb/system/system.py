@@ -75,7 +75,7 @@ class System:
         self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
         self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
-        if sum(family.lines and family.power is not None for family in self.families) > 1:
+        if sum(family.over_lines and family.balance.power is not None for family in self.families) > 1:
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
         for body in net.bodies:
@@ -129,12 +129,12 @@ class System:
     @property
     def lines(self):
         """The `Family` of the lines by their law; None where they have no tension."""
-        return next((family for family in self.families if family.lines), None)
+        return next((family for family in self.families if family.over_lines), None)
 
     @property
     def _in_tangent(self):
         """Families with a stiffness or a damping: those of the pattern, in its order."""
-        return [f for f in self.families if f.stiffness is not None or f.damping is not None]
+        return [f for f in self.families if f.tangent.stiffness is not None or f.velocity.damping is not None]
 
     @cached_property
     def pattern(self):
@@ -164,7 +164,7 @@ class System:
     @property
     def _lines_in_tangent(self):
         """Number of the lines among the families of the pattern; None where they have no tension."""
-        return next((i for i, family in enumerate(self._in_tangent) if family.lines), None)
+        return next((i for i, family in enumerate(self._in_tangent) if family.over_lines), None)
 
     @cached_property
     def unsupported_parts(self):
@@ -175,8 +175,8 @@ class System:
 
     def per_cell(self):
         """`PerCell` of new arrays; those of families over the lines are one."""
-        lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.lines)])))
-        return PerCell([lines if f.lines else np.zeros((len(f.cells), f.observed)) for f in self.families], lines)
+        lines = np.zeros((len(self.net.cells), max([2, *(f.columns for f in self.families if f.over_lines)])))
+        return PerCell([lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.families], lines)
 
     def blocks(self):
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""
@@ -187,12 +187,15 @@ class System:
     def working(self):
         """Sign of each family: 1 if its power counts as work, −1 if its power is energy lost, else 0."""
         signs = {"work": 1, "dissipated_energy": -1}
-        return np.array([signs[f.book] if f.power is not None else 0 for f in self.families], dtype=np.int64)
+        return np.array(
+            [signs[f.balance.column] if f.balance.power is not None else 0 for f in self.families], dtype=np.int64
+        )
 
     @property
     def corners(self):
         """Times at which a table of time has a corner [s], increasing."""
-        times = [t for part in (*self.families, *self.drives, *self.line_drives) for t in part.times]
+        times = [t for family in self.families for t in family.timing.times]
+        times += [t for drive in (*self.drives, *self.line_drives) for t in drive.times]
         return np.unique(np.array(times, dtype=float))
 
     def line_data(self, t):
@@ -223,12 +226,12 @@ class System:
         """The same system with other numbers of its lines, of the shape of `Net.line_data`."""
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
-        changed.families = [replace(f, data=numbers) if f.lines else f for f in self.families]
         changed._at_time = None
         return changed
 
-    def _data(self, family, t):
-        return self.line_data(t) if family.lines else family.data
+    def data_of(self, family, t):
+        """Numbers of the cells of a family at time t, shape (cells, columns)."""
+        return self.line_data(t) if family.over_lines else family.data
 
     @cached_property
     def length_force_kernel(self):
@@ -258,23 +261,23 @@ class System:
     def forces(self, t, x, v=None, per_cell=None):
         """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
         v, per_cell = self._zero if v is None else v, self.per_cell() if per_cell is None else per_cell
-        f, lines = np.zeros((self.rows, 3)), self.line_data(t)
+        f = np.zeros((self.rows, 3))
         for family, out in zip(self.families, per_cell, strict=True):
-            family.force(t, x, v, f, family.cells, lines if family.lines else family.data, out)
+            family.force(t, x, v, f, family.cells, self.data_of(family, t), out)
         if self.carriers:
             self.carriers.add_forces_to_bodies(x, f)
         return Forces(f, per_cell)
 
     def force_of(self, family, t, x, v=None):
         """Force on every row of one family [N]."""
-        f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), max(family.observed, 2)))
-        family.force(t, x, self._zero if v is None else v, f, family.cells, self._data(family, t), out)
+        f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), max(family.columns, 2)))
+        family.force(t, x, self._zero if v is None else v, f, family.cells, self.data_of(family, t), out)
         return f
 
     def outer_force(self, t, x=None, v=None):
         """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
         x = self._zero if x is None else x
-        outer = [self.force_of(family, t, x, v) for family in self.families if not family.internal]
+        outer = [self.force_of(family, t, x, v) for family in self.families if not family.balance.internal]
         return sum(outer, np.zeros((self.rows, 3)))
 
     @cached_property
@@ -305,7 +308,7 @@ class System:
         out = np.zeros(len(family.cells))
         if family.energy is None:
             return out
-        family.energy(t, x, family.cells, self._data(family, t), out)
+        family.energy(t, x, family.cells, self.data_of(family, t), out)
         return out
 
     def energy(self, t, x):
@@ -320,10 +323,10 @@ class System:
         """
         v, blocks = self._zero if v is None else v, self.blocks() if blocks is None else blocks
         for family, block in zip(self._in_tangent, blocks, strict=True):
-            if family.stiffness is None or not (only is None or family in only):
+            if family.tangent.stiffness is None or not (only is None or family in only):
                 block[:] = 0.0
             else:
-                family.stiffness(t, x, v, block, family.cells, self._data(family, t), definite)
+                family.tangent.stiffness(t, x, v, block, family.cells, self.data_of(family, t), definite)
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_stiffness(values, self, t, x, v, blocks)
@@ -332,7 +335,7 @@ class System:
     @property
     def symmetric(self):
         """True if K and C are symmetric."""
-        return all(f.symmetric for f in self.families) and not self.carried.any()
+        return all(f.tangent.symmetric for f in self.families) and not self.carried.any()
 
     @cached_property
     def turning(self):
@@ -347,9 +350,9 @@ class System:
     @property
     def dead(self):
         """True if the only internal forces are the tensions of the lines, and all others are dead loads."""
-        outer = [f for f in self.families if not f.internal]
-        inner = [f for f in self.families if f.internal]
-        return all(f.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
+        outer = [f for f in self.families if not f.balance.internal]
+        inner = [f for f in self.families if f.balance.internal]
+        return all(f.tangent.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
 
     @property
     def convex(self):
@@ -359,7 +362,7 @@ class System:
     @property
     def contact(self):
         """True if the web may touch bodies."""
-        return any(family.contact for family in self.families)
+        return any(family.contact.with_lines for family in self.families)
 
     @cached_property
     def contact_forces(self):
@@ -371,25 +374,25 @@ class System:
     @property
     def rotating(self):
         """Families of the forces of inertia in a frame that turns, none where none does."""
-        return [family for family in self.families if family.angular_velocity is not None]
+        return [family for family in self.families if family.frame.angular_velocity is not None]
 
     @property
     def orbit_radius(self):
         """Radius of the orbit that the web is in [m], None where it is in none."""
-        return next((f.orbit_radius for f in self.families if f.orbit_radius is not None), None)
+        return next((f.frame.orbit_radius for f in self.families if f.frame.orbit_radius is not None), None)
 
     def damping(self, t, x, v, blocks=None):
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity.
 
         ``blocks`` are `blocks` to write to, which a loop keeps.
         """
-        if not any(f.damping is not None for f in self.families):
+        if not any(f.velocity.damping is not None for f in self.families):
             return None
         blocks = self.blocks() if blocks is None else blocks
         for family, block in zip(self._in_tangent, blocks, strict=True):
             block[:] = 0.0
-            if family.damping is not None:
-                family.damping(t, x, v, block, family.cells, self._data(family, t), False)
+            if family.velocity.damping is not None:
+                family.velocity.damping(t, x, v, block, family.cells, self.data_of(family, t), False)
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_damping(values, self, x, v, blocks)

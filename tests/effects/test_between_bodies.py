@@ -45,7 +45,7 @@ def system(one, other, held=False, more=(), **contact):
     ]
     net = discretisation.build(FAR, CABLE)
     whole = System(net, [*bodies, *more, refweb.Contact(between_bodies=True, **contact)], np.zeros((2, 3), dtype=bool))
-    own = [family for family in whole.families if family.pairs or family.cells.shape[1] == 6]
+    own = [family for family in whole.families if family.contact.pairs or family.cells.shape[1] == 6]
     return [System(whole.net, [SimpleNamespace(on=lambda _, f=f: f)], whole.supported[:2]) for f in own]
 
 

@@ -97,7 +97,7 @@ def test_forces_of_contact_are_those_of_the_law(loss, column):
             theta, cell = contact["theta"][column], slice(contact["cell"], contact["cell"] + 1)
             seen = (1.0 - theta) * kick.v + theta * kick.after
             where = family.cells[cell], family.data[cell]
-            family.force(0.0, kick.x, seen, total, *where, np.zeros((1, family.observed)))
+            family.force(0.0, kick.x, seen, total, *where, np.zeros((1, family.columns)))
         kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-8 * np.abs(kick.own).max())
         found += bool(np.isin(family.cells[contacts["cell"], :2], kick.system.net.carried).any())
@@ -128,7 +128,7 @@ def test_forces_of_drag_are_those_of_the_law():
         kick = Kick(seed, LOSSES["drag"])
         total = np.zeros_like(kick.v)
         for one in kick.families:
-            one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), one.observed)))
+            one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), one.columns)))
         kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-10 * np.abs(kick.own).max())
 

@@ -342,7 +342,7 @@ def test_bound_bounds(law):
         C = system.pattern.matrix(system.damping(0.0, x, v)).toarray()
         largest = scipy.linalg.eigvalsh(C, np.diag(np.repeat(net.mass, 3)))[-1]
         (family,), losses = system.families, np.zeros(len(net.points))
-        family.damping_bound(0.0, 0.0, x, net.mass, losses, family.cells, family.data)
+        family.velocity.bound(0.0, 0.0, x, net.mass, losses, family.cells, system.data_of(family, 0.0))
         assert 0.0 < largest <= (losses / net.mass).max() * (1.0 + 1e-12)
 
 

@@ -106,7 +106,7 @@ def one_line(shape, order, exponent):
     body = refweb.Body(**{"name": "it", "shape": shape, "position": (0.0, 0.0, 0.0), "fixed": True, **SHAPES[shape]})
     cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1.0, order=order)
     system = nets.system(web, cable, [body, refweb.Contact(stiffness=1e3, exponent=exponent)], False)
-    return system, next(family for family in system.families if family.contact)
+    return system, next(family for family in system.families if family.contact.with_lines)
 
 
 def deep_states(system, shape, count=25, seed=5):
@@ -123,7 +123,7 @@ def deep_states(system, shape, count=25, seed=5):
 
 def force_of(system, family, x):
     force = np.zeros_like(x)
-    out = np.zeros((len(family.cells), family.observed))
+    out = np.zeros((len(family.cells), family.columns))
     family.force(0.0, x, np.zeros_like(x), force, family.cells, family.data, out)
     return force
 
@@ -143,7 +143,7 @@ def test_force_is_minus_the_slope_of_energy_however_deep(shape, order, exponent)
             continue
         touched += 1
         blocks = np.zeros((len(family.cells), *2 * (3 * family.cells.shape[1],)))
-        family.stiffness(0.0, x, np.zeros_like(x), blocks, family.cells, family.data, False)
+        family.tangent.stiffness(0.0, x, np.zeros_like(x), blocks, family.cells, family.data, False)
         rows = family.cells[0]
         for column, (row, axis) in enumerate([(row, axis) for row in rows for axis in range(3)]):
             d = np.zeros_like(x)

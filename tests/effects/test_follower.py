@@ -307,7 +307,7 @@ def exact():
     """Displacement of the unknowns at 0.01 s, by DOP853 at a tolerance of 1e-11, and the work by one more equation."""
     system = blown()
     free, mass = system.free, np.repeat(system.net.mass, 3)[system.free]
-    loads = [f for f in system.families if f.book == "work"]
+    loads = [f for f in system.families if f.balance.column == "work"]
 
     def rate(t, y):
         x, v = np.zeros((system.rows, 3)), np.zeros((system.rows, 3))
@@ -379,10 +379,10 @@ def test_bounds_bound():
     for family in system.families[1:]:
         x = 0.05 * rng.standard_normal((system.rows, 3))
         rates = np.zeros(system.rows)
-        family.bound(0.0, 0.0, x, system.net.mass, rates, family.cells, family.data)
+        family.tangent.bound(0.0, 0.0, x, system.net.mass, rates, family.cells, family.data)
         for t in (0.0, 0.7, 1.0, 9.0):
             blocks = np.empty((len(family.cells), 3 * family.cells.shape[1], 3 * family.cells.shape[1]))
-            family.stiffness(t, x, x, blocks, family.cells, family.data, False)
+            family.tangent.stiffness(t, x, x, blocks, family.cells, family.data, False)
             sums = np.zeros((system.rows, 3))
             for cell, block in zip(family.cells, blocks, strict=True):
                 sums[cell] += np.abs(block).sum(axis=1).reshape(-1, 3)

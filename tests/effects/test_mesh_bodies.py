@@ -33,7 +33,7 @@ def one_line(file, order=1, **contact):
     body = refweb.Body(name="it", shape="mesh", file=file, position=(0.0, 0.0, 0.0), axes=AXES, fixed=True)
     cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1.0, order=order)
     system = nets.system(web, cable, [body, refweb.Contact(**{"stiffness": 1e3, **contact})], False)
-    return system, next(family for family in system.families if family.contact)
+    return system, next(family for family in system.families if family.contact.with_lines)
 
 
 def deep_states(system, count, seed=5):
@@ -48,7 +48,7 @@ def deep_states(system, count, seed=5):
 
 
 def force_of(family, x):
-    force, out = np.zeros_like(x), np.zeros((len(family.cells), family.observed))
+    force, out = np.zeros_like(x), np.zeros((len(family.cells), family.columns))
     family.force(0.0, x, np.zeros_like(x), force, family.cells, family.data, out)
     return force
 
@@ -66,7 +66,7 @@ def test_force_is_minus_the_slope_of_energy(files, name, order, exponent):
             continue
         touched += 1
         blocks = np.zeros((1, *2 * (3 * family.cells.shape[1],)))
-        family.stiffness(0.0, x, np.zeros_like(x), blocks, family.cells, family.data, False)
+        family.tangent.stiffness(0.0, x, np.zeros_like(x), blocks, family.cells, family.data, False)
         np.testing.assert_allclose(blocks[0], blocks[0].T, rtol=0, atol=1e-9 * np.abs(blocks).max())
         np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * np.abs(force).max())
         for column, (row, axis) in enumerate([(row, axis) for row in family.cells[0] for axis in range(3)]):
@@ -275,12 +275,12 @@ def test_shares_of_losses_are_those_of_the_rise():
 def test_friction_on_a_mesh_takes_energy(files):
     """In all states of random slip; what is lost is the power of the force that is felt."""
     system, _ = one_line(files["ell"], friction=0.4, damping=0.5, slip_velocity=0.1)
-    family = next(family for family in system.families if family.power is not None)
+    family = next(family for family in system.families if family.balance.power is not None)
     rng, touched = np.random.default_rng(4), 0
     for x in deep_states(system, 30):
         v = rng.standard_normal(x.shape)
         v[system.net.bodies[0].row] = 0.0
-        force, out = np.zeros_like(x), np.zeros((1, family.observed))
+        force, out = np.zeros_like(x), np.zeros((1, family.columns))
         family.force(0.0, x, v, force, family.cells, family.data, out)
         assert out[0, 0] <= 0.0 and (force * v).sum() == pytest.approx(out[0, 0], abs=1e-12 * np.abs(force).max())
         touched += out[0, 0] < 0.0

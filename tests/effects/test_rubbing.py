@@ -66,7 +66,7 @@ class Kick:
         self.v = np.where(system.supported, 0.0, 10.0 ** rng.uniform(-3, 1) * rng.standard_normal(shown))
         self.h = float(10.0 ** rng.uniform(-5, -1))
         self.f = loaded * 10.0 * rng.standard_normal(shown)
-        (self.family,) = (one for one in system.families if one.rubbing is not None)
+        (self.family,) = (one for one in system.families if one.velocity.implicit is not None)
         solved = Solved(system, self.x, self.v, self.h, self.f, self.mass)
         self.contacts, self.rows, self.sweeps = solved.contacts, solved.rows, solved.sweeps
         self.own, self.after, self.mean = solved.forces, solved.after, solved.mean

@@ -413,7 +413,7 @@ def test_pairs_that_are_found_give_the_same_run(monkeypatch):
     for limit in (20_000, 0):
         monkeypatch.setattr(table, "LISTED", limit)
         system, course, history = thrown(strings(damping=2.0, step_size=1e-5))
-        assert [family.finder is None for family in system.families][-1] == bool(limit)
+        assert [family.contact.finder is None for family in system.families][-1] == bool(limit)
         runs.append((course.x, course.v, history.energies.sum(axis=1), course.work))
     for one, other in zip(*runs, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
@@ -424,7 +424,7 @@ def test_free_strings_keep_energy_and_momenta():
     drifts = []
     for finer in (1, 2, 4):
         system, course, history = thrown(strings(held=False, duration=0.008), safety=0.2 / finer)
-        stored = [family.book for family in system.families].index("self_contact_energy")
+        stored = [family.balance.column for family in system.families].index("self_contact_energy")
         assert history.energies[:, stored].max() > 1e-5
         drifts.append(course.drift)
         mass, place = system.net.mass[:, None], system.net.points
@@ -820,8 +820,8 @@ def test_near_along_the_net_is_what_is_so_in_the_run(reels, pushed):
         solve=refweb.Dynamic(duration=0.12),
         accuracy=refweb.Accuracy(error="none"),
     )
-    family = next(family for family in scene.build().families if family.crossing is not None)
-    assert ([0, 1] in family.elements.tolist()) == pushed
+    family = next(family for family in scene.build().families if family.contact.crossing is not None)
+    assert ([0, 1] in family.elements.numbers.tolist()) == pushed
 
 
 # Friction

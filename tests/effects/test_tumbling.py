@@ -81,17 +81,17 @@ def test_contract(effect, seed):
             w = v.copy()
             w[spins] = [body.turning(x, v) for body in bodies]
             (out,), power = one.forces(0.0, x, v)[1], (f * w).sum()
-            expected = out[:, 0].sum() if family.power is not None else 0.0
+            expected = out[:, 0].sum() if family.balance.power is not None else 0.0
             assert power == pytest.approx(expected, rel=1e-12, abs=1e-13 * np.abs(f * w).sum()) and expected <= 0.0
         for dx, dv in ((d, 0.0 * d), (0.0 * d, d)):
-            if (family.damping if dv.any() else family.stiffness) is None:
+            if (family.velocity.damping if dv.any() else family.tangent.stiffness) is None:
                 continue
             values = one.stiffness(0.0, x, v) if dx.any() else one.damping(0.0, x, v)
             product = one.pattern.matrix(values) @ (dx + dv).ravel()[one.free]
             changes = [(one.force(0.0, x + h * dx, v + h * dv) - f).ravel()[one.free] for h in steps]
             left = [np.linalg.norm(change + h * product) for h, change in zip(steps, changes, strict=True)]
             assert abs(np.polyfit(np.log(steps), np.log(left), 1)[0] - 2.0) < 0.1 or left[-1] < 1e-6 * np.abs(f).sum()
-        if not family.internal:
+        if not family.balance.internal:
             continue
         size = np.abs(f).sum()
         moment = np.cross(net.points + x, f)[:linear].sum(axis=0) + f[spins].sum(axis=0)

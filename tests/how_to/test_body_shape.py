@@ -127,15 +127,15 @@ PLACES = [
 def test_force_is_minus_the_slope_of_energy(body, place, exponent):
     scene = net_scene({**body, "position": place}, solve=STATIC, contact={"exponent": exponent})
     system = scene.build()
-    (family,) = [family for family in system.families if family.contact]
+    (family,) = [family for family in system.families if family.contact.with_lines]
     rng = np.random.default_rng(3)
     x, v = 0.03 * rng.standard_normal((2, system.rows, 3))
-    force, out = np.zeros_like(x), np.zeros((len(family.cells), family.observed))
+    force, out = np.zeros_like(x), np.zeros((len(family.cells), family.columns))
     family.force(0.0, x, v, force, family.cells, family.data, out)
     assert (out[:, 0] > 0.0).sum() >= 3
     np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * np.abs(force).sum())
     blocks = np.zeros((len(family.cells), *2 * (3 * family.cells.shape[1],)))
-    family.stiffness(0.0, x, v, blocks, family.cells, family.data, False)
+    family.tangent.stiffness(0.0, x, v, blocks, family.cells, family.data, False)
     for _ in range(5):
         d = rng.standard_normal(x.shape)
         step = 1e-6

@@ -106,7 +106,7 @@ def test_it_keeps_what_every_effect_keeps(current, seed):
     assert np.abs(product).max() > 0.1
     assert agrees(lambda h: (system.force(0.0, x + h * d) - system.force(0.0, x - h * d)).ravel(), -2.0 * product)
     rates = np.zeros(len(net.points))
-    family.bound(np.inf, 0.0, x, net.mass, rates, family.cells, family.data)
+    family.tangent.bound(np.inf, 0.0, x, net.mass, rates, family.cells, family.data)
     sums = np.abs(system.pattern.matrix(system.stiffness(0.0, x, v)).toarray()).sum(axis=1).reshape(-1, 3).max(axis=1)
     assert (sums <= rates * (1.0 + 1e-15)).all()
 

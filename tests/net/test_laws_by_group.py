@@ -156,15 +156,16 @@ def test_each_line_has_its_law(order):
         for there, mine in zip(alone.families, mixed.families, strict=True):
             pairs = []
             for family, system in ((there, alone), (mine, mixed)):
-                for block, kernel in zip(blocks, (family.stiffness, family.damping), strict=True):
+                data = system.data_of(family, 0.0)
+                for block, kernel in zip(blocks, (family.tangent.stiffness, family.velocity.damping), strict=True):
                     block[:] = 0.0
                     if kernel is not None:
-                        kernel(0.0, x, v, block, family.cells, family.data, False)
+                        kernel(0.0, x, v, block, family.cells, data, False)
                 f, out = np.zeros_like(x), np.zeros((len(family.cells), 3))
-                family.force(0.0, x, v, f, family.cells, family.data, out)
+                family.force(0.0, x, v, f, family.cells, data, out)
                 f[:] = 0.0  # then of these lines alone
                 some = np.zeros((here.sum(), 3))
-                family.force(0.0, x, v, f, family.cells[here], family.data[here], some)
+                family.force(0.0, x, v, f, family.cells[here], data[here], some)
                 pairs.append([out[here], f, *blocks[:, here], system.energy_of(family, 0.0, x)[here]])
             for one, other in zip(*pairs, strict=True):
                 np.testing.assert_allclose(one, other, rtol=0, atol=SAME * abs(one).max())

@@ -577,7 +577,7 @@ def touching(position, radius, order, subdivide, stiffness=STIFFNESS):
     cable = finer(skew_cable("tension-only"), order, subdivide)
     web, contact = skew_web(), refweb.Contact(stiffness=stiffness)
     net_system = nets.system(web, cable, [ball, contact], supported=held_ends(web, cable))
-    return net_system, next(f for f in net_system.families if f.contact)
+    return net_system, next(f for f in net_system.families if f.contact.with_lines)
 
 
 def segment_distance(a, b, c):

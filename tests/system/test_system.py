@@ -125,8 +125,10 @@ def test_threads_share_a_system():
 
         return None if kernel is None else call
 
-    parts = ("force", "stiffness", "damping")
-    system.families = [replace(f, **{part: meeting(getattr(f, part)) for part in parts}) for f in system.families]
+    for n, family in enumerate(system.families):
+        tangent = family.tangent._replace(stiffness=meeting(family.tangent.stiffness))
+        velocity = family.velocity._replace(damping=meeting(family.velocity.damping))
+        system.families[n] = replace(family, force=meeting(family.force), tangent=tangent, velocity=velocity)
 
     def found(t, place):
         x = np.array([[0.0, 0.0, 0.0], np.subtract(place, [1.0, 0.0, 0.0])])

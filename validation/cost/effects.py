@@ -200,7 +200,7 @@ def of_pairs(scene, times=200):
     from refweb.effects.self_contact.search import near_pairs
 
     system = scene.build()
-    family = next(family for family in system.families if family.crossing is not None)
+    family = next(family for family in system.families if family.contact.crossing is not None)
     numbers = []
     for x, skin in ((system.laid, 0.0), (system.laid * [1.0, 1.0, 3.0], 0.05)):
         _, rows, data = near_pairs(skin, x, family.cells, family.data)

@@ -52,7 +52,7 @@ STEP = 1e-6
 def pushes(state):
     """Force of contact on every row, by differences of its energy: what the force should be, whatever it is [N]."""
     system, force = state.system, np.zeros_like(state.x)
-    for family in (family for family in system.families if family.contact and family.energy is not None):
+    for family in (family for family in system.families if family.contact.with_lines and family.energy is not None):
         for row in np.unique(family.cells):
             for axis in range(3):
                 moved = np.zeros_like(state.x)

@@ -27,12 +27,12 @@ class FollowedPairs(Followed):
     """
 
     def __init__(self, system):
-        self._families, self._net = [family for family in system.families if family.pairs], system.net
+        self._families, self._net = [family for family in system.families if family.contact.pairs], system.net
 
     def soon(self, x, v):
         """Time in which no body comes much nearer to another from displacement x and velocity v [s]."""
         time = np.inf
-        for pair in (pair for family in self._families for pair in family.pairs):
+        for pair in (pair for family in self._families for pair in family.contact.pairs):
             body_a, body_b = pair
             speed = np.linalg.norm(v[body_a.row] - v[body_b.row]) + sum(
                 body.extent * np.linalg.norm(body.turning(x, v)) for body in pair if body.turn is not None
@@ -51,9 +51,9 @@ class FollowedPairs(Followed):
 
     def _met(self, looked_at, x, path, margin):
         family, still = looked_at, np.zeros_like(x)
-        deep = np.zeros((len(family.cells), family.observed))
+        deep = np.zeros((len(family.cells), family.columns))
         family.force(0.0, x, still, np.zeros_like(x), family.cells, family.data, deep)
-        for pair, (depth, *_) in zip(family.pairs, deep, strict=True):
+        for pair, (depth, *_) in zip(family.contact.pairs, deep, strict=True):
             nearer = self._nearer(pair, path) + self._nearer(pair, margin)
             if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):
                 body_a, body_b = pair

@@ -104,8 +104,8 @@ class Ccd(Record):
     @classmethod
     def of(cls, system):
         """Make the record of a system."""
-        numbers = [i for i, family in enumerate(system.families) if family.crossing is not None]
-        crossings, near = [system.families[i].crossing for i in numbers], near_of(system)
+        numbers = [i for i, family in enumerate(system.families) if family.contact.crossing is not None]
+        crossings, near = [system.families[i].contact.crossing for i in numbers], near_of(system)
         return cls(
             families=np.array(numbers, dtype=np.int64),
             places=np.array([near.index(i) for i in numbers], dtype=np.int64),
@@ -151,7 +151,7 @@ class BodyCcd(Record):
     @classmethod
     def of(cls, system):
         """Those of a system."""
-        numbers = [i for i, family in enumerate(system.families) if family.passing is not None]
+        numbers = [i for i, family in enumerate(system.families) if family.contact.passing is not None]
         passing, near, limits = [system.families[i] for i in numbers], near_of(system), np.zeros((0, 2))
         if numbers:
             from ...effects.contact.line_body_ccd import limits_of
@@ -160,7 +160,7 @@ class BodyCcd(Record):
         return cls(
             families=np.array(numbers, dtype=np.int64),
             places=np.array([near.index(i) for i in numbers], dtype=np.int64),
-            meets=Functions(MEETS, [family.passing for family in passing]),
+            meets=Functions(MEETS, [family.contact.passing for family in passing]),
             limits=np.ascontiguousarray(limits[:, 0]),
             factors=np.ascontiguousarray(limits[:, 1]),
             met=np.ones(4, dtype=np.int64),

@@ -25,7 +25,7 @@ def source_of(system, places):
     places : list of (float, ndarray of shape (rows, 3))
         Time [s] and displacement [m] at the ends of steps in turn.
     """
-    families = [f for f in system.families if f.energy is not None and f.book != "work"]
+    families = [f for f in system.families if f.energy is not None and f.balance.column != "work"]
     cells = sum(len(family.cells) for family in families)
     steps = list(zip(places, places[1:], strict=False))[-max(int(MOST / max(cells, 1)), 1) :]
     largest, source = -1.0, (system.families[0], 0)
@@ -45,10 +45,10 @@ def source_of(system, places):
 
 def name_of(system, family, cell):
     """Name of the item that a cell of a family belongs to."""
-    if family.pairs:
-        return " and ".join(f'body "{body.name}"' for body in family.pairs[cell])
-    if family.lines or family.elements is not None:
-        lines = system.net.line[np.atleast_1d(cell if family.lines else family.elements[cell])].tolist()
+    if family.contact.pairs:
+        return " and ".join(f'body "{body.name}"' for body in family.contact.pairs[cell])
+    if family.over_lines or family.elements.numbers is not None:
+        lines = system.net.line[np.atleast_1d(cell if family.over_lines else family.elements.numbers[cell])].tolist()
         return f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} and {lines[1]}"
     if family.cells.shape[1] > 1:
         return f"line {system.net.line[np.isin(system.net.cells, family.cells[cell]).sum(axis=1).argmax()]}"

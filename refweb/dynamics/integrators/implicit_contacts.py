@@ -69,19 +69,22 @@ class ImplicitContacts(Record):
     @classmethod
     def of(cls, system, turns):
         """Those of a system; ``turns`` are its `refweb.net.rotation.RigidRotations`."""
-        families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
+        families = [i for i, family in enumerate(system.families) if family.velocity.implicit is not None]
         terms = [system.families[i] for i in families]
         depths = [depths_of(system, term) for term in terms]
         carriers = np.full(system.rows if len(turns.carried) else 0, -1)
         carriers[turns.carried[:, 0]] = np.arange(len(turns.carried))
         return cls(
             families=np.array(families, dtype=np.int64),
-            detects=Functions(DETECT, [term.rubbing.detect for term in terms]),
-            laws=Functions(LAW, [term.rubbing.law for term in terms]),
-            memories=Arrays(MEMORIES, [np.zeros((len(f.cells), f.rubbing.slots), dtype=MEMORY) for f in terms]),
+            detects=Functions(DETECT, [term.velocity.implicit.detect for term in terms]),
+            laws=Functions(LAW, [term.velocity.implicit.law for term in terms]),
+            memories=Arrays(
+                MEMORIES, [np.zeros((len(f.cells), f.velocity.implicit.slots), dtype=MEMORY) for f in terms]
+            ),
             depths=np.array([number for number, _ in depths], dtype=np.int64),
             elements=Arrays(INTEGERS, [elements for _, elements in depths]),
-            parts=(1 if len(turns.carried) == 0 else CARRIED) * max((term.rubbing.parts for term in terms), default=0),
+            parts=(1 if len(turns.carried) == 0 else CARRIED)
+            * max((term.velocity.implicit.parts for term in terms), default=0),
             pieces=system.net.subdivide,
             carriers=carriers,
         )
@@ -90,10 +93,12 @@ class ImplicitContacts(Record):
 def depths_of(system, family):
     """(``depths``, ``elements``) of the push of the lines of a family on its bodies, see `ImplicitContacts`."""
     near = near_of(system)
-    for i in near if family.contact else ():
+    for i in near if family.contact.with_lines else ():
         push = system.families[i]
-        if push.contact:
-            keys, its = (term.elements * system.rows + term.cells[:, system.net.along.size] for term in (family, push))
+        if push.contact.with_lines:
+            keys, its = (
+                term.elements.numbers * system.rows + term.cells[:, system.net.along.size] for term in (family, push)
+            )
             order = np.argsort(its)
             matches = order[np.minimum(np.searchsorted(its, keys, sorter=order), len(its) - 1)]
             if (its[matches] == keys).all():

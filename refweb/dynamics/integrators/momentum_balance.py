@@ -136,12 +136,12 @@ class Outside(Record):
     def of(cls, system):
         """Make the record of a system."""
         net, linear = system.net, system.rows - system.net.spins
-        outer = [(i, family) for i, family in enumerate(system.families) if not family.internal]
-        known = [family for _, family in outer if family.impulse is not None]
-        damped = [i for i, family in enumerate(known) if family.damping is not None]
-        pushing = [i for i, family in outer if family.impulse is None]
+        outer = [(i, family) for i, family in enumerate(system.families) if not family.balance.internal]
+        known = [family for _, family in outer if family.balance.impulse is not None]
+        damped = [i for i, family in enumerate(known) if family.velocity.damping is not None]
+        pushing = [i for i, family in outer if family.balance.impulse is None]
         return cls(
-            impulses=Functions(IMPULSE, [family.impulse for family in known]),
+            impulses=Functions(IMPULSE, [family.balance.impulse for family in known]),
             cells=Arrays(INDICES, [family.cells for family in known]),
             data=Arrays(MATRIX, [family.data for family in known]),
             damped=np.array(damped, dtype=np.int64),
@@ -166,7 +166,7 @@ def _inverse_reach(net):
 
 def kept_axes(system):
     """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
-    kept = all(f.moment_free or (f.internal and not f.twists) for f in system.families)
+    kept = all(f.balance.moment_free or (f.balance.internal and not f.balance.twists) for f in system.families)
     if system.fixed.any() or not kept:
         return np.zeros((0, 3))
     normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)

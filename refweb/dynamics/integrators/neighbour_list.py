@@ -129,7 +129,7 @@ class NeighbourList(Record):
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
         skin["depth"], skin["lasts"] = np.inf, MANY
         swaps = Functions(SWAP, [swap_for(system.families[i]) for i in near])
-        pairs = any(family.finder is not None for family in system.families)
+        pairs = any(family.contact.finder is not None for family in system.families)
         at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
         skin["widest"] = WIDEST * float(system.net.natural_length.mean()) if pairs else np.inf
         cells, data = [system.families[i].cells for i in near], [system.families[i].data for i in near]
@@ -142,12 +142,16 @@ class NeighbourList(Record):
 
 def near_of(system):
     """Numbers of the families of a system whose cells act only near something."""
-    return [i for i, family in enumerate(system.families) if family.near is not None or family.finder is not None]
+    return [
+        i
+        for i, family in enumerate(system.families)
+        if family.contact.near is not None or family.contact.finder is not None
+    ]
 
 
 def swap_for(family):
     """The kernel that swaps the cells of a family."""
-    return swap_of(family.near) if family.finder is None else swap_pairs_of(family.finder)
+    return swap_of(family.contact.near) if family.contact.finder is None else swap_pairs_of(family.contact.finder)
 
 
 @kernel()

@@ -201,11 +201,11 @@ class Families(Record):
         """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
         families, net = system.families, system.net
         lines = net.line_data.copy() if system.line_drives else net.line_data
-        numbers = [lines if family.lines else family.data for family in families]
-        fast = [i for i, family in enumerate(families) if family.damping is not None]
-        viscous = [i for i in fast if families[i].rubbing is None]
+        numbers = [lines if family.over_lines else family.data for family in families]
+        fast = [i for i, family in enumerate(families) if family.velocity.damping is not None]
+        viscous = [i for i in fast if families[i].velocity.implicit is None]
         still = [i for i in range(1, len(families)) if i not in fast]
-        powers = [(i, f.power, i in fast) for i, f in enumerate(families) if f.power is not None]
+        powers = [(i, f.balance.power, i in fast) for i, f in enumerate(families) if f.balance.power is not None]
         near, stored = near_of(system), [np.zeros(len(family.cells)) for family in families]
         cells = [*(families[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         return cls(
@@ -219,8 +219,8 @@ class Families(Record):
             stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
-            bounds=Functions(k.BOUND, [family.bound or no_bound for family in families]),
-            dampings=Functions(k.BOUND, [families[i].damping_bound or no_bound for i in viscous]),
+            bounds=Functions(k.BOUND, [family.tangent.bound or no_bound for family in families]),
+            dampings=Functions(k.BOUND, [families[i].velocity.bound or no_bound for i in viscous]),
         )
 
 

@@ -160,11 +160,11 @@ class SimpsonBalance:
         self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
         self._families = (
             Arrays(INDICES, [f.cells for f in families]),
-            Arrays(MATRIX, [self._lines if f.lines else f.data for f in families]),
+            Arrays(MATRIX, [self._lines if f.over_lines else f.data for f in families]),
             Functions(ENERGY, [f.energy or no_energy for f in families]),
             Arrays(VECTOR, [np.zeros(len(f.cells)) for f in families]),
         )
-        self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
+        self._powered = [(i, f.balance.power) for i, f in enumerate(families) if f.balance.power is not None]
         self._working = system.working
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
         self._outside = Outside.of(system)

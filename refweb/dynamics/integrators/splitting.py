@@ -111,8 +111,8 @@ class Splitting(CentralDifference):
 
     def __init__(self, system, *observed, order=6, **steps):
         for family in system.families:
-            timed = family.power is not None or len(family.times) > 0
-            if family.damping is not None or timed and not family.dead:
+            timed = family.balance.power is not None or len(family.timing.times) > 0
+            if family.velocity.damping is not None or timed and not family.dead:
                 given = " with damping or friction" if family.name in ("contact", "self_contact") else ""
                 raise InputError(
                     f'[solve] method = "explicit" takes no [{family.name}]{given}, nothing that depends on velocity, '

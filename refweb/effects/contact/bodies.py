@@ -13,12 +13,14 @@ import numpy as np
 
 from ...errors import InputError
 from ...net.skeleton import COLUMNS, THICKNESS
-from ..base import CONTACT_COLUMNS, OWN, Family
+from ..base import OWN, Balance, ContactForce, Family, Tangent, Timing, VelocityForce
 from .body_body_detection import PARTS, SIDE, SIDES
 from .pair import lever
 
 PER_PART, MORE = 3, 1024
 """Contacts that a part of a skeleton has at most on a convex body; room for more where one is not convex."""
+FELT_BY_BOTH = 1, 0
+"""`ContactForce.felt` of two bodies."""
 
 
 def pairs_of(net):
@@ -68,36 +70,31 @@ def _penalty(net, depths, group):
     from .body_body_penalty import kernels, near
 
     force, energy, stiffness, bound = kernels(*depths)
+    turns = any(body.turn is not None for a, b, _ in group for body in (a, b))
     return Family(
         **_shared(net, group),
         force=force,
         energy=energy,
-        stiffness=stiffness,
-        bound=bound,
-        near=near,
-        pairs=tuple((a, b) for a, b, _ in group),
-        book="body_contact_energy",
-        symmetric=not any(body.turn is not None for a, b, _ in group for body in (a, b)),  # moments, and quaternions
+        tangent=Tangent(stiffness, bound, symmetric=not turns),  # moments, and quaternions
+        contact=ContactForce(FELT_BY_BOTH, tuple((a, b) for a, b, _ in group), near),
+        balance=Balance("body_contact_energy", internal=True),
     )
 
 
 def _friction(net, depths, group):
     from .body_body_friction import kernels
 
-    force, stiffness, damping, rubbing = kernels(*depths)
+    force, stiffness, damping, implicit = kernels(*depths)
     shared = _shared(net, group)
     parts = shared["data"][:, [SIDES + PARTS, SIDES + SIDE + PARTS]].sum(axis=1)
     return Family(
         **shared,
         force=force,
-        energy=None,
-        stiffness=stiffness,
-        book="dissipated_energy",
-        power=OWN,
-        damping=damping,
-        rubbing=rubbing(int(parts.max())),
-        symmetric=False,
-        at_rest=False,
+        tangent=Tangent(stiffness, symmetric=False),
+        velocity=VelocityForce(damping, implicit=implicit(int(parts.max()))),
+        contact=ContactForce(FELT_BY_BOTH),
+        balance=Balance("dissipated_energy", OWN, internal=True),
+        timing=Timing(at_rest=False),
     )
 
 
@@ -109,7 +106,7 @@ def _shared(net, group) -> dict:
         row[: len(values)] = values
     rows[:, 0] = rows[:, 0].max()
     cells = np.array(cells, dtype=np.int32)
-    return dict(name="contact", internal=True, felt=(1, 0), cells=cells, data=rows, observed=CONTACT_COLUMNS)
+    return dict(name="contact", cells=cells, data=rows)
 
 
 def _pair(net, first, second, law):

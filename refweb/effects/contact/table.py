@@ -16,7 +16,7 @@ from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest, quote
 from ...tables import Table, boolean, field, real, table
-from ..base import CONTACT_COLUMNS, OWN, Family
+from ..base import OWN, Balance, CellElements, ContactForce, Family, Tangent, Timing, VelocityForce
 from .line_body_ccd import passing
 from .nearest_point import in_sphere, near
 from .pair import AWAY, pair_data
@@ -206,19 +206,15 @@ class Contact(Table):
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         nodes = along.shape[1]
 
-        def disable_cells(numbers):
+        def disable(numbers):
             numbers[:, AWAY : AWAY + 3 * nodes] += np.tile(OUT_OF_REACH, nodes)
 
         return dict(
             name="contact",
-            contact=True,
-            felt=(nodes,),
-            observed=CONTACT_COLUMNS,
-            internal=True,
+            contact=ContactForce((nodes,)),
             cells=np.ascontiguousarray(np.vstack(cells), dtype=np.int32),
             data=np.ascontiguousarray(np.vstack(data)),
-            elements=np.tile(np.arange(len(along)), len(bodies)),
-            disable_cells=disable_cells,
+            elements=CellElements(np.tile(np.arange(len(along)), len(bodies)), disable),
         )
 
     def _penalty(self, net, element, depth, spins, bodies):
@@ -234,37 +230,31 @@ class Contact(Table):
             from .penalty import kernels
 
             (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_reach(depth, spins)
+        if net.order == 1:  # explicit steps take no other elements
+            passes = None if net.quasi_static else passing(depth, *element[1:], spins)
+            pairs["contact"] = pairs["contact"]._replace(near=near(*element, within), passing=passes)
         return Family(
             **pairs,
-            passing=passing(depth, *element[1:], spins) if net.order == 1 and not net.quasi_static else None,
             force=force,
             energy=energy,
-            stiffness=stiffness,
-            bound=bound,
-            near=near(*element, within) if net.order == 1 else None,  # explicit steps take no other elements
-            book="contact_energy",
-            symmetric=spins == 0,  # moments, and quaternions
+            tangent=Tangent(stiffness, bound, symmetric=spins == 0),  # moments, and quaternions
+            balance=Balance("contact_energy", internal=True),
         )
 
     def _friction(self, net, element, depth, spins, bodies):
         from .friction import kernels
 
         force, stiffness, bound, damping = kernels(depth, *element, spins)
-        pairs, rubbing = self._pairs(net, bodies, spins), None
+        implicit = None
         if net.order == 1:  # explicit steps take no other elements
             from . import line_body_friction
 
-            rubbing = line_body_friction.kernels(depth, net.subdivide, element[2], spins)
+            implicit = line_body_friction.kernels(depth, net.subdivide, element[2], spins)
         return Family(
-            **pairs,
+            **self._pairs(net, bodies, spins),
             force=force,
-            energy=None,
-            stiffness=stiffness,
-            bound=bound,
-            book="dissipated_energy",
-            power=OWN,
-            damping=damping,
-            rubbing=rubbing,
-            symmetric=False,
-            at_rest=False,
+            tangent=Tangent(stiffness, bound, symmetric=False),
+            velocity=VelocityForce(damping, implicit=implicit),
+            balance=Balance("dissipated_energy", OWN, internal=True),
+            timing=Timing(at_rest=False),
         )

@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...messages import nearest
 from ...net.net import REFERENCE
 from ...tables import Several, Table, field, real, table, vector
-from ..base import Family, without
+from ..base import Balance, CellElements, Family, Tangent, Timing, VelocityForce, without
 from .force import kernels
 from .implicit_drag import implicit_drag
 
@@ -163,15 +163,9 @@ class Drag(Table):
             cells=cells,
             data=data,
             force=force,
-            book="work" if blows else "dissipated_energy",
-            stiffness=stiffness if cells.shape[1] > 1 else None,
-            bound=bound if cells.shape[1] > 1 else None,
-            observed=1,
-            power=0,
-            damping=damping,
-            rubbing=implicit_drag(cells.shape[1]),
-            symmetric=False,
-            at_rest=blows,
-            elements=elements,
-            disable_cells=without(slice(2)),
+            balance=Balance("work" if blows else "dissipated_energy", power=0),
+            tangent=Tangent(*((stiffness, bound) if cells.shape[1] > 1 else (None, None)), symmetric=False),
+            velocity=VelocityForce(damping, implicit=implicit_drag(cells.shape[1])),
+            timing=Timing(at_rest=blows),
+            elements=CellElements(elements, without(slice(2))),
         )

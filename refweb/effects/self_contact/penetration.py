@@ -35,7 +35,7 @@ HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
 
 def pressed(system):
     """Number of the family of lines against lines of a system, None where there is none."""
-    numbers = (i for i, family in enumerate(system.families) if family.crossing is not None)
+    numbers = (i for i, family in enumerate(system.families) if family.contact.crossing is not None)
     return next(numbers, None)
 
 
@@ -57,7 +57,7 @@ def would_pass(system, v, nodes):
     carries comes with the mass of the body.
     """
     fixed, pairs = system.fixed.all(axis=1), np.reshape(nodes, (2, 2))
-    crossing = system.families[pressed(system)].crossing
+    crossing = system.families[pressed(system)].contact.crossing
     given = f"{lines_of(system.net, nodes)} would pass through each other"
     heavy = []
     for pair in pairs:
@@ -87,7 +87,7 @@ def first_stiffness(system):
     system : refweb.system.system.System
         With any stiffness of lines.
     """
-    net, touch = system.net, system.families[pressed(system)].crossing.touch
+    net, touch = system.net, system.families[pressed(system)].contact.crossing.touch
     lines = float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
     if net.quasi_static:
         return lines
@@ -113,7 +113,8 @@ class Passage:
     def __init__(self, system, unfollowed=None, chosen=False):
         self._system, self._unfollowed, self._chosen = system, unfollowed, chosen
         family = system.families[pressed(system)]
-        self.touch, self._stiffness, self._elements = family.crossing.touch, family.crossing.stiffness, family.elements
+        crossing, self._elements = family.contact.crossing, family.elements.numbers
+        self.touch, self._stiffness = crossing.touch, crossing.stiffness
         self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
 
     def record(self, overlap, crossings):

@@ -10,7 +10,7 @@ from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 def weights(system, column):
     """Weights of (energy of each family, kinetic energy, work, step size) that make a column of the whole net."""
-    total, books = column == "total_energy", [f.book for f in system.families]
+    total, books = column == "total_energy", [f.balance.column for f in system.families]
     stored = [book not in ("work", "dissipated_energy") for book in books]
     weights_found = [
         (total and family_weight) or (book != "work" and book == column)
@@ -42,7 +42,7 @@ class Booked(Observable):
 
     def on(self, system):
         """Refuse a column that no effect writes to."""
-        if self.needs and self.observe.quantity not in [f.book for f in system.families]:
+        if self.needs and self.observe.quantity not in [f.balance.column for f in system.families]:
             raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
 
     def of(self, state):
@@ -149,7 +149,7 @@ class Work(Booked):
         moved = system.drives or system.line_drives
         if not moved:
             super().on(system)
-        loads = [f for f in system.families if f.book == "work"]
+        loads = [f for f in system.families if f.balance.column == "work"]
         if system.net.quasi_static and (moved or any(f.energy is None for f in loads)):
             tables = "[[motion]], [[pressure]], [[thrust]] and [[reel]]"
             raise InputError(f'quantity = "work" is not known in statics with {tables}: it depends on the path')

@@ -39,7 +39,9 @@ def case(*effects, subdivide=1, **contact):
 def solver_of(scene, everything):
     system = scene.build()
     if everything:
-        system.families = [replace(family, near=None, passing=None) for family in system.families]
+        system.families = [
+            replace(family, contact=family.contact._replace(near=None, passing=None)) for family in system.families
+        ]
     solver = Simulation(scene, scene.build(), refweb.Solution(scene)).integrator
     return CentralDifference(system, *solver.observed)
 
@@ -95,11 +97,11 @@ def test_what_is_near_is_what_is_near():
     scene, rng = case(BALL, BOX, subdivide=3), np.random.default_rng(7)
     system = scene.build()
     net, counts = system.net, []
-    for family in (one for one in system.families if one.near is not None):
+    for family in (one for one in system.families if one.contact.near is not None):
         body = next(body for body in net.bodies if body.row == family.cells[0, -1])
         for skin in (0.0, 0.05, 0.3):
             x, chosen = rng.normal(0.0, 0.02, (system.rows, 3)), np.empty(len(family.cells), dtype=np.int64)
-            count = family.near(skin, x, family.cells, family.data, chosen)
+            count = family.contact.near(skin, x, family.cells, family.data, chosen)
             may = np.isin(net.line, net.line[distances(net, body, x) < skin])
             must = np.isin(net.line, net.line[-depths(net, body, x) < skin])
             np.testing.assert_array_equal(np.isin(net.line, net.line[chosen[:count]]).sum(), count)  # whole lines
@@ -119,7 +121,7 @@ def test_far_from_a_body_few_lines_are_looked_at():
     everything = len(lists.cells[1])
     assert everything == 2 * 8 * 7 and skin["depth"] == np.inf  # whoever comes next looks at all
     family = solver.system.families[1]
-    swap, arrays = neighbour_list.swap_of(family.near), (lists.cells, lists.data, lists.outs, lists.stored)
+    swap, arrays = neighbour_list.swap_of(family.contact.near), (lists.cells, lists.data, lists.outs, lists.stored)
     swap(1, 0, 0.05, course.x, *arrays)
     chosen = lists.cells[-1][:, 0]
     assert 0 < len(chosen) < 0.5 * everything
