@@ -146,8 +146,6 @@ def test_effect(name, i, law, seed):
         return drive(net, system)
     if system.constraints:
         return constraint(net, system, seed)
-    if system.line_drives:
-        return line_drive(name, i, law, seed)
     assert system.families
     for family in system.families:
         alone = SimpleNamespace(on=lambda _, family=family: family)
@@ -438,7 +436,10 @@ def constraint(net, system, seed):
     assert np.abs(np.cross(net.points + x, force).sum(axis=0)).max() <= 1e-15 * size
 
 
-def line_drive(name, i, law, seed):
+@pytest.mark.parametrize("name, i", [case for case in cases("extend") if case[0] in ("Reel", "Temperature")])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", range(3))
+def test_natural_lengths(name, i, law, seed):
     """Lengths are a factor times what they are otherwise, in any order of times; ∂E/∂L is the slope of energy."""
     net, effect = skew_net(law), example(name, i)
     own, free = net.natural_length.copy(), np.zeros((len(net.points), 3), dtype=bool)
@@ -449,7 +450,7 @@ def line_drive(name, i, law, seed):
         lengths, others = system.natural_length(time), alone.natural_length(time)
         assert (lengths > 0.0).all()
         np.testing.assert_allclose(lengths, others * np.where(net.line == 0, 0.95, 1.0), rtol=1e-15)
-    driven = np.concatenate([drive.cells[:, 0] for drive in system.line_drives])
+    driven = np.concatenate([elements for elements, _ in system.net.factors])
     np.testing.assert_array_equal(np.delete(lengths, driven), np.delete(own, driven))
     np.testing.assert_array_equal(system.net.natural_length, own)
     energy, lengths, slopes = system.energy(t, x), system.natural_length(t), system.length_force(t, x)

@@ -250,7 +250,7 @@ TABLES = {
 }
 SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
+LISTED += ("motion", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
 FAMILY = {"force": 1, "energy": 1, "bound": 1}
 KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
 KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
@@ -263,8 +263,7 @@ KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1} 
 KERNELS["orbit"] = KERNELS["frame"]
 KERNELS["rupture"] = FAMILY
 KERNELS["drag"] = {**FAMILY, **dict.fromkeys(SOLVED, 1)}
-KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
-KERNELS |= {name: {} for name in ("point_mass", "velocity", "body", "fold")}
+KERNELS |= {name: {} for name in ("reel", "temperature", "point_mass", "velocity", "body", "fold")}
 """Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
 
 
@@ -399,7 +398,7 @@ def summed(*effects):
     for name in effects:
         for which, number in KERNELS[name].items():
             total[which] += number * (2 if name == "drag" and {"body", "contact"} & set(effects) else 1)
-    total["work of lengths"] = min(total["lengths"], 1)
+    total["work of lengths"] = int(bool({"reel", "temperature"} & set(effects)))
     return total
 
 

@@ -98,7 +98,7 @@ it has. It sees what steps miss where ``impulse=impulse`` of `Balance` brings âˆ
 ``internal``.
 
 A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
-`refweb.effects.length_factor`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
+`refweb.effects.natural_lengths`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
 returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every
 effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README, and
 ``tests/reference`` for an ``Examples`` section of its docstring, which is its page in ``refweb help``.

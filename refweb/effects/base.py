@@ -5,7 +5,7 @@ matrix and knows no other effect.
 
 ``on(net)``
     A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
-    `PrescribedMotion`, a `LineDrive`, a `Constraint` or a `BreakLimits`.
+    `PrescribedMotion`, a `Constraint` or a `BreakLimits`.
 ``extend(net)``
     The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
     has no ``on`` first.
@@ -412,28 +412,6 @@ class BreakLimits:
     def watched(self):
         """True if any tension breaks anything."""
         return bool(np.isfinite(self.limits).any())
-
-
-@dataclass(frozen=True, eq=False)
-class LineDrive:
-    """Natural lengths that are prescribed over time; ``kernel`` (signature `LINES`) multiplies them.
-
-    Attributes
-    ----------
-    cells : ndarray of int32, shape (elements, 1)
-        The elements it changes.
-    data : ndarray, shape (rows, columns)
-        Numbers of the kernel.
-    kernel : kernel
-        Multiplies the natural lengths at time t; what multiplies them before or after does not matter.
-    times : sequence of float
-        Times at which the factor has a corner [s].
-    """
-
-    cells: np.ndarray
-    data: np.ndarray
-    kernel: Callable
-    times: tuple = ()
 
 
 def column(rows):

@@ -23,7 +23,7 @@ def static_energies(system):
 def dynamic_energies(system):
     """Names of the energies of a motion."""
     books = dict.fromkeys(family.balance.column for family in system.families)
-    works = "work" in books or system.drives or system.line_drives
+    works = "work" in books or system.drives or system.net.factors
     return ["kinetic_energy", *(book for book in books if book != "work"), *(["work"] if works else []), "total_energy"]
 
 

@@ -18,7 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import BreakLimits, Constraint, Family, LineDrive, PrescribedMotion
+from ..effects.base import BreakLimits, Constraint, Family, PrescribedMotion
+from ..effects.elasticity import length_force
+from ..effects.natural_lengths import NaturalLengths, set_lengths
 from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
@@ -46,8 +48,6 @@ class System:
         One per effect that adds forces.
     drives : list of refweb.effects.base.Drive
         One per effect that prescribes motion; its rows are supported as well.
-    line_drives : list of refweb.effects.base.LineDrive
-        One per effect that prescribes natural lengths.
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
@@ -71,7 +71,6 @@ class System:
                 part = effect.on(net)
                 acting += part if isinstance(part, list) else [part]
         self.families = [a for a in acting if isinstance(a, Family)]
-        self.line_drives = [a for a in acting if isinstance(a, LineDrive)]
         self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
         self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
@@ -195,18 +194,23 @@ class System:
     def corners(self):
         """Times at which a table of time has a corner [s], increasing."""
         times = [t for family in self.families for t in family.timing.times]
-        times += [t for drive in (*self.drives, *self.line_drives) for t in drive.times]
+        times += [t for drive in self.drives for t in drive.times]
+        times += [t for _, table in self.net.factors for t, _ in table]
         return np.unique(np.array(times, dtype=float))
+
+    @cached_property
+    def lengths(self):
+        """The `NaturalLengths` that change with time."""
+        return NaturalLengths.of(self.net)
 
     def line_data(self, t):
         """`Net.line_data` with the natural lengths of time t, shape (elements, columns)."""
-        if not self.line_drives:
+        if not self.net.factors:
             return self.net.line_data
         known = self._at_time
         if known is None or known[0] != t:
             numbers = self.net.line_data.copy()
-            for d in self.line_drives:
-                d.kernel(t, numbers, d.cells, d.data)
+            set_lengths(t, self.lengths, numbers)
             self._at_time = known = t, numbers
         return known[1]
 
@@ -216,10 +220,10 @@ class System:
 
     def at(self, t):
         """The system as it stands at time t: its natural lengths are those of that time, and stay."""
-        if not self.line_drives:
+        if not self.net.factors:
             return self
         view = self.with_line_data(self.line_data(t))
-        view.line_drives = []
+        view.net = replace(view.net, factors=())
         return view
 
     def with_line_data(self, numbers):
@@ -227,23 +231,17 @@ class System:
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
         changed._at_time = None
+        changed.__dict__.pop("lengths", None)
         return changed
 
     def data_of(self, family, t):
         """Numbers of the cells of a family at time t, shape (cells, columns)."""
         return self.line_data(t) if family.over_lines else family.data
 
-    @cached_property
-    def length_force_kernel(self):
-        """Kernel of ∂E/∂L of each element, E the energy of the lines."""
-        from ..effects.elasticity import length_force
-
-        return length_force(self.net)
-
     def length_force(self, t, x):
         """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
         force = np.empty(len(self.net.cells))
-        self.length_force_kernel(t, x, self.net.cells, self.line_data(t), force)
+        length_force(self.net)(t, x, self.net.cells, self.line_data(t), force)
         return force
 
     def drive(self, t, x, v=None):

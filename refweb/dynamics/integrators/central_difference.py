@@ -124,7 +124,9 @@ class CentralDifference(Integrator):
         self.prepare()
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
-        return safe_step.call(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
+        return safe_step.call(
+            0.0, np.inf, len(self._model.lengths.elements) > 0, float(reach), 0.0, x, rest, self._model
+        )
 
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""
@@ -235,7 +237,7 @@ class CentralDifference(Integrator):
         for name in SHARED:
             clock[name] = getattr(course, name)
         clock["least_energy"] = self._least_energy
-        changing = len(self._model.reels.lengths)
+        changing = len(self._model.lengths.elements)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = course.power, np.zeros((2, changing)), course.crossings, *self._contacts
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
@@ -312,7 +314,7 @@ class CentralDifference(Integrator):
         def after(state, begun, count):
             state, running.clock["begun"] = state.copy(), begun
             copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
-            changing, workspace = self._model.reels.lengths.size > 0, Workspace.of(model, copy)
+            changing, workspace = self._model.lengths.elements.size > 0, Workspace.of(model, copy)
             run_steps.call(count, float(course.step), changing, self._scheme, model, self._observed, copy, workspace)
             return state
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numba import types
 
+from ...effects.natural_lengths import set_lengths
 from ...kernels import (
     MATRIX,
     Arrays,
@@ -45,7 +46,7 @@ from .extremes import (
     update_extreme,
 )
 from .neighbour_list import show_near
-from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
+from .step import add_forces, interpolate, interpolate_kicks, note_state
 
 if TYPE_CHECKING:
     from .monitors import Observed
@@ -150,8 +151,8 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
     for i in range(len(motions.kernels)):
         motions.kernels[i](t, x, v, f, motions.cells[i], motions.data[i], motions.outs[i])
-    if model.reels.lengths.size:
-        set_lengths(t, model.reels, data[0])
+    if model.lengths.elements.size:
+        set_lengths(t, model.lengths, data[0])
     f[:] = 0.0
     add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), families.still, forces, cells, data, outs)
     for i in families.viscous:
@@ -222,8 +223,8 @@ def show_again(now: float, inside: Inside, model: Model, observed: Observed, run
     Losses that kicks are solved for are those of the step, see `exchange_losses`.
     """
     families = model.families
-    if model.reels.lengths.size:
-        set_lengths(now, model.reels, families.data[0])
+    if model.lengths.elements.size:
+        set_lengths(now, model.lengths, families.data[0])
     for i in observed.families:
         if not among(model.implicit_contacts.families, i):
             families.forces[i](

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.natural_lengths import NaturalLengths, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
     ENERGY,
     EnergyTable,
     IndexTable,
+    Indices,
     Integers,
     Matrix,
     MatrixTable,
@@ -28,7 +30,7 @@ from ...net.net import AXIAL_STIFFNESS, LENGTH
 from ...net.rotation import RigidRotations, more_kinetic
 
 if TYPE_CHECKING:
-    from .records import Families, Reels
+    from .records import Families, Model
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -174,11 +176,29 @@ def book_motion(driven, mass, x, v, f, before, work):
 
 
 @kernel(leaf=True, apart=("lengths",))
-def book_lengths(t: float, x: Matrix, reels: Reels, was: Vector, length_force: Matrix, work: Vector) -> None:
-    """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
-    reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
-    for c in range(reels.lengths.size):
-        work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
+def write_length_force(
+    t: float, x: Matrix, lengths: NaturalLengths, cells: Indices, lines: Matrix, out: Vector
+) -> None:
+    """Write ∂E/∂L of each natural length that changes [N]."""
+    begin = 0
+    for n in range(lengths.runs.shape[0]):
+        first, last = lengths.runs[n, 0], lengths.runs[n, 1]
+        end = begin + last - first
+        lengths.by_length[0](t, x, cells[first:last], lines[first:last], out[begin:end])
+        begin = end
+
+
+@kernel(leaf=True, apart=("lengths",))
+def change_lengths(t: float, x: Matrix, model: Model, was: Vector, length_force: Matrix, work: Vector) -> None:
+    """Set natural lengths at time t, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL."""
+    lengths, cells, lines = model.lengths, model.families.cells[0], model.families.data[0]
+    for c in range(was.size):
+        was[c] = lines[lengths.elements[c], LENGTH]
+    set_lengths(t, lengths, lines)
+    write_length_force(t, x, lengths, cells, lines, length_force[1])
+    for c in range(was.size):
+        change = lines[lengths.elements[c], LENGTH] - was[c]
+        work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * change
         length_force[0, c] = length_force[1, c]
 
 

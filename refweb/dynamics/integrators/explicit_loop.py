@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.natural_lengths import set_lengths
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
@@ -25,12 +26,13 @@ from .energy_balance import (
     act,
     begin_powers,
     book_energies,
-    book_lengths,
     book_motion,
     book_potential,
     book_powers,
+    change_lengths,
     drifts_away,
     note_motion,
+    write_length_force,
 )
 from .events import ended_by, note_events
 from .extremes import look_at, note_time, plain_value, turns_back, update_extreme
@@ -45,10 +47,8 @@ from .step import (
     give_reaction,
     move,
     move_supports,
-    note_lengths,
     note_state,
     plain_kick,
-    set_lengths,
     set_reaction,
     turn_supports,
     viscous_kick,
@@ -60,7 +60,7 @@ from .workspace import Workspace
 if TYPE_CHECKING:
     from .extremes import Extremes
     from .monitors import Observed
-    from .records import Model, Reels, Running, Scheme
+    from .records import Model, Running, Scheme
 
 HELD = -2
 """What the loop returns where lines would pass whatever the step."""
@@ -114,24 +114,14 @@ def begin_forces(t, changing, extra, reaction, push, model, running):
 @kernel(apart=("booked",))
 def begin_more(t: float, changing: bool, extra: Matrix, push: Vector, model: Model, running: Running) -> None:
     """Write powers, forces of natural lengths and push from outside."""
-    x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
+    x, v, families, outside = running.x, running.v, model.families, model.outside
     if running.clock[0].begun == 0:
         lossy, again = model.implicit_contacts.families, running.clock[0].nsteps > 0
         begin_powers(t, x, v, extra, families, lossy, again, running.power)
     if changing:
-        reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
+        write_length_force(t, x, model.lengths, families.cells[0], families.data[0], running.length_force[0])
     if outside.pushing.size:
         set_push(t, x, v, outside, families, extra, push)
-
-
-@kernel(leaf=True, apart=("lengths",))
-def change_lengths(
-    t: float, x: Matrix, reels: Reels, was: Vector, lines: Matrix, length_force: Matrix, work: Vector
-) -> None:
-    """Give what changes its natural lengths at time t, and book the work of that."""
-    note_lengths(reels, was)
-    set_lengths(t, reels, lines)
-    book_lengths(t, x, reels, was, length_force, work)
 
 
 @kernel(leaf=True, apart=())
@@ -141,7 +131,7 @@ def run_steps(
 ) -> int:  # fmt: skip
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
     where, known, push, before, total = space.where, space.known, space.push, space.before, space.total
-    clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
+    clock, families, motions, nearby = running.clock[0], model.families, model.motions, model.nearby
     mass, inverse, fixed, driven = model.inertia.mass, model.inertia.inverse, model.inertia.fixed, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
@@ -173,7 +163,7 @@ def run_steps(
         if moves:
             move_supports(now, h, x, v, f, space.aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            change_lengths(now, x, reels, space.was, data_of_lines, running.length_force, work)
+            change_lengths(now, x, model, space.was, running.length_force, work)
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
@@ -298,14 +288,14 @@ def advance_rows(
     and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is felt, and goes
     on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.ccd`.
     """
-    clock, events, reels, left = running.clock[0], running.events, model.reels, breath
+    clock, events, lengths, left = running.clock[0], running.events, model.lengths, breath
     total, stopped = space.total, ended_by(events)
     for n in range(times.size):
-        if reels.lengths.size and not clock.begun:
-            set_lengths(clock.time, reels, model.families.data[0])
+        if lengths.elements.size and not clock.begun:
+            set_lengths(clock.time, lengths, model.families.data[0])
         while clock.time < times[n] and not stopped:
             end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
-            changing = reels.corners.size > 2 and reels.corners[0] < end and reels.corners[-3] > clock.time
+            changing = lengths.corners.size > 2 and lengths.corners[0] < end and lengths.corners[-3] > clock.time
             if not begun:
                 clock.since = clock.time
                 if not plan(end, changing, scheme, model, running):
@@ -360,8 +350,8 @@ def begin(
 ) -> None:
     """Write forces, values of probes with their places, and energies at t = 0."""
     families = model.families
-    if model.reels.lengths.size:
-        set_lengths(0.0, model.reels, families.data[0])
+    if model.lengths.elements.size:
+        set_lengths(0.0, model.lengths, families.data[0])
     for i in range(len(families.forces)):
         families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)

@@ -13,6 +13,7 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
+from ...effects.natural_lengths import NaturalLengths
 from ...kernels import (
     INDICES,
     MATRIX,
@@ -25,10 +26,8 @@ from ...kernels import (
     ForceTable,
     Functions,
     IndexTable,
-    Indices,
     IntegerMatrix,
     Integers,
-    LinesTable,
     Matrix,
     MatrixTable,
     PartTable,
@@ -200,7 +199,7 @@ class Families(Record):
     def of(cls, system, outs):
         """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
         families, net = system.families, system.net
-        lines = net.line_data.copy() if system.line_drives else net.line_data
+        lines = net.line_data.copy() if net.factors else net.line_data
         numbers = [lines if family.over_lines else family.data for family in families]
         fast = [i for i, family in enumerate(families) if family.velocity.damping is not None]
         viscous = [i for i in fast if families[i].velocity.implicit is None]
@@ -244,57 +243,6 @@ class Motions(Record):
         )
 
 
-class Reels(Record):
-    """Natural lengths that change.
-
-    Attributes
-    ----------
-    kernels, cells, data : table
-        What changes them, elements counted among those that change.
-    lengths : ndarray, shape (changing,)
-        Natural lengths that the kernels multiply [m].
-    elements : ndarray of int
-        Numbers of the elements that change.
-    lines : ndarray, shape (changing, columns)
-        Numbers of these elements as last set.
-    nodes : ndarray of int, shape (changing, 2)
-        Their nodes.
-    by_length : table
-        One kernel of ∂E/∂L [N], where any length changes.
-    corners : ndarray
-        Times at which a factor of natural lengths has a corner [s], increasing, then ∞ for the end of a row if there
-        are such factors, then −∞ for its start.
-    """
-
-    kernels: LinesTable
-    cells: IndexTable
-    data: MatrixTable
-    lengths: Vector
-    elements: Integers
-    lines: Matrix
-    nodes: Indices
-    by_length: EnergyTable
-    corners: Vector
-
-    @classmethod
-    def of(cls, system):
-        """Those of a system."""
-        drives, net = system.line_drives, system.net
-        elements = np.unique(np.concatenate([[], *(drive.cells[:, 0] for drive in drives)])).astype(np.int64)
-        corners = sorted({time for drive in drives for time in drive.times})
-        return cls(
-            kernels=Functions(k.LINES, [drive.kernel for drive in drives]),
-            cells=Arrays(INDICES, [np.searchsorted(elements, drive.cells).astype(np.int32) for drive in drives]),
-            data=Arrays(MATRIX, [drive.data for drive in drives]),
-            lengths=net.natural_length[elements],
-            elements=elements,
-            lines=net.line_data[elements],
-            nodes=net.cells[elements],
-            by_length=Functions(k.ENERGY, [system.length_force_kernel] if drives else []),
-            corners=np.array([*corners, *([np.inf] if drives else []), -np.inf]),
-        )
-
-
 class Model(Record):
     """A system as the loop sees it; ``corners`` are the times at which a table has one [s], increasing."""
 
@@ -302,7 +250,7 @@ class Model(Record):
     families: Families
     implicit_contacts: ImplicitContacts
     motions: Motions
-    reels: Reels
+    lengths: NaturalLengths
     corners: Vector
     outside: Outside
     nearby: NeighbourList
@@ -315,7 +263,7 @@ class Model(Record):
         """Make the record of a `refweb.system.system.System`, whose families write their values to ``outs``."""
         inertia = Inertia.of(system)
         forces = inertia, Families.of(system, outs), ImplicitContacts.of(system, inertia.turns)
-        changes = Motions.of(system), Reels.of(system), system.corners, Outside.of(system)
+        changes = Motions.of(system), system.lengths, system.corners, Outside.of(system)
         return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
 
 

@@ -118,7 +118,7 @@ class Splitting(CentralDifference):
                     f'[solve] method = "explicit" takes no [{family.name}]{given}, nothing that depends on velocity, '
                     'and of time dead loads alone: use "central-difference" or "cvode"'
                 )
-        if system.drives or system.line_drives:
+        if system.drives or system.net.factors:
             raise InputError(
                 '[solve] method = "explicit" takes nothing that is moved or reeled: use "central-difference" or "cvode"'
             )

@@ -20,14 +20,13 @@ from ...kernels import (
     kernel,
     sum_of,
 )
-from ...net.net import LENGTH
 from ...net.rotation import RigidRotations, add_forces_to_bodies, advance_rotation, note_turns, update_attached_nodes
 from .contacts import feel
 from .energy_balance import act
 from .implicit_contacts import detect_all
 
 if TYPE_CHECKING:
-    from .records import Families, Model, Reels, Running
+    from .records import Families, Model, Running
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -272,24 +271,6 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
         for i in model.implicit_contacts.families:
             running.power[i] = sum_of(families.outs[i][:, 0])
     return turned
-
-
-@kernel(leaf=True)
-def note_lengths(reels, was):
-    """Write natural lengths that change."""
-    for c in range(was.size):
-        was[c] = reels.lines[c, LENGTH]
-
-
-@kernel(apart=("lengths",))
-def set_lengths(t: float, reels: Reels, lines: Matrix) -> None:
-    """Give the elements that change their natural lengths at time t, in the numbers of all ``lines``."""
-    for c in range(reels.lengths.size):
-        reels.lines[c, LENGTH] = reels.lengths[c]
-    for i in range(len(reels.kernels)):
-        reels.kernels[i](t, reels.lines, reels.cells[i], reels.data[i])
-    for c in range(reels.elements.size):
-        lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
 
 
 @kernel(leaf=True, apart=("looks",))

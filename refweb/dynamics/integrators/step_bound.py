@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from ...effects.natural_lengths import set_lengths
 from ...kernels import BOUND, Matrix, kernel
 from ...net.rotation_bounds import carry_rates, pull_rates
-from .step import set_lengths
 
 if TYPE_CHECKING:
     from .records import Families, Inertia, Model, Running
@@ -56,10 +56,10 @@ def safe_step(
     time, and stiffness, which goes with its inverse, is largest at an end.
     """
     bound = math.inf
-    for corner in model.reels.corners:
+    for corner in model.lengths.corners:
         if changing and (start < corner < end or corner == math.inf) or corner == -math.inf:
             if changing:
-                set_lengths(min(max(corner, start), end), model.reels, model.families.data[0])
+                set_lengths(min(max(corner, start), end), model.lengths, model.families.data[0])
             bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.families))
     return bound
 

@@ -57,7 +57,7 @@ class Workspace(Record):
             extra=next(vectors),
             half=next(vectors),
             momenta=next(vectors),
-            was=np.empty(len(model.reels.lengths)),
+            was=np.empty(len(model.lengths.elements)),
             total=np.zeros(sums),
             inside=Inside.of(rows, model.families.outs[0], running.extremes, sums, losses),
         )

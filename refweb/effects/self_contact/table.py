@@ -22,7 +22,7 @@ from ..base import (
     VelocityForce,
     without,
 )
-from ..length_factor import shortest_of
+from ..natural_lengths import shortest_of
 from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
 from .search import distances, near, near_pairs, paired

@@ -146,7 +146,7 @@ class Work(Booked):
 
     def on(self, system):
         """Refuse a scene without such effects, and in statics work that depends on the path."""
-        moved = system.drives or system.line_drives
+        moved = system.drives or system.net.factors
         if not moved:
             super().on(system)
         loads = [f for f in system.families if f.balance.column == "work"]
