@@ -418,7 +418,7 @@ MUTANTS = [
         "factor = 1.0",
     ),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
-    Mutant("dynamics/history", 'scales["stress"] = 0, 1.0 / net.area', 'scales["stress"] = 0, net.area'),
+    Mutant("dynamics/history", 'scales["stress"] = tension, 1.0 / net.area', 'scales["stress"] = tension, net.area'),
     Mutant(
         "dynamics/history",
         "float(extremes.values[slot]), float(extremes.times[slot])",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.base import pairs_of
+from ..effects.base import STRAIN, pairs_of
 from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
 from ..results import probes
@@ -32,14 +32,14 @@ def _probes_of_warnings(system, followed, step_size):
     are probes that are looked at in any case: where one of them is of tensions, the largest of which is that of the
     largest strain, strains need no look of their own. How fast bodies are counts where the ``step_size`` is given [s].
     """
-    net, scales = system.net, {}
+    net, tension, scales = system.net, system.tension_column, {}
     if (net.laws == SMOOTH).any():
-        scales["stress"] = 0, 1.0 / net.area
+        scales["stress"] = tension, 1.0 / net.area
     if np.isfinite(net.strength).any():
-        scales["utilisation"] = 0, 1.0 / (net.area * net.strength)
-    tell = [scale for column, scale in scales.values() if column == 0]
+        scales["utilisation"] = tension, 1.0 / (net.area * net.strength)
+    tell = [scale for _, scale in scales.values()]
     if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
-        scales["strain"] = 1, np.ones(len(net.cells))
+        scales["strain"] = STRAIN, np.ones(len(net.cells))
     by_name = {
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
@@ -66,7 +66,7 @@ def _probes_of_warnings(system, followed, step_size):
 def _of_tension(probe):
     """Tell if a probe follows the largest of all tensions, each times a scale, and no mean of it."""
     every = probe.kernel is probes.line and list(probe.rows[1:]) == [0, len(probe.data)]
-    return every and probe.rows[0] == 0 and probe.sign > 0.0 and not probe.average
+    return every and probe.rows[0] != STRAIN and probe.sign > 0.0 and not probe.average
 
 
 def _tells_strain(system, scale):

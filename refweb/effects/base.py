@@ -25,8 +25,9 @@ import numpy as np
 
 from ..errors import InputError
 
-TENSION, STRAIN, POWER = range(3)
-"""Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
+TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
+"""Columns of what families over the lines observe: tension by the law [N], strain [1], and of a force beside the law
+the tension with it [N] and its power [W]."""
 
 
 OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
@@ -246,8 +247,7 @@ class Family:
     data : ndarray, shape (cells, columns), optional
         Numbers of each cell. None where the cells are the elements of the net: kernels then see the numbers of its
         lines at the time, `refweb.system.system.System.line_data`, and ``out`` is one array for all such terms. It has
-        the whole tension and the strain in the columns `TENSION` and `STRAIN`, and the `POWER` of a force beside that
-        of the law.
+        the columns from `TENSION` on.
     force : kernel
         Adds to the forces.
     balance : Balance

@@ -10,7 +10,7 @@ import functools
 from ..errors import InputError
 from ..kernels import ENERGY, FORCE, kernel
 from ..net.net import AXIAL_STIFFNESS
-from .base import STRAIN, TENSION, Balance, Family, Timing
+from .base import DAMPED_TENSION, STRAIN, TENSION, Balance, Family, Timing
 
 HELD = "rupture_energy"
 """Column of the numbers of the lines with what a broken element held [J]."""
@@ -26,6 +26,8 @@ def kernels(column):
             if data[c, AXIAL_STIFFNESS] == 0.0:
                 out[c, TENSION] = 0.0
                 out[c, STRAIN] = 0.0
+                if out.shape[1] > DAMPED_TENSION:
+                    out[c, DAMPED_TENSION] = 0.0
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):

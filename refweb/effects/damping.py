@@ -26,7 +26,7 @@ from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
-from .base import POWER, TENSION, Balance, Family, Tangent, Timing, VelocityForce, column
+from .base import DAMPED_TENSION, POWER, Balance, Family, Tangent, Timing, VelocityForce, column
 from .line_kernels import gradient, law_of, pull_together, strain
 
 
@@ -80,7 +80,7 @@ def kernels(law, tau, gradients, weights):
                     largest = tension
                 power -= weights[q] * data[c, LENGTH] * pull * rate
                 pull_together(f, cells, c, q, nodes, flat, weights[q] * pull * inverse, p0, p1, p2)
-            out[c, TENSION] = largest
+            out[c, DAMPED_TENSION] = largest
             out[c, POWER] = power
 
     @kernel(STIFFNESS)

@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..effects.base import TENSION
-
 
 class PerCell(list):
     """Values of each family per cell, an array beside each of `System.families`.
@@ -15,17 +13,17 @@ class PerCell(list):
     Attributes
     ----------
     lines : ndarray, shape (elements, columns)
-        That of the lines, with tension [N] and strain [1] in the columns `refweb.effects.base.TENSION` and `STRAIN`.
+        That of the lines, with the columns of `refweb.effects.base`.
     """
 
-    def __init__(self, arrays, lines):
+    def __init__(self, arrays, lines, tension_column):
         super().__init__(arrays)
-        self.lines = lines
+        self.lines, self._tension_column = lines, tension_column
 
     @property
     def tension(self):
-        """Tension of each element [N], a view of ``lines``."""
-        return self.lines[:, TENSION]
+        """Tension of each element [N], with damping where there is some, a view of ``lines``."""
+        return self.lines[:, self._tension_column]
 
 
 class Forces(NamedTuple):

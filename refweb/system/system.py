@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import BreakLimits, Constraint, Family, PrescribedMotion
+from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, Family, PrescribedMotion
 from ..effects.elasticity import length_force
 from ..effects.natural_lengths import NaturalLengths, set_lengths
 from ..net.net import LENGTH
@@ -175,7 +175,13 @@ class System:
     def per_cell(self):
         """`PerCell` of new arrays; those of families over the lines are one."""
         lines = np.zeros((len(self.net.cells), max([2, *(f.columns for f in self.families if f.over_lines)])))
-        return PerCell([lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.families], lines)
+        arrays = [lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.families]
+        return PerCell(arrays, lines, self.tension_column)
+
+    @property
+    def tension_column(self):
+        """Column of what the lines observe that has their whole tension."""
+        return DAMPED_TENSION if any(f.over_lines and f.balance.power is not None for f in self.families) else TENSION
 
     def blocks(self):
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""

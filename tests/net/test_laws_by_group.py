@@ -161,10 +161,10 @@ def test_each_line_has_its_law(order):
                     block[:] = 0.0
                     if kernel is not None:
                         kernel(0.0, x, v, block, family.cells, data, False)
-                f, out = np.zeros_like(x), np.zeros((len(family.cells), 3))
+                f, out = np.zeros_like(x), np.zeros((len(family.cells), 4))
                 family.force(0.0, x, v, f, family.cells, data, out)
                 f[:] = 0.0  # then of these lines alone
-                some = np.zeros((here.sum(), 3))
+                some = np.zeros((here.sum(), 4))
                 family.force(0.0, x, v, f, family.cells[here], data[here], some)
                 pairs.append([out[here], f, *blocks[:, here], system.energy_of(family, 0.0, x)[here]])
             for one, other in zip(*pairs, strict=True):

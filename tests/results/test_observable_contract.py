@@ -11,7 +11,7 @@ import pytest
 from nets import LAWS, skew_net
 
 import refweb
-from refweb.effects.base import CONTACT
+from refweb.effects.base import CONTACT, STRAIN
 from refweb.effects.elasticity import Elasticity
 from refweb.errors import InputError
 from refweb.registry import OBSERVABLES
@@ -76,7 +76,8 @@ def probed(observe, state):
     """(value, place) that the probe of an observable finds in a state."""
     system, found = state.system, observe.probe(state.system)
     force, shown = system.forces(0.0, state.x, state.v)
-    strained = np.column_stack([state.element_tension, state.element_strain])
+    strained = np.zeros((len(system.net.cells), 4))
+    strained[:, system.tension_column], strained[:, STRAIN] = state.element_tension, state.element_strain
     shared = {CONTACT: system.contact_forces.of(shown), **dict(enumerate(shown))}
     rows, data = np.array(found.rows, dtype=np.int64), shared.get(found.family, found.data)
     where = np.array([-1, PLACE])

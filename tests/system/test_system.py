@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb.effects.base import DAMPED_TENSION
 from refweb.effects.damping import Damping
 from refweb.effects.elasticity import Elasticity
 from refweb.system.system import System
@@ -72,7 +73,7 @@ def test_lines_by_name():
         seen = system.forces(0.0, x, v).per_cell
         place = effects.index(next(effect for effect in effects if isinstance(effect, Elasticity)))
         assert seen[place] is seen.lines and np.shares_memory(seen.tension, seen.lines)
-        np.testing.assert_array_equal(seen.tension, seen.lines[:, 0])
+        np.testing.assert_array_equal(seen.tension, seen.lines[:, DAMPED_TENSION])
     assert System(net, [weight], FREE).lines is None
 
 

@@ -156,7 +156,7 @@ def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: M
     f[:] = 0.0
     add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), families.still, forces, cells, data, outs)
     for i in families.viscous:
-        forces[i](t, x, v, f, cells[i], data[i], outs[i])
+        forces[i](t, x, v, f, cells[i], data[i], lines if i == families.line_damping else outs[i])
     for i in model.implicit_contacts.families:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)

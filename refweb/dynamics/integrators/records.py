@@ -172,6 +172,8 @@ class Families(Record):
     still, viscous : ndarray of int
         Families behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
+    line_damping : int
+        Number of the one of these that acts on the lines, −1 where there is none.
     energies, stored : table
         Kernel of the energy of each family, and what it writes per cell [J].
     working : ndarray of int, shape (families,)
@@ -188,6 +190,7 @@ class Families(Record):
     outs: MatrixTable
     still: Integers
     viscous: Integers
+    line_damping: int
     energies: EnergyTable
     stored: VectorTable
     working: Integers
@@ -214,6 +217,7 @@ class Families(Record):
             outs=Arrays(MATRIX, [*outs, *(outs[i] for i in near)]),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
+            line_damping=next((i for i in viscous if families[i].over_lines), -1),
             energies=Functions(k.ENERGY, [family.energy or no_energy for family in families]),
             stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...effects.base import STRAIN
 from ...net.net import AXIAL_STIFFNESS
 from ...net.tension_laws import TENSION_ONLY
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
@@ -17,7 +18,6 @@ class Line(Observable):
     """
 
     keys, at = ("line",), "line"
-    column = 0
 
     def values(self, state):
         """Value of each line in a state, shape (lines,)."""
@@ -54,8 +54,8 @@ class Line(Observable):
         elements, scale = self.elements(system.net), self.scale(system.net)[:, None]
         first, last = int(elements[0]), int(elements[-1])
         if len(elements) == last + 1 - first:
-            return Probe(line, [self.column, first, last + 1], scale)
-        return Probe(line_of, [self.column, *elements.tolist()], scale)
+            return Probe(line, [self.column(system), first, last + 1], scale)
+        return Probe(line_of, [self.column(system), *elements.tolist()], scale)
 
     def position(self, system, at):
         """The line of an element."""
@@ -65,7 +65,11 @@ class Line(Observable):
         """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
         pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
         alone = sum(family.over_lines for family in system.families) == 1
-        return NOT_NEGATIVE if self.column == 0 and pulls and alone else ANY
+        return NOT_NEGATIVE if self.column(system) != STRAIN and pulls and alone else ANY
+
+    def column(self, system):
+        """Column of tension of what the lines observe."""
+        return system.tension_column
 
     def scale(self, net):
         """1, shape (cells,)."""
@@ -115,7 +119,9 @@ class Stress(Line):
 class Strain(Line):
     """Engineering strain."""
 
-    column = 1
+    def column(self, system):
+        """Column of strain."""
+        return STRAIN
 
     def values(self, state):
         """Strain [1], shape (lines,)."""
