@@ -223,8 +223,8 @@ MUTANTS = [
     Mutant("effects/damping", "max(pull, smallest)", "pull"),
     Mutant(
         "effects/damping",
-        "power -= weights[q] * data[c, LENGTH] * pull * rate",
-        "power += weights[q] * data[c, LENGTH] * pull * rate",
+        "power -= weights[q] * line.natural_length * pull * rate",
+        "power += weights[q] * line.natural_length * pull * rate",
     ),
     Mutant(
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
@@ -490,8 +490,8 @@ MUTANTS = [
     ),
     Mutant(
         "results/observables/line",
-        "return tension / net.line_data[:, AXIAL_STIFFNESS]",
-        "return tension / net.line_data[:, AXIAL_STIFFNESS] / 2.0",
+        "return tension / net.line_data.ea",
+        "return tension / net.line_data.ea / 2.0",
     ),
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
     Mutant("results/state", "self.element_strain <= self.system.net.slackness", "self.element_strain <= 0.0"),

@@ -294,7 +294,7 @@ def test_extension(name, i):
     np.testing.assert_array_equal(longer.points[:rows], net.points)
     assert (longer.mass[:rows] >= net.mass).all() and len(longer.mass) == len(longer.points) >= rows
     assert longer.web is net.web and longer.cells is net.cells
-    np.testing.assert_array_equal(longer.line_data[:, : net.line_data.shape[1]], net.line_data)
+    np.testing.assert_array_equal(longer.line_data.matrix[:, : net.line_data.matrix.shape[1]], net.line_data.matrix)
     added = getattr(effect, "mass", 0.0) or 0.0
     times = len(effect.node) if added and hasattr(effect, "node") else 1
     np.testing.assert_allclose(longer.mass.sum() - net.mass.sum(), times * added, rtol=1e-14)

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS, LENGTH
 from ..net.rotation import RigidRotations
 from ..net.rotation_bounds import carry_rates
 from ..registry import INTEGRATORS
@@ -50,7 +49,7 @@ def ruling(integrator, system, reach, speed):
         of_it = [row, *(node for body in net.bodies if row in (body.row, body.spin) for node in body.carried)]
         at = np.flatnonzero(np.isin(family.cells, of_it).any(axis=1))
         data = net.line_data[at]
-        by = f"elasticity of line {net.line[at[(data[:, AXIAL_STIFFNESS] / data[:, LENGTH]).argmax()]]}"
+        by = f"elasticity of line {net.line[at[(data.ea / data.natural_length).argmax()]]}"
     else:
         name = "friction" if family.velocity.implicit is not None else family.name
         by = f"{name} at {system.row_name(row)}"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..effects.base import STRAIN, pairs_of
-from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
 from ..net.tension_laws import SMOOTH
 from ..results import probes
 from ..results.columns import FIRST, components, dynamic_energies, vectors
@@ -74,7 +73,7 @@ def _tells_strain(system, scale):
     net, lines = system.net, [family for family in system.families if family.over_lines]
     if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
-    numbers = np.column_stack([scale * net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, SLACKNESS : SMOOTHING + 1]])
+    numbers = np.column_stack([scale * net.line_data.ea, net.line_data.slackness, net.line_data.smoothing])
     return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))
 
 
@@ -298,8 +297,9 @@ class Watch:
         follows = (_of_tension(p) and _tells_strain(self.system, p.data[:, 0]) for p in self.probes)
         at = next(i for i, yes in enumerate(follows) if yes)
         cell = int(places[at])
-        tension, (stiffness, *law) = values[at] / self.probes[at].data[cell, 0], net.line_data[cell, 1:4]
-        return float(net.law.strain(tension, stiffness, *law)) if tension > 0.0 else 0.0, int(net.line[cell])
+        tension, numbers = values[at] / self.probes[at].data[cell, 0], net.line_data[cell]
+        strain = net.law.strain(tension, numbers.ea, numbers.slackness, numbers.smoothing) if tension > 0.0 else 0.0
+        return float(strain), int(net.line[cell])
 
     def overlap_of_lines(self, course):
         """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""

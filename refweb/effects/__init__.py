@@ -13,7 +13,6 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
     from refweb.effects.vectors import cross
     from refweb.errors import InputError
     from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
-    from refweb.net.net import REFERENCE
     from refweb.tables import Several, Table, nodes, real, table, vector
 
 
@@ -61,7 +60,7 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
             if net.order > 1:
                 raise InputError(f"[cable] order = {net.order} must be 1: a current runs straight from node to node")
             elements = np.flatnonzero(np.isin(net.line, net.web.find_lines(self.lines)))
-            reference = net.line_data[elements, REFERENCE : REFERENCE + 3]
+            reference = net.line_data.reference[elements]
             data = np.hstack([reference, np.tile(self.current * np.array(self.field), (len(elements), 1))])
             tangent, balance = Tangent(stiffness, bound, symmetric=False), Balance("work", power=0)
             return Family("current", net.cells[elements], data, force, balance, tangent=tangent)

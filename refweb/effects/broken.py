@@ -9,8 +9,8 @@ import functools
 
 from ..errors import InputError
 from ..kernels import ENERGY, FORCE, kernel
-from ..net.net import AXIAL_STIFFNESS
 from .base import DAMPED_TENSION, STRAIN, TENSION, Balance, Family, Timing
+from .line_kernels import line_at
 
 HELD = "rupture_energy"
 """Column of the numbers of the lines with what a broken element held [J]."""
@@ -23,7 +23,7 @@ def kernels(column):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            if data[c, AXIAL_STIFFNESS] == 0.0:
+            if line_at(data, c).ea == 0.0:
                 out[c, TENSION] = 0.0
                 out[c, STRAIN] = 0.0
                 if out.shape[1] > DAMPED_TENSION:
@@ -50,7 +50,7 @@ def held_energy(net):
             'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
             '"lumped"'
         )
-    force, energy = kernels(net.column(HELD))
+    force, energy = kernels(net.line_data.column(HELD))
     return Family(
         name="rupture",
         cells=net.cells,

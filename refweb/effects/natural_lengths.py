@@ -26,9 +26,9 @@ from ..kernels import (
     VectorTable,
     kernel,
 )
-from ..net.net import LENGTH
 from .base import column
 from .elasticity import length_force
+from .line_kernels import NATURAL_LENGTH
 from .time_tables import flattened, interpolate
 
 
@@ -83,11 +83,11 @@ class NaturalLengths(Record):
 def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
     """Write natural lengths at time t to the numbers of all ``lines``."""
     for c in range(lengths.elements.size):
-        lines[lengths.elements[c], LENGTH] = lengths.built[c]
+        lines[lengths.elements[c], NATURAL_LENGTH] = lengths.built[c]
     for i in range(len(lengths.tables)):
         factor, cells = interpolate(t, lengths.tables[i], 0, 2, 1)[0], lengths.cells[i]
         for c in range(cells.shape[0]):
-            lines[cells[c, 0], LENGTH] *= factor
+            lines[cells[c, 0], NATURAL_LENGTH] *= factor
 
 
 def with_factor(net, lines, table):
@@ -113,6 +113,6 @@ def shortest_of(net):
     lengths, numbers, shortest = NaturalLengths.of(net), net.line_data.copy(), net.natural_length.copy()
     shortest[lengths.elements] = np.inf
     for t in {0.0, net.end, *lengths.corners[(lengths.corners > 0.0) & (lengths.corners < net.end)]}:
-        set_lengths(t, lengths, numbers)
-        np.minimum(shortest, numbers[:, LENGTH], out=shortest)
+        set_lengths(t, lengths, numbers.matrix)
+        np.minimum(shortest, numbers.natural_length, out=shortest)
     return shortest

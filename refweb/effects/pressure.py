@@ -18,7 +18,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table, vector
 from .base import CellElements, Tangent, without
 from .outer_load import factor_at, outer_load
@@ -148,7 +147,7 @@ class Pressure(Table):
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
         pushed = self.value * sides[net.line[at], None] * normal
-        data = np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3]])
+        data = np.hstack([pushed, net.line_data.reference[at]])
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         arguments = dict(
             force=force,

@@ -17,7 +17,6 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import quote
-from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table
 from .base import CellElements, Tangent, without
 from .line_kernels import direction
@@ -119,7 +118,7 @@ class Thrust(Table):
         power = np.arange(len(order))
         functions = np.linalg.inv(np.vander(net.places, increasing=True))
         slopes = sign * (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
-        reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
+        reference = sign * net.line_data.reference[cell]
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
         parts = dict(

@@ -156,7 +156,8 @@ def strain_remark(strain):
 def floor_remark(net, stress):
     """A warning where the smooth law's floor exceeds 1 % of the largest stress [Pa]."""
     if (smooth := net.laws == SMOOTH).any():
-        floor = float((Law("smooth").floor(*net.line_data[smooth, 1:4].T) / net.area[smooth]).max())
+        lines = net.line_data[smooth]
+        floor = float((Law("smooth").floor(lines.ea, lines.slackness, lines.smoothing) / net.area[smooth]).max())
         if floor > 0.01 * stress:
             yield (
                 f"floor of the smooth law {floor:.4g} Pa is above 1 % of the largest stress {stress:.4g} Pa: "

@@ -20,7 +20,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import SolverError
-from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor
 
 ANCHOR = 1e-10
@@ -47,7 +46,7 @@ def check_speed(system, t):
     """Refuse a frame that turns at the limit or above it, with that limit."""
     net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
-    axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    axial = net.line_data.ea / net.natural_length
     tension_stiffness = system.assemble_lines(net.unit_tension * axial[:, None, None])
     for part in system.unsupported_parts:
         tension_stiffness[system.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()

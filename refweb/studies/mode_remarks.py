@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
 from ..statics.remarks import remark_on_open
@@ -24,7 +23,7 @@ def remarks_on(spectrum_here, state, equilibrium):
         yield "zero", f"{spectrum_here.zero} directions have no stiffness: they have no frequency and are not listed"
     if text := remark_on_open(state, equilibrium):
         yield "slack", text
-    kinked = (net.laws != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
+    kinked = (net.laws != LINEAR) & (net.line_data.smoothing == 0.0)
     if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
         yield "kink", f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
     for text in floor_remark(net, float(state.stress.max())):

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS
-
 
 class Breaks(NamedTuple):
     """Broken lines, in the order in which they broke.
@@ -59,8 +57,8 @@ def torn(system, elements, energies):
     system = _breakable(system)
     net = system.net
     numbers = net.line_data.copy()
-    numbers[elements, AXIAL_STIFFNESS] = 0.0
-    numbers[elements, net.column("rupture_energy")] = energies
+    numbers.ea[elements] = 0.0
+    numbers.rupture_energy[elements] = energies
     changed = copy.copy(system)
     changed.net = replace(net, line_data=numbers)
     broken = np.zeros(len(net.cells), dtype=bool)

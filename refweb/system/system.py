@@ -21,7 +21,6 @@ import numpy as np
 from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, Family, PrescribedMotion
 from ..effects.elasticity import length_force
 from ..effects.natural_lengths import NaturalLengths, set_lengths
-from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
 from .forces import Forces, PerCell
@@ -210,19 +209,19 @@ class System:
         return NaturalLengths.of(self.net)
 
     def line_data(self, t):
-        """`Net.line_data` with the natural lengths of time t, shape (elements, columns)."""
+        """`Net.line_data` with the natural lengths of time t."""
         if not self.net.factors:
             return self.net.line_data
         known = self._at_time
         if known is None or known[0] != t:
             numbers = self.net.line_data.copy()
-            set_lengths(t, self.lengths, numbers)
+            set_lengths(t, self.lengths, numbers.matrix)
             self._at_time = known = t, numbers
         return known[1]
 
     def natural_length(self, t):
         """Natural length of each element at time t [m], shape (elements,)."""
-        return self.line_data(t)[:, LENGTH]
+        return self.line_data(t).natural_length
 
     def at(self, t):
         """The system as it stands at time t: its natural lengths are those of that time, and stay."""
@@ -233,7 +232,7 @@ class System:
         return view
 
     def with_line_data(self, numbers):
-        """The same system with other numbers of its lines, of the shape of `Net.line_data`."""
+        """The same system with other numbers of its lines, a `refweb.net.line_data.LineData`."""
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
         changed._at_time = None
@@ -242,12 +241,12 @@ class System:
 
     def data_of(self, family, t):
         """Numbers of the cells of a family at time t, shape (cells, columns)."""
-        return self.line_data(t) if family.over_lines else family.data
+        return self.line_data(t).matrix if family.over_lines else family.data
 
     def length_force(self, t, x):
         """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
         force = np.empty(len(self.net.cells))
-        length_force(self.net)(t, x, self.net.cells, self.line_data(t), force)
+        length_force(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
         return force
 
     def drive(self, t, x, v=None):

@@ -136,7 +136,7 @@ def test_limit_of_a_net():
     net = discretisation.build(web, cable)
     across = (axis @ axis) * np.eye(3) - np.outer(axis, axis)
     stiff, free = np.zeros((6, 6)), [1, 3, 4, 5]
-    for (i, j), axial, length in zip(web.lines, net.line_data[:, 1], web.natural_length, strict=True):
+    for (i, j), axial, length in zip(web.lines, net.line_data.ea, web.natural_length, strict=True):
         stiff[np.ix_([i, j], [i, j])] += axial / length * np.array([[1, -1], [-1, 1]])
     held = np.kron(stiff[np.ix_(free, free)], np.eye(3))
     taken = np.kron(np.diag(net.mass[free]), across)

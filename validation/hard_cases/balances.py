@@ -4,7 +4,6 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 import refweb
-from refweb.net.net import AXIAL_STIFFNESS
 
 
 def tensions(solution):
@@ -80,7 +79,7 @@ def unbalanced(solution):
     # from, and lines of EA/L = k make a force of that
     first = np.linalg.norm(net.points[net.cells[:, 1]] - net.points[net.cells[:, 0]], axis=1)
     given = np.where(first == net.natural_length, 0.0, first)
-    stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    stiffness = net.line_data.ea / net.natural_length
     rounding = 1e7 * np.finfo(float).eps * (stiffness * (np.abs(state.x).max() + given)).max()
     scale = max(np.linalg.norm(outer, axis=1).max(), np.abs(force).max(), rounding)
     return np.linalg.norm(rest, axis=1).max() / scale if scale > 0 else 0.0

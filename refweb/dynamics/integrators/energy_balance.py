@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.line_kernels import NATURAL_LENGTH
 from ...effects.natural_lengths import NaturalLengths, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
@@ -26,7 +27,6 @@ from ...kernels import (
     kernel,
     sum_of,
 )
-from ...net.net import AXIAL_STIFFNESS, LENGTH
 from ...net.rotation import RigidRotations, more_kinetic
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def least_energy(net):
     A web at rest whose lines have exactly their natural length moves by its rounding alone, and books nothing else.
     """
     lines = net.line_data
-    return float(0.5 * (lines[:, AXIAL_STIFFNESS] * lines[:, LENGTH]).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
+    return float(0.5 * (lines.ea * lines.natural_length).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
 
 
 def refuse_open(course, limit, remedy):
@@ -193,11 +193,11 @@ def change_lengths(t: float, x: Matrix, model: Model, was: Vector, length_force:
     """Set natural lengths at time t, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL."""
     lengths, cells, lines = model.lengths, model.families.cells[0], model.families.data[0]
     for c in range(was.size):
-        was[c] = lines[lengths.elements[c], LENGTH]
+        was[c] = lines[lengths.elements[c], NATURAL_LENGTH]
     set_lengths(t, lengths, lines)
     write_length_force(t, x, lengths, cells, lines, length_force[1])
     for c in range(was.size):
-        change = lines[lengths.elements[c], LENGTH] - was[c]
+        change = lines[lengths.elements[c], NATURAL_LENGTH] - was[c]
         work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * change
         length_force[0, c] = length_force[1, c]
 

@@ -45,7 +45,6 @@ from ...kernels import (
     Vector,
     kernel,
 )
-from ...net.net import AXIAL_STIFFNESS
 
 if TYPE_CHECKING:
     from .records import Families
@@ -150,7 +149,7 @@ class Outside(Record):
             mass=net.mass[:linear],
             inverse_reach=_inverse_reach(net),
             axes=kept_axes(system),
-            rounding=float(ROUNDINGS * net.line_data[:, AXIAL_STIFFNESS].sum()),
+            rounding=float(ROUNDINGS * net.line_data.ea.sum()),
         )
 
 

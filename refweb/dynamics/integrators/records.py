@@ -202,7 +202,7 @@ class Families(Record):
     def of(cls, system, outs):
         """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
         families, net = system.families, system.net
-        lines = net.line_data.copy() if net.factors else net.line_data
+        lines = (net.line_data.copy() if net.factors else net.line_data).matrix
         numbers = [lines if family.over_lines else family.data for family in families]
         fast = [i for i, family in enumerate(families) if family.velocity.damping is not None]
         viscous = [i for i in fast if families[i].velocity.implicit is None]

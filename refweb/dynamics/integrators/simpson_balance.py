@@ -157,7 +157,7 @@ class SimpsonBalance:
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
         families, self._observed = system.families, observed
-        self._lines = system.net.line_data.copy() if system.net.factors else system.net.line_data
+        self._lines = system.line_data(0.0).matrix.copy()
         self._families = (
             Arrays(INDICES, [f.cells for f in families]),
             Arrays(MATRIX, [self._lines if f.over_lines else f.data for f in families]),
@@ -247,7 +247,7 @@ class SimpsonBalance:
         """Energy of each family, kinetic energy, work [J] and step size [s], for the work of each family."""
         t, x, v, system, total = sample.time, sample.x, sample.v, self.system, np.zeros(len(self.system.families) + 3)
         if system.net.factors:
-            self._lines[:] = system.line_data(t)
+            self._lines[:] = system.line_data(t).matrix
         book_energies(t, x, v, system.net.mass, self._turns, *self._families, work, self._working, total)
         total[-3] = self.kinetic(x, v)
         total[-1] = step

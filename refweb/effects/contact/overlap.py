@@ -35,7 +35,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError, PenetrationError, SolverError
-from ...net.net import AXIAL_STIFFNESS
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
 
@@ -323,7 +322,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     net, deep = system.net, AIM * allowed(body)
     if not math.isfinite(deep):
         raise InputError(f'stiffness is missing for body "{body.name}", whose size is infinite: give stiffness = ...')
-    lines = net.line_data[:, AXIAL_STIFFNESS] / (net.natural_length * exponent * deep ** (exponent - 1.0))
+    lines = net.line_data.ea / (net.natural_length * exponent * deep ** (exponent - 1.0))
     push = max(_push(system, body, t) for t in (*load_steps, *_times(system)))
     asked = push / deep**exponent
     if net.quasi_static:

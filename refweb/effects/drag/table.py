@@ -12,7 +12,6 @@ import numpy as np
 from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest
-from ...net.net import REFERENCE
 from ...tables import Several, Table, field, real, table, vector
 from ..base import Balance, CellElements, Family, Tangent, Timing, VelocityForce, without
 from .force import kernels
@@ -135,7 +134,7 @@ class Drag(Table):
             order = [a, *(b for b in range(count) if b != a)]
             slopes = (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
             both = np.outer(shares[a] * pressed, [self.normal, math.pi * self.tangential])
-            rest = np.tile([*self.wind], (elements, 1)), net.line_data[:, REFERENCE : REFERENCE + 3]
+            rest = np.tile([*self.wind], (elements, 1)), net.line_data.reference
             tail = np.zeros((elements, 1)), net.natural_length[:, None], np.tile(slopes[order], (elements, 1))
             cells.append(net.cells[:, order])
             numbers.append(np.hstack([both, *rest, *tail]))

@@ -19,7 +19,6 @@ import math
 import numpy as np
 
 from ...errors import PenetrationError, SolverError
-from ...net.net import AXIAL_STIFFNESS, LENGTH
 
 AIM = 0.8
 """Overlap that a stiffness is named for, over the radius."""
@@ -88,7 +87,7 @@ def first_stiffness(system):
         With any stiffness of lines.
     """
     net, touch = system.net, system.families[pressed(system)].contact.crossing.touch
-    lines = float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+    lines = float((net.line_data.ea / net.line_data.natural_length).max())
     if net.quasi_static:
         return lines
     v = system.initial_velocity()[: system.rows - net.spins]

@@ -9,7 +9,6 @@ import numpy as np
 
 from ... import memory
 from ...errors import InputError
-from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from ...tables import Table, boolean, real, table
 from ..base import (
     Balance,
@@ -117,7 +116,7 @@ class SelfContact(Table):
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
         if chosen is not None and len(chosen) <= LISTED:
             rows, numbers = paired(chosen, cells, data)
-            common = dict(cells=rows, data=numbers, elements=CellElements(chosen, without(SCALE)))
+            common: dict = dict(cells=rows, data=numbers, elements=CellElements(chosen, without(SCALE)))
             search = ContactForce(near=near)
         else:
             if net.quasi_static:
@@ -156,7 +155,7 @@ class SelfContact(Table):
         """Its stiffness [N/m], chosen where it is left out."""
         if self.stiffness is not None:
             return self.stiffness
-        return float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+        return float((net.line_data.ea / net.line_data.natural_length).max())
 
     def _elements(self, net, beside):
         """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""
@@ -166,7 +165,7 @@ class SelfContact(Table):
         data[:, SCALE] = self.stiffness_on(net) / (math.sqrt(12.0) * touch**3)
         data[:, OWN_LENGTH] = net.natural_length
         data[:, ENDS : ENDS + 3] = net.points[net.cells[:, 0]]
-        data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data[:, REFERENCE : REFERENCE + 3]
+        data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data.reference
         data[:, RUBBING : RUBBING + 3] = self.friction, self.slip_velocity, self.rolling
         data[:, APART:] = beside
         return np.ascontiguousarray(net.cells, dtype=np.int32), data

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...effects.base import STRAIN
-from ...net.net import AXIAL_STIFFNESS
 from ...net.tension_laws import TENSION_ONLY
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
@@ -129,7 +128,7 @@ class Strain(Line):
 
     def bound(self, tension, net):
         """Error bound of tension over EA [1], shape (cells,)."""
-        return tension / net.line_data[:, AXIAL_STIFFNESS]
+        return tension / net.line_data.ea
 
     def error(self, state, equilibrium):
         """None where duality leaves it open whether the line is slack: then its strain is not unique."""
