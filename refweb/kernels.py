@@ -67,7 +67,7 @@ def _array(scalar, dimensions):
 
 
 VECTOR, MATRIX, INDICES = _array(_f, 1), _array(_f, 2), _array(_i, 2)
-"""Types of numbers per cell, of the data and of the cells of a family."""
+"""Types of numbers per cell, of the data and of the cells of a term."""
 INTEGERS = _array(types.int64, 1)
 """Type of row numbers."""
 _common = (_f, _array(_f, 2), _array(_f, 2))

@@ -240,7 +240,7 @@ MUTANTS = [
     Mutant("effects/drag/table", "[self.normal, math.pi * self.tangential]", "[self.normal, self.tangential]"),
     Mutant("system/contact_forces", "felt[partner_row, FORCE] -= x", "felt[partner_row, FORCE] += x"),
     Mutant("system/contact_forces", "float(cell % known[ELEMENTS])", "float(cell)"),
-    Mutant("dynamics/integrators/contacts", "if known[FAMILY] in near:", "if False:"),
+    Mutant("dynamics/integrators/contacts", "if known[TERM] in near:", "if False:"),
     Mutant("results/observables/overlap", "forces.pair_rows(body_b, bodies)", "[forces.row(body_b)]"),
     Mutant("results/observables/overlap", "if body_b is None else", "if body is None else"),
     Mutant("effects/contact/penalty", "out[c, FELT + k] += push * g[k]", "out[c, FELT + k] -= push * g[k]"),
@@ -551,7 +551,7 @@ MUTANTS = [
         "self.per_cell() if per_cell is",
         "self.__dict__.setdefault('one', self.per_cell()) if per_cell is",
     ),
-    Mutant("system/broken_lines", "changed.families.append(held_energy(net))", "pass"),
+    Mutant("system/broken_lines", "changed.terms.append(held_energy(net))", "pass"),
     Mutant(
         "dynamics/integrators/rupture", "_holding(self.inner.system.net.broken)", "_holding(course.breaks.elements)"
     ),

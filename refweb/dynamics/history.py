@@ -50,9 +50,9 @@ def _probes_of_warnings(system, followed, step_size):
         from ..results.observables.overlap import probe_of
 
         by_name |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
-    for i in (i for i, family in enumerate(system.families) if family.contact.crossing is not None):
-        cells = len(system.families[i].cells)
-        by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
+    for i in (i for i, term in enumerate(system.terms) if term.contact.crossing is not None):
+        cells = len(system.terms[i].cells)
+        by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, term=i)
     if pairs_of(system):
         from ..results.observables.overlap import probe_of_speed, probes_between
 
@@ -70,7 +70,7 @@ def _of_tension(probe):
 
 def _tells_strain(system, scale):
     """Tell if the largest tension times a scale is that of the most strained element in any case."""
-    net, lines = system.net, [family for family in system.families if family.over_lines]
+    net, lines = system.net, [term for term in system.terms if term.over_lines]
     if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
     numbers = np.column_stack([scale * net.line_data.ea, net.line_data.slackness, net.line_data.smoothing])
@@ -153,7 +153,7 @@ class Watch:
 
     def _weights_of_columns(self, energies):
         """Weights of the columns of a `History` in each column of ``history.csv``, shape (columns there, columns)."""
-        unit = History.empty(0, len(self.probes), self.system.families)
+        unit = History.empty(0, len(self.probes), self.system.terms)
         unit = History(unit.names, np.eye(len(unit.names)), unit.probed)
         columns = [unit.time]
         for o in self._observables:

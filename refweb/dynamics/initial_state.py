@@ -59,9 +59,9 @@ def remarks_on(start, system):
     refined = before.copy()
     system.drive(0.0, refined)
     inner = [
-        (family.contact.with_lines, system.energy_of(family, 0.0, refined))
-        for family in system.families
-        if family.balance.internal
+        (term.contact.with_lines, system.energy_of(term, 0.0, refined))
+        for term in system.terms
+        if term.balance.internal
     ]
     moved = np.flatnonzero((refined != before).any(axis=1))
     if len(moved):

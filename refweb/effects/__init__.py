@@ -9,7 +9,7 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
 
     import numpy as np
 
-    from refweb.effects.base import Balance, Family, Tangent
+    from refweb.effects.base import Balance, ForceTerm, Tangent
     from refweb.effects.vectors import cross
     from refweb.errors import InputError
     from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
@@ -63,7 +63,7 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
             reference = net.line_data.reference[elements]
             data = np.hstack([reference, np.tile(self.current * np.array(self.field), (len(elements), 1))])
             tangent, balance = Tangent(stiffness, bound, symmetric=False), Balance("work", power=0)
-            return Family("current", net.cells[elements], data, force, balance, tangent=tangent)
+            return ForceTerm("current", net.cells[elements], data, force, balance, tangent=tangent)
 
 A line in `refweb.registry.EFFECTS` makes it known to scenes, messages and all methods::
 

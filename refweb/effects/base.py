@@ -4,7 +4,7 @@ An effect is a frozen value that holds physical numbers only. It has one or more
 matrix and knows no other effect.
 
 ``on(net)``
-    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
+    A `ForceTerm`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
     `PrescribedMotion`, a `Constraint` or a `BreakLimits`.
 ``extend(net)``
     The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
@@ -26,15 +26,15 @@ import numpy as np
 from ..errors import InputError
 
 TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
-"""Columns of what families over the lines observe: tension by the law [N], strain [1], and of a force beside the law
+"""Columns of what terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law
 the tension with it [N] and its power [W]."""
 
 
 OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
-"""Columns of what families of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
+"""Columns of what terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
 a loss; the first of three of the force on the body that `ContactForce.felt` names [N]; and their number."""
 CONTACT = -2
-"""Number that stands, in place of that of a family, for what bodies feel of contact."""
+"""Number that stands, in place of that of a term, for what bodies feel of contact."""
 DEPTH, FORCE, ELEMENT, FELT_COLUMNS = 0, 1, 4, 5
 """Columns of that: the largest depth of lines in a body, or that of a pair of bodies [m]; the first of three of the
 force on the body [N]; the element of that depth, −1 where nothing touches; and their number."""
@@ -60,7 +60,7 @@ class ImplicitContactKernels(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """Check if cells of a family, each of two lines, can have passed through each other.
+    """Check if cells of a term, each of two lines, can have passed through each other.
 
     Attributes
     ----------
@@ -235,7 +235,7 @@ class CellElements(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Family:
+class ForceTerm:
     """Force of cells of one kind with its kernels, whose signatures are in `refweb.kernels`.
 
     Attributes
@@ -291,22 +291,22 @@ class Family:
 
 
 def pairs_of(system):
-    """Pairs of bodies of a system that may touch each other, in the order of families and their cells."""
-    return [pair for family in system.families for pair in family.contact.pairs]
+    """Pairs of bodies of a system that may touch each other, in the order of terms and their cells."""
+    return [pair for term in system.terms for pair in term.contact.pairs]
 
 
-def refuse_found(families, what):
-    """Refuse families whose pairs are found, `ContactForce.finder`, where ``what`` needs a tangent.
+def refuse_found(terms, what):
+    """Refuse terms whose pairs are found, `ContactForce.finder`, where ``what`` needs a tangent.
 
     Raises
     ------
     InputError
         For the first of them.
     """
-    for family in families:
-        if family.contact.finder is not None:
+    for term in terms:
+        if term.contact.finder is not None:
             raise InputError(
-                f"[{family.name}] has more pairs of elements than a tangent may hold, in a web of {len(family.cells)} "
+                f"[{term.name}] has more pairs of elements than a tangent may hold, in a web of {len(term.cells)} "
                 f'elements, and {what} needs one: use method = "central-difference" and start = "web"'
             )
 
@@ -415,5 +415,5 @@ class BreakLimits:
 
 
 def column(rows):
-    """Row numbers as the cells of a family that couples nothing: int32, shape (rows, 1)."""
+    """Row numbers as the cells of a term that couples nothing: int32, shape (rows, 1)."""
     return np.ascontiguousarray(np.asarray(rows, dtype=np.int32).reshape(-1, 1))

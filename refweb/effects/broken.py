@@ -1,6 +1,6 @@
 """Values of broken elements: tension and strain 0, and the energy that they had, which stays.
 
-Every system with broken elements has this family, whether a ``[rupture]`` broke them or the web came with them.
+Every system with broken elements has this term, whether a ``[rupture]`` broke them or the web came with them.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import functools
 
 from ..errors import InputError
 from ..kernels import ENERGY, FORCE, kernel
-from .base import DAMPED_TENSION, STRAIN, TENSION, Balance, Family, Timing
+from .base import DAMPED_TENSION, STRAIN, TENSION, Balance, ForceTerm, Timing
 from .line_kernels import line_at
 
 HELD = "rupture_energy"
@@ -38,7 +38,7 @@ def kernels(column):
 
 
 def held_energy(net):
-    """The `Family` of what broken elements held, and of their tension and strain, which are 0.
+    """The `ForceTerm` of what broken elements held, and of their tension and strain, which are 0.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def held_energy(net):
             '"lumped"'
         )
     force, energy = kernels(net.line_data.column(HELD))
-    return Family(
+    return ForceTerm(
         name="rupture",
         cells=net.cells,
         data=None,

@@ -25,7 +25,7 @@ from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
-from .base import DAMPED_TENSION, POWER, Balance, Family, Tangent, Timing, VelocityForce, column
+from .base import DAMPED_TENSION, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column
 from .line_kernels import gradient, law_of, line_at, pull_together, strain
 
 
@@ -216,13 +216,13 @@ class Damping(Table):
         return net.with_column("damping_time", self.time) if self.time else net
 
     def on(self, net):
-        """The families of all lines, whose tension is that with damping, and of all nodes with mass."""
-        families = []
+        """The terms of all lines, whose tension is that with damping, and of all nodes with mass."""
+        terms = []
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
             force, stiffness, damping, bound = kernels(net.law_number, net.line_data.column("damping_time"), *element)
-            families.append(
-                Family(
+            terms.append(
+                ForceTerm(
                     name="damping",
                     cells=net.cells,
                     data=None,
@@ -235,8 +235,8 @@ class Damping(Table):
             )
         if self.rate:
             nodes = net.heavy[net.heavy < net.nodes]
-            families.append(
-                Family(
+            terms.append(
+                ForceTerm(
                     name="damping",
                     cells=column(nodes),
                     data=self.rate * net.mass[nodes, None],
@@ -246,4 +246,4 @@ class Damping(Table):
                     timing=Timing(at_rest=False),
                 )
             )
-        return families
+        return terms

@@ -17,7 +17,7 @@ import numpy as np
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table, table
-from .base import STRAIN, TENSION, Balance, Family, Tangent
+from .base import STRAIN, TENSION, Balance, ForceTerm, Tangent
 from .line_kernels import law_of, line_at, pull_together, strain
 
 
@@ -164,9 +164,9 @@ class Elasticity(Table):
     """Tension of every line by the law of its cable, see `refweb.net.tension_laws`."""
 
     def on(self, net):
-        """The family of all lines; ``out`` is tension [N] and strain."""
+        """The term of all lines; ``out`` is tension [N] and strain."""
         force, energy, stiffness, bound, *_ = of(net)
-        return Family(
+        return ForceTerm(
             name="elasticity",
             cells=net.cells,
             data=None,

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..tables import Several, Table, table, vector
 from .base import Balance, MovingFrame
-from .turning_axes import families
+from .turning_axes import force_terms
 
 
 @table
@@ -46,4 +46,4 @@ class Frame(Table):
         """Centrifugal and Coriolis force of all rows with mass."""
         speed = np.array(self.angular_velocity)
         across = (speed @ speed) * np.eye(3) - np.outer(speed, speed)
-        return families(net, MovingFrame(tuple(speed)), across, name="frame", balance=Balance("frame_energy"))
+        return force_terms(net, MovingFrame(tuple(speed)), across, name="frame", balance=Balance("frame_energy"))

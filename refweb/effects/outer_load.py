@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels import kernel
-from .base import Balance, Family, Timing
+from .base import Balance, ForceTerm, Timing
 from .time_tables import flattened, integrate, interpolate
 
 
@@ -31,7 +31,7 @@ def factor_until(t, data, start):
 
 
 def outer_load(net, name, cells, data, factor, impulse=None, **parts):
-    """The `Family` of a load.
+    """The `ForceTerm` of a load.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ def outer_load(net, name, cells, data, factor, impulse=None, **parts):
     impulse : kernel, optional
         That of a `Balance`.
     **parts
-        ``force``, which writes its power [W] to ``out[c, 0]``, and other parts of a `Family`.
+        ``force``, which writes its power [W] to ``out[c, 0]``, and other parts of a `ForceTerm`.
     """
     table = factor or ()
     largest = max((abs(value) for _, value in table), default=1.0)
     numbers = [largest, *((0.0, 1.0) if net.quasi_static else (1.0, 0.0)), *flattened(table)]
-    return Family(
+    return ForceTerm(
         name=name,
         cells=cells,
         data=np.hstack([data, np.tile(numbers, (len(cells), 1))]),

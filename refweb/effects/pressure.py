@@ -141,7 +141,7 @@ class Pressure(Table):
             raise InputError("normal = [0, 0, 0] must have a direction")
 
     def on(self, net):
-        """The family of the elements of these lines; ``out`` is the power [W]."""
+        """The term of the elements of these lines; ``out`` is the power [W]."""
         lines = net.web.find_lines(self.lines)
         at = np.flatnonzero(np.isin(net.line, lines))
         normal = np.array(self.normal) / np.linalg.norm(self.normal)

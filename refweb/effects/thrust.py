@@ -106,7 +106,7 @@ class Thrust(Table):
     factor: Several = rows(2, default=None, increasing=True)
 
     def on(self, net):
-        """The family of one element; ``out`` is the power [W]."""
+        """The term of one element; ``out`` is the power [W]."""
         nodes_found = net.web.find(self.node)
         if len(nodes_found) != 1:
             raise InputError(f"node = {quote(self.node)} is {len(nodes_found)} nodes, must be one")

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from .base import Family, Tangent, Timing, VelocityForce, column
+from .base import ForceTerm, Tangent, Timing, VelocityForce, column
 
 STIFFEST, MASS = 9, 10
 """Columns of data of the first part, behind G: the largest eigenvalue of −G, at least 0; the mass matrix of the cell,
@@ -132,8 +132,8 @@ def kernels_of_velocity(nodes):
     return coriolis, damping, damping_bound
 
 
-def families(net, frame, pull, **arguments):
-    """The families of all rows with mass; where mass is consistent those of the lines as well.
+def force_terms(net, frame, pull, **arguments):
+    """The terms of all rows with mass; where mass is consistent those of the lines as well.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def families(net, frame, pull, **arguments):
     pull : array_like, shape (3, 3)
         G [1/s²].
     **arguments
-        ``name`` and ``balance`` of the families.
+        ``name`` and ``balance`` of the terms.
     """
     heavy = net.heavy
     turning = [body for body in net.bodies if body.spin is not None and not body.shape.planar]
@@ -160,7 +160,7 @@ def families(net, frame, pull, **arguments):
     if any(body.turn is not None for body in turning):
         from . import turning_bodies
 
-        terms += turning_bodies.families(net, frame.angular_velocity, pull, arguments)
+        terms += turning_bodies.force_terms(net, frame.angular_velocity, pull, arguments)
     return terms
 
 
@@ -173,7 +173,7 @@ def _numbers(head, *parts):
 def _of_place(cells, mass, points, pull, frame, arguments):
     stiffest = max(-float(np.linalg.eigvalsh(pull)[0]), 0.0)
     force, energy, stiffness, bound = kernels_of_place(cells.shape[1])
-    return Family(
+    return ForceTerm(
         cells=cells,
         data=_numbers([*np.ravel(pull), stiffest], mass, points),
         force=force,
@@ -186,7 +186,7 @@ def _of_place(cells, mass, points, pull, frame, arguments):
 
 def _of_velocity(cells, mass, frame, arguments):
     force, damping, damping_bound = kernels_of_velocity(cells.shape[1])
-    return Family(
+    return ForceTerm(
         cells=cells,
         data=_numbers(frame.angular_velocity, mass),
         force=force,

@@ -61,10 +61,10 @@ def check_speed(system, t):
     while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
-    family = system.rotating[0]
-    speed = np.linalg.norm(family.frame.angular_velocity)
-    key = "angular_velocity" if family.name == "frame" else "mean_motion"
+    term = system.rotating[0]
+    speed = np.linalg.norm(term.frame.angular_velocity)
+    key = "angular_velocity" if term.name == "frame" else "mean_motion"
     raise SolverError(
-        f"no equilibrium: [{family.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
+        f"no equilibrium: [{term.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
         f"centrifugal forces outgrow any tension: lower {key} or the masses, or raise modulus × area"
     )

@@ -147,7 +147,7 @@ def force_scale(system, t, x, tension):
     """
     stiffness = system.net.line_data.ea / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
-    outer = [f for f in system.families if not f.over_lines]
+    outer = [f for f in system.terms if not f.over_lines]
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
     return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 

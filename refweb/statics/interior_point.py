@@ -106,7 +106,7 @@ class InteriorPoint:
         self._ends = net.weights[:, None] * net.gradients
         self._stiffness = net.per_bar(net.line_data.ea) / net.bar_lengths
         self._natural = net.bar_lengths * (1.0 + net.per_bar(net.slackness))
-        outer = (system.force_of(f, t, x) for f in system.families if not f.balance.internal)
+        outer = (system.force_of(f, t, x) for f in system.terms if not f.balance.internal)
         self._outer = sum(outer, np.zeros((system.rows, 3)))
         load = np.abs(self._outer.ravel()[system.free]).max(initial=0.0)
         self.loaded, self._load = bool(load > 0.0), max(load, np.finfo(float).tiny)

@@ -119,4 +119,4 @@ def _above(system, state, forces):
 
 def _scale(system, state):
     """Energy of the lines and of the loads [J], without signs."""
-    return sum(float(np.abs(system.energy_of(f, state.step, state.x)).sum()) for f in system.families)
+    return sum(float(np.abs(system.energy_of(f, state.step, state.x)).sum()) for f in system.terms)

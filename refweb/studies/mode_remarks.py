@@ -32,7 +32,7 @@ def remarks_on(spectrum_here, state, equilibrium):
 
 def left_out(system):
     """Effects that the modes of a system leave out."""
-    if any(family.velocity.damping is not None and family not in system.rotating for family in system.families):
+    if any(term.velocity.damping is not None and term not in system.rotating for term in system.terms):
         yield "forces that depend on velocity, such as damping, are left out"
     if free := [body.name for body in system.net.bodies if not body.fixed]:
         yield f"free bodies wait, and the web does not feel them: {', '.join(free)}"

@@ -1,4 +1,4 @@
-"""Result of an evaluation of all forces: their sum on every row, and the values of each family per cell."""
+"""Result of an evaluation of all forces: their sum on every row, and the values of each term per cell."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class PerCell(list):
-    """Values of each family per cell, an array beside each of `System.families`.
+    """Values of each term per cell, an array beside each of `System.terms`.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class PerCell(list):
 
 
 class Forces(NamedTuple):
-    """Force on every row [N], shape (rows, 3), and what families observe."""
+    """Force on every row [N], shape (rows, 3), and what terms observe."""
 
     force: np.ndarray
     per_cell: PerCell

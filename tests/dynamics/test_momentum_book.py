@@ -12,7 +12,7 @@ from refweb.dynamics.integrators import momentum_balance
 from refweb.dynamics.integrators.momentum_balance import CLOSURE, allowed
 from refweb.dynamics.integrators.step_limits import StepLimits
 from refweb.effects import gravity
-from refweb.effects.base import Balance, Family
+from refweb.effects.base import Balance, ForceTerm
 from refweb.effects.time_tables import flattened, integrate, interpolate
 from refweb.errors import EnergyDriftError
 from refweb.kernels import FORCE, kernel
@@ -225,7 +225,7 @@ class Couple(refweb.Velocity):
 
     def on(self, net):
         cells, balance = np.array([[0, 1]], dtype=np.int32), Balance("work", power=0, internal=True)
-        return Family("couple", cells, np.array([[0.1]]), couple, balance)
+        return ForceTerm("couple", cells, np.array([[0.1]]), couple, balance)
 
 
 @pytest.mark.parametrize("method", METHODS)

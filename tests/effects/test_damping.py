@@ -341,8 +341,8 @@ def test_bound_bounds(law):
         x, v = (0.1 * rng.standard_normal(net.points.shape) for _ in range(2))
         C = system.pattern.matrix(system.damping(0.0, x, v)).toarray()
         largest = scipy.linalg.eigvalsh(C, np.diag(np.repeat(net.mass, 3)))[-1]
-        (family,), losses = system.families, np.zeros(len(net.points))
-        family.velocity.bound(0.0, 0.0, x, net.mass, losses, family.cells, system.data_of(family, 0.0))
+        (term,), losses = system.terms, np.zeros(len(net.points))
+        term.velocity.bound(0.0, 0.0, x, net.mass, losses, term.cells, system.data_of(term, 0.0))
         assert 0.0 < largest <= (losses / net.mass).max() * (1.0 + 1e-12)
 
 

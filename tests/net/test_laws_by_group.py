@@ -153,20 +153,20 @@ def test_each_line_has_its_law(order):
         alone = made(refweb.Cable(law=law, **own, **given, groups={name: refweb.Group(area=2e-4) for name in groups}))
         here = of == law
         assert here.any()
-        for there, mine in zip(alone.families, mixed.families, strict=True):
+        for there, mine in zip(alone.terms, mixed.terms, strict=True):
             pairs = []
-            for family, system in ((there, alone), (mine, mixed)):
-                data = system.data_of(family, 0.0)
-                for block, kernel in zip(blocks, (family.tangent.stiffness, family.velocity.damping), strict=True):
+            for term, system in ((there, alone), (mine, mixed)):
+                data = system.data_of(term, 0.0)
+                for block, kernel in zip(blocks, (term.tangent.stiffness, term.velocity.damping), strict=True):
                     block[:] = 0.0
                     if kernel is not None:
-                        kernel(0.0, x, v, block, family.cells, data, False)
-                f, out = np.zeros_like(x), np.zeros((len(family.cells), 4))
-                family.force(0.0, x, v, f, family.cells, data, out)
+                        kernel(0.0, x, v, block, term.cells, data, False)
+                f, out = np.zeros_like(x), np.zeros((len(term.cells), 4))
+                term.force(0.0, x, v, f, term.cells, data, out)
                 f[:] = 0.0  # then of these lines alone
                 some = np.zeros((here.sum(), 4))
-                family.force(0.0, x, v, f, family.cells[here], data[here], some)
-                pairs.append([out[here], f, *blocks[:, here], system.energy_of(family, 0.0, x)[here]])
+                term.force(0.0, x, v, f, term.cells[here], data[here], some)
+                pairs.append([out[here], f, *blocks[:, here], system.energy_of(term, 0.0, x)[here]])
             for one, other in zip(*pairs, strict=True):
                 np.testing.assert_allclose(one, other, rtol=0, atol=SAME * abs(one).max())
         each = np.empty((2, len(of)))

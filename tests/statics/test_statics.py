@@ -339,9 +339,7 @@ def test_certificate_contains_the_solution_of_a_conic_solver(mesh, prestrain):
     net, free = net_system.net, net_system.free
     lines, unknowns = len(net.cells), len(free)
     stiffness = net.line_data.ea / net.natural_length
-    load = sum(
-        net_system.force_of(f, 1.0, np.zeros_like(found.x)) for f in net_system.families if not f.balance.internal
-    )
+    load = sum(net_system.force_of(f, 1.0, np.zeros_like(found.x)) for f in net_system.terms if not f.balance.internal)
     vector = net.points[net.cells[:, 1]] - net.points[net.cells[:, 0]]
     row, one = np.arange(lines), np.ones(lines)
     incidence = scipy.sparse.coo_array(
@@ -625,7 +623,7 @@ def test_reactions_balance_loads_and_moments(mesh, prestrain):
     net_system = small_web(mesh, prestrain)
     (found,) = solve(net_system)
     state = State(net_system, 1.0, found.x)
-    load = sum(net_system.force_of(f, 1.0, found.x) for f in net_system.families if not f.balance.internal)
+    load = sum(net_system.force_of(f, 1.0, found.x) for f in net_system.terms if not f.balance.internal)
     left = np.where(net_system.supported, 0.0, found.force)
     size = np.abs(state.reaction).sum() + np.abs(load).sum()
     reach = np.abs(state.position).max()

@@ -64,7 +64,7 @@ def test_other_numbers_of_the_lines():
 
 
 def test_lines_by_name():
-    """Their family, and what they show per cell, wherever they stand among the effects."""
+    """Their term, and what they show per cell, wherever they stand among the effects."""
     net, (x, v) = nets.skew_net("linear"), displaced()
     weight = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
     for effects in ([Elasticity(), Damping(time=0.02), weight], [weight, Elasticity(), Damping(time=0.02)]):
@@ -90,15 +90,15 @@ def test_columns_of_two_effects():
 
 
 def test_one_power_of_the_lines():
-    """Two families that would write their power to the same column of what the lines show."""
+    """Two terms that would write their power to the same column of what the lines show."""
 
     class Again(Damping):
         def extend(self, net):
             return net
 
         def on(self, net):
-            (family,) = super().on(net)
-            return [replace(family, name="again")]
+            (term,) = super().on(net)
+            return [replace(term, name="again")]
 
     with pytest.raises(ValueError, match="one column for a power"):
         System(nets.skew_net(), [Elasticity(), Damping(time=0.02), Again(time=0.02)], FREE)
@@ -126,10 +126,10 @@ def test_threads_share_a_system():
 
         return None if kernel is None else call
 
-    for n, family in enumerate(system.families):
-        tangent = family.tangent._replace(stiffness=meeting(family.tangent.stiffness))
-        velocity = family.velocity._replace(damping=meeting(family.velocity.damping))
-        system.families[n] = replace(family, force=meeting(family.force), tangent=tangent, velocity=velocity)
+    for n, term in enumerate(system.terms):
+        tangent = term.tangent._replace(stiffness=meeting(term.tangent.stiffness))
+        velocity = term.velocity._replace(damping=meeting(term.velocity.damping))
+        system.terms[n] = replace(term, force=meeting(term.force), tangent=tangent, velocity=velocity)
 
     def found(t, place):
         x = np.array([[0.0, 0.0, 0.0], np.subtract(place, [1.0, 0.0, 0.0])])

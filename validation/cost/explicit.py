@@ -293,7 +293,7 @@ def address(array):
 def c_run(name, loop, system, counts, sizes):
     """CPU time of a C loop over the same steps, and its last displacement."""
     net, long, double = system.net, ctypes.c_long, ctypes.c_double
-    contact = next((f for f in system.families if f.contact.with_lines), None)
+    contact = next((f for f in system.terms if f.contact.with_lines), None)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     f = system.force(0.0, x)
     inverse = np.where(system.supported, 0.0, 1.0 / net.mass[:, None])

@@ -51,12 +51,12 @@ STEP = 1e-6
 def pushes(state):
     """Force of contact on every row, by differences of its energy: what the force should be, whatever it is [N]."""
     system, force = state.system, np.zeros_like(state.x)
-    for family in (family for family in system.families if family.contact.with_lines and family.energy is not None):
-        for row in np.unique(family.cells):
+    for term in (term for term in system.terms if term.contact.with_lines and term.energy is not None):
+        for row in np.unique(term.cells):
             for axis in range(3):
                 moved = np.zeros_like(state.x)
                 moved[row, axis] = STEP
-                ends = [system.energy_of(family, state.time, state.x + sign * moved).sum() for sign in (1.0, -1.0)]
+                ends = [system.energy_of(term, state.time, state.x + sign * moved).sum() for sign in (1.0, -1.0)]
                 force[row, axis] -= (ends[0] - ends[1]) / (2.0 * STEP)
     return force
 

@@ -159,29 +159,29 @@ class Inertia(Record):
         )
 
 
-class Families(Record):
-    """Force terms; that of the lines is the first family.
+class ForceTerms(Record):
+    """Force terms; that of the lines is the first term.
 
-    Of those that act only near something, lists have the cells that are looked at; all stand behind all families.
+    Of those that act only near something, lists have the cells that are looked at; all stand behind all terms.
 
     Attributes
     ----------
     forces, cells, data, outs : table
-        Kernel of each family, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
+        Kernel of each term, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
         column, the numbers of cells that are looked at instead of all, none where all are.
     still, viscous : ndarray of int
-        Families behind the first whose forces follow from displacement and time alone, and those of velocity whose
+        ForceTerms behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
     line_damping : int
         Number of the one of these that acts on the lines, −1 where there is none.
     energies, stored : table
-        Kernel of the energy of each family, and what it writes per cell [J].
-    working : ndarray of int, shape (families,)
-        Whether what is booked of a family is work (1), its energy, which is lost (−1), or nothing (0).
+        Kernel of the energy of each term, and what it writes per cell [J].
+    working : ndarray of int, shape (terms,)
+        Whether what is booked of a term is work (1), its energy, which is lost (−1), or nothing (0).
     powers : ndarray of int, shape (powered, 3)
-        Families booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
+        ForceTerms booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
     bounds, dampings : table
-        Kernel that bounds the stiffness of each family, and the damping of each viscous one.
+        Kernel that bounds the stiffness of each term, and the damping of each viscous one.
     """
 
     forces: ForceTable
@@ -201,29 +201,29 @@ class Families(Record):
     @classmethod
     def of(cls, system, outs):
         """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
-        families, net = system.families, system.net
+        terms, net = system.terms, system.net
         lines = (net.line_data.copy() if net.factors else net.line_data).matrix
-        numbers = [lines if family.over_lines else family.data for family in families]
-        fast = [i for i, family in enumerate(families) if family.velocity.damping is not None]
-        viscous = [i for i in fast if families[i].velocity.implicit is None]
-        still = [i for i in range(1, len(families)) if i not in fast]
-        powers = [(i, f.balance.power, i in fast) for i, f in enumerate(families) if f.balance.power is not None]
-        near, stored = near_of(system), [np.zeros(len(family.cells)) for family in families]
-        cells = [*(families[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
+        numbers = [lines if term.over_lines else term.data for term in terms]
+        fast = [i for i, term in enumerate(terms) if term.velocity.damping is not None]
+        viscous = [i for i in fast if terms[i].velocity.implicit is None]
+        still = [i for i in range(1, len(terms)) if i not in fast]
+        powers = [(i, f.balance.power, i in fast) for i, f in enumerate(terms) if f.balance.power is not None]
+        near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
+        cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         return cls(
-            forces=Functions(k.FORCE, [family.force for family in families]),
-            cells=Arrays(INDICES, [*(family.cells for family in families), *cells]),
+            forces=Functions(k.FORCE, [term.force for term in terms]),
+            cells=Arrays(INDICES, [*(term.cells for term in terms), *cells]),
             data=Arrays(MATRIX, [*numbers, *(numbers[i] for i in near)]),
             outs=Arrays(MATRIX, [*outs, *(outs[i] for i in near)]),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
-            line_damping=next((i for i in viscous if families[i].over_lines), -1),
-            energies=Functions(k.ENERGY, [family.energy or no_energy for family in families]),
+            line_damping=next((i for i in viscous if terms[i].over_lines), -1),
+            energies=Functions(k.ENERGY, [term.energy or no_energy for term in terms]),
             stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
-            bounds=Functions(k.BOUND, [family.tangent.bound or no_bound for family in families]),
-            dampings=Functions(k.BOUND, [families[i].velocity.bound or no_bound for i in viscous]),
+            bounds=Functions(k.BOUND, [term.tangent.bound or no_bound for term in terms]),
+            dampings=Functions(k.BOUND, [terms[i].velocity.bound or no_bound for i in viscous]),
         )
 
 
@@ -251,7 +251,7 @@ class Model(Record):
     """A system as the loop sees it; ``corners`` are the times at which a table has one [s], increasing."""
 
     inertia: Inertia
-    families: Families
+    terms: ForceTerms
     implicit_contacts: ImplicitContacts
     motions: Motions
     lengths: NaturalLengths
@@ -264,9 +264,9 @@ class Model(Record):
 
     @classmethod
     def of(cls, system, outs):
-        """Make the record of a `refweb.system.system.System`, whose families write their values to ``outs``."""
+        """Make the record of a `refweb.system.system.System`, whose terms write their values to ``outs``."""
         inertia = Inertia.of(system)
-        forces = inertia, Families.of(system, outs), ImplicitContacts.of(system, inertia.turns)
+        forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns)
         changes = Motions.of(system), system.lengths, system.corners, Outside.of(system)
         return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
 
@@ -282,8 +282,8 @@ class Running(Record):
         Displacement [m], velocity [m/s] and force [N].
     before : ndarray, shape (3, rows, 3)
         The same at the row or the corner of a table before.
-    work : ndarray, shape (families + 1,)
-        Work of each family and, last, of motion [J].
+    work : ndarray, shape (terms + 1,)
+        Work of each term and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports [N s].
     ledger : refweb.dynamics.integrators.momentum_balance.MomentumBalance
@@ -294,8 +294,8 @@ class Running(Record):
         What each event has come to.
     averages : refweb.dynamics.integrators.averages.Averages
         Means over windows.
-    power : ndarray, shape (families,)
-        Power of each family at the last step [W].
+    power : ndarray, shape (terms,)
+        Power of each term at the last step [W].
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)

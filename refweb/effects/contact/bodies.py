@@ -1,4 +1,4 @@
-"""Pairs of bodies that may touch each other, as families of cells.
+"""Pairs of bodies that may touch each other, as terms of cells.
 
 A cell is two bodies: the rows of both, and two rows of rotation of each; where a body has fewer, its own row stands in
 their place and is not read. A skeleton that is one point with all of the thickness, a sphere's, says all there is to
@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...net.skeleton import COLUMNS, THICKNESS
-from ..base import OWN, Balance, ContactForce, Family, Tangent, Timing, VelocityForce
+from ..base import OWN, Balance, ContactForce, ForceTerm, Tangent, Timing, VelocityForce
 from .body_body_detection import PARTS, SIDE, SIDES
 from .pair import lever
 
@@ -42,8 +42,8 @@ def skeleton_of(body):
     return parts
 
 
-def families(net, law_of):
-    """The families of all pairs of bodies of a net, of one kind each.
+def force_terms(net, law_of):
+    """The terms of all pairs of bodies of a net, of one kind each.
 
     Parameters
     ----------
@@ -62,8 +62,8 @@ def families(net, law_of):
         pressed.setdefault(depths, []).append((a, b, law))
         if law[2] > 0.0 or law[3] > 0.0:
             losing.setdefault(depths, []).append((a, b, law))
-    families = [_penalty(net, depths, group) for depths, group in pressed.items()]
-    return families + [_friction(net, depths, group) for depths, group in losing.items()]
+    terms = [_penalty(net, depths, group) for depths, group in pressed.items()]
+    return terms + [_friction(net, depths, group) for depths, group in losing.items()]
 
 
 def _penalty(net, depths, group):
@@ -71,7 +71,7 @@ def _penalty(net, depths, group):
 
     force, energy, stiffness, bound = kernels(*depths)
     turns = any(body.turn is not None for a, b, _ in group for body in (a, b))
-    return Family(
+    return ForceTerm(
         **_shared(net, group),
         force=force,
         energy=energy,
@@ -87,7 +87,7 @@ def _friction(net, depths, group):
     force, stiffness, damping, implicit = kernels(*depths)
     shared = _shared(net, group)
     parts = shared["data"][:, [SIDES + PARTS, SIDES + SIDE + PARTS]].sum(axis=1)
-    return Family(
+    return ForceTerm(
         **shared,
         force=force,
         tangent=Tangent(stiffness, symmetric=False),
@@ -99,7 +99,7 @@ def _friction(net, depths, group):
 
 
 def _shared(net, group) -> dict:
-    """Common arguments of the `Family` of some pairs."""
+    """Common arguments of the `ForceTerm` of some pairs."""
     cells, data = zip(*(_pair(net, *pair) for pair in group), strict=True)
     rows = np.zeros((len(data), max(len(row) for row in data)))
     for row, values in zip(rows, data, strict=True):

@@ -13,7 +13,7 @@ from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest
 from ...tables import Several, Table, field, real, table, vector
-from ..base import Balance, CellElements, Family, Tangent, Timing, VelocityForce, without
+from ..base import Balance, CellElements, ForceTerm, Tangent, Timing, VelocityForce, without
 from .force import kernels
 from .implicit_drag import implicit_drag
 
@@ -107,19 +107,19 @@ class Drag(Table):
     bodies: dict = field(_bodies, default_factory=dict)
 
     def on(self, net):
-        """The families of the nodes of elements and of free bodies; ``out`` is the power [W]."""
+        """The terms of the nodes of elements and of free bodies; ``out`` is the power [W]."""
         free = [body for body in net.bodies if not body.fixed]
         names = [body.name for body in free]
         for name in self.bodies:
             if name not in names:
                 raise InputError(f'bodies."{name}" is not a free body, {nearest(name, names)}')
-        families = [self._family(net, *self._ends(net))]
+        terms = [self._term(net, *self._ends(net))]
         if free:
             numbers = np.zeros((len(free), 11))
             numbers[:, 0], numbers[:, 2:5] = [self._of(body) for body in free], self.wind
             numbers[:, 8] = numbers[:, 9] = 1.0
-            families.append(self._family(net, np.array([[body.row] for body in free], dtype=np.int32), numbers))
-        return families
+            terms.append(self._term(net, np.array([[body.row] for body in free], dtype=np.int32), numbers))
+        return terms
 
     def _ends(self, net):
         """Cells and numbers of all nodes of elements, those of a node together, and the element of each."""
@@ -154,10 +154,10 @@ class Drag(Table):
         coefficient = SPHERE if settings.coefficient is None else settings.coefficient
         return 0.5 * self.density * coefficient * (settings.area or math.pi * body.shape.grown().radius ** 2)
 
-    def _family(self, net, cells, data, elements=None):
+    def _term(self, net, cells, data, elements=None):
         blows = any(self.wind)
         force, stiffness, damping, bound = kernels(cells.shape[1])
-        return Family(
+        return ForceTerm(
             name="drag",
             cells=cells,
             data=data,

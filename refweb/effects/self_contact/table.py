@@ -1,4 +1,4 @@
-"""Contact of lines with lines: what a scene says of it, and its families."""
+"""Contact of lines with lines: what a scene says of it, and its terms."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..base import (
     CellElements,
     ContactForce,
     Crossing,
-    Family,
+    ForceTerm,
     Tangent,
     Timing,
     VelocityForce,
@@ -99,7 +99,7 @@ class SelfContact(Table):
     rolling: bool = boolean(default=True)
 
     def on(self, net):
-        """The family of the push, and those of damping and friction.
+        """The term of the push, and those of damping and friction.
 
         ``out`` is how deep a pair or an element overlaps [m], or the power of what is lost [W].
         """
@@ -129,7 +129,7 @@ class SelfContact(Table):
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
         kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon
         follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)
-        push = Family(
+        push = ForceTerm(
             name="self_contact",
             force=line_line_penalty.force,
             energy=line_line_penalty.energy,
@@ -138,18 +138,18 @@ class SelfContact(Table):
             contact=search._replace(crossing=follows),
             **common,
         )
-        families = [push]
+        terms = [push]
         if self.damping > 0.0:
             from . import line_line_damping
 
             velocity = VelocityForce(line_line_damping.damping, line_line_damping.damping_bound)
-            families.append(_lossy(line_line_damping, velocity, search, **common))
+            terms.append(_lossy(line_line_damping, velocity, search, **common))
         if self.friction > 0.0:
             from . import line_line_friction
 
             velocity = VelocityForce(line_line_friction.damping, implicit=line_line_friction.KICKS)
-            families.append(_lossy(line_line_friction, velocity, search, twists=not self.rolling, **common))
-        return families if len(families) > 1 else push
+            terms.append(_lossy(line_line_friction, velocity, search, twists=not self.rolling, **common))
+        return terms if len(terms) > 1 else push
 
     def stiffness_on(self, net):
         """Its stiffness [N/m], chosen where it is left out."""
@@ -213,8 +213,8 @@ class SelfContact(Table):
 
 
 def _lossy(kernels, velocity, search, twists=False, **common):
-    """The family of damping or of friction, by the module of its kernels."""
-    return Family(
+    """The term of damping or of friction, by the module of its kernels."""
+    return ForceTerm(
         name="self_contact",
         force=kernels.force,
         tangent=Tangent(kernels.stiffness if search.finder is None else None, kernels.bound, symmetric=False),

@@ -63,7 +63,7 @@ class Line(Observable):
     def bounds(self, system):
         """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
         pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
-        alone = sum(family.over_lines for family in system.families) == 1
+        alone = sum(term.over_lines for term in system.terms) == 1
         return NOT_NEGATIVE if self.column(system) != STRAIN and pulls and alone else ANY
 
     def column(self, system):

@@ -73,7 +73,7 @@ def exact(system, v, end):
         system.drive(t, x, w)
         return np.concatenate([y[n:], mass.solve(system.force(t, x, w).ravel()[free])])
 
-    parts = *(family.timing for family in system.families), *system.drives
+    parts = *(term.timing for term in system.terms), *system.drives
     corners = sorted({t for part in parts for t in part.times if 0.0 < t < end})
     y, before = np.concatenate([np.zeros(n), v.ravel()[free]]), 0.0
     for after in (*corners, end):
