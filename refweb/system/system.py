@@ -131,7 +131,7 @@ class System:
 
     @property
     def _in_tangent(self):
-        """ForceTerms with a stiffness or a damping: those of the pattern, in its order."""
+        """Terms with a stiffness or a damping: those of the pattern, in its order."""
         return [f for f in self.terms if f.tangent.stiffness is not None or f.velocity.damping is not None]
 
     @cached_property
@@ -376,7 +376,7 @@ class System:
 
     @property
     def rotating(self):
-        """ForceTerms of the forces of inertia in a frame that turns, none where none does."""
+        """Terms of the forces of inertia in a frame that turns, none where none does."""
         return [term for term in self.terms if term.frame.angular_velocity is not None]
 
     @property

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...effects.base import FELT_COLUMNS
-from ...kernels import Indices, IntegerMatrix, Matrix, Record, kernel
-from ...system.contact_forces import CHOSEN, TERM, add_felt, forget
+from ...kernels import Indices, Matrix, Record, kernel
+from ...system.contact_forces import ContactTermArray, add_felt, forget
 from .neighbour_list import near_of
 
 if TYPE_CHECKING:
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 class Contacts(Record):
-    """ForceTerms of contact with bodies, and what these feel.
+    """Terms of contact with bodies, and what these feel.
 
     Attributes
     ----------
-    terms : ndarray of int
+    terms : ndarray of `refweb.system.contact_forces.CONTACT_TERM`
         See `refweb.system.contact_forces.ContactForces`.
     felt : ndarray, shape (rows, columns)
         What bodies feel.
@@ -30,7 +30,7 @@ class Contacts(Record):
         Numbers of chosen cells, where all are looked at.
     """
 
-    terms: IntegerMatrix
+    terms: ContactTermArray
     felt: Matrix
     first: int
     none: Indices
@@ -40,9 +40,9 @@ class Contacts(Record):
         """Those of a system; numbers of cells that are near stand as `refweb.dynamics.integrators.records` says."""
         forces, near = system.contact_forces, near_of(system)
         terms = forces.terms.copy()
-        for known in terms:
-            if known[TERM] in near:
-                known[CHOSEN] = len(system.terms) + len(near) + near.index(known[TERM])
+        for term in terms:
+            if term["number"] in near:
+                term["chosen"] = len(system.terms) + len(near) + near.index(term["number"])
         return cls(terms, np.zeros((forces.rows, FELT_COLUMNS)), forces.first, np.empty((0, 1), dtype=np.int32))
 
 
@@ -58,8 +58,8 @@ def sum_contacts(contacts: Contacts, terms: ForceTerms) -> None:
     """Write what bodies feel where terms show what they do."""
     forget(contacts.felt)
     for m in range(contacts.terms.shape[0]):
-        known = contacts.terms[m]
-        i, chosen = known[TERM], contacts.none
-        if known[CHOSEN] >= 0:
-            chosen = terms.cells[known[CHOSEN]]
-        add_felt(contacts.first, known, terms.cells[i], chosen, terms.outs[i], contacts.felt)
+        term = contacts.terms[m]
+        i, chosen = term.number, contacts.none
+        if term.chosen >= 0:
+            chosen = terms.cells[term.chosen]
+        add_felt(contacts.first, term, terms.cells[i], chosen, terms.outs[i], contacts.felt)

@@ -34,7 +34,7 @@ CARRIED = 3
 
 
 class ImplicitContacts(Record):
-    """ForceTerms whose kicks are solved for.
+    """Terms whose kicks are solved for.
 
     Attributes
     ----------

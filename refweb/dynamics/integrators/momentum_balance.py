@@ -107,7 +107,7 @@ class Outside(Record):
     damped : ndarray of int
         Those of them that depend on velocity.
     pushing : ndarray of int
-        ForceTerms that are integrated along the steps.
+        Terms that are integrated along the steps.
     places : ndarray, shape (linear rows, 3)
         Reference positions [m], about their mean.
     mass : ndarray, shape (linear rows,)

@@ -21,7 +21,6 @@ from ...kernels import (
     Vector,
 )
 from ...results.probes import PROBE, plain_of
-from ...system.contact_forces import TERM
 from .averages import Windows
 
 ProbeTable = Annotated[Functions, PROBE]
@@ -43,7 +42,7 @@ class Observed(Record):
     windows : refweb.dynamics.integrators.averages.Windows
         Windows of the probes that are averaged.
     terms : ndarray of int
-        ForceTerms whose values per cell are the data of probes.
+        Terms whose values per cell are the data of probes.
     plain : ndarray of int, shape (probes, 4)
         What the loop looks at itself, see `refweb.results.probes.plain_of`.
     scales : ndarray, shape (probes,)
@@ -68,7 +67,7 @@ class Observed(Record):
         numbers = [shared.get(p.term, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
         terms_seen = [probe.term for probe in probes if probe.term >= 0]
         if any(probe.term == CONTACT for probe in probes):
-            terms_seen += contacts.terms[:, TERM].tolist()
+            terms_seen += contacts.terms["number"].tolist()
         windows, signs = Windows.of(probes), np.array([float(item.sign) for item in (*probes, *sums)])
         signs[windows.slots] = 0.0
         plain = [plain_of(probe) for probe in probes]

@@ -101,7 +101,7 @@ SkinArray = Annotated[np.ndarray, types.Array(from_dtype(SKIN), 1, "C")]
 
 
 class NeighbourList(Record):
-    """ForceTerms whose cells act only near something.
+    """Terms whose cells act only near something.
 
     Attributes
     ----------

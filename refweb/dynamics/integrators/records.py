@@ -170,7 +170,7 @@ class ForceTerms(Record):
         Kernel of each term, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
         column, the numbers of cells that are looked at instead of all, none where all are.
     still, viscous : ndarray of int
-        ForceTerms behind the first whose forces follow from displacement and time alone, and those of velocity whose
+        Terms behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
     line_damping : int
         Number of the one of these that acts on the lines, −1 where there is none.
@@ -179,7 +179,7 @@ class ForceTerms(Record):
     working : ndarray of int, shape (terms,)
         Whether what is booked of a term is work (1), its energy, which is lost (−1), or nothing (0).
     powers : ndarray of int, shape (powered, 3)
-        ForceTerms booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
+        Terms booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
     bounds, dampings : table
         Kernel that bounds the stiffness of each term, and the damping of each viscous one.
     """
