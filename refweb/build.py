@@ -84,9 +84,9 @@ def build(web, cable, effects, supports, support, solve, output, accuracy, obser
         _check_links(solve)
     _check_start(solve, accuracy)
     if solve.method in INTEGRATORS and INTEGRATORS[solve.method].knob == "rtol":
-        refuse_found(system.families, f'method = "{solve.method}"')
+        refuse_found(system.terms, f'method = "{solve.method}"')
     if getattr(solve, "start", "web") == "equilibrium":
-        refuse_found(system.families, 'start = "equilibrium"')
+        refuse_found(system.terms, 'start = "equilibrium"')
     system.initial_velocity()
     if system.laid is not None and solve.start != "web":
         raise InputError(f'[solve] start = {quote(solve.start)} must be "web" with [fold], which is a start of its own')

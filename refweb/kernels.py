@@ -12,7 +12,6 @@ all its digits, which it loses when positions are the unknowns.
                    positive semidefinite part
 `BOUND`            ``(reach, speed, x, mass, rates, cells, data)``: adds to ``rates`` what bounds each row's sum of
                    |K| [N/m], for all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most
-`LINES`            ``(t, lines, cells, data)``: changes natural lengths among the numbers of all lines
 `IMPULSE`          ``(t, x, cells, data, total)``: adds ∫F dt [N s], F the sum of the forces of all cells, to ``total
                    (3,)``, but for a constant
 `DETECT`           ``(x, cells, data, contacts, parts, begin)``: writes the contacts of all cells, see `CONTACT`, from
@@ -68,7 +67,7 @@ def _array(scalar, dimensions):
 
 
 VECTOR, MATRIX, INDICES = _array(_f, 1), _array(_f, 2), _array(_i, 2)
-"""Types of numbers per cell, of the data and of the cells of a family."""
+"""Types of numbers per cell, of the data and of the cells of a term."""
 INTEGERS = _array(types.int64, 1)
 """Type of row numbers."""
 _common = (_f, _array(_f, 2), _array(_f, 2))
@@ -76,7 +75,6 @@ FORCE = types.void(*_common, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array
 ENERGY = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2), _array(_f, 1))
 BOUND = types.void(_f, _f, _array(_f, 2), _array(_f, 1), _array(_f, 1), _array(_i, 2), _array(_f, 2))
 IMPULSE = ENERGY
-LINES = types.void(_f, _array(_f, 2), _array(_i, 2), _array(_f, 2))
 STIFFNESS = types.void(*_common, _array(_f, 3), _array(_i, 2), _array(_f, 2), types.boolean)
 PART = np.dtype([("row", np.int64), ("jacobian", float, (3, 3)), ("transpose", float, (3, 3))])
 """A row that a contact moves; for each direction, J (what its velocity adds to the relative velocity u) and Jᵀ (what a
@@ -144,7 +142,6 @@ MemoryTable = Annotated[Arrays, MEMORIES]
 ForceTable = Annotated[Functions, FORCE]
 EnergyTable = Annotated[Functions, ENERGY]
 BoundTable = Annotated[Functions, BOUND]
-LinesTable = Annotated[Functions, LINES]
 DetectTable = Annotated[Functions, DETECT]
 LawTable = Annotated[Functions, LAW]
 MeetsTable = Annotated[Functions, MEETS]

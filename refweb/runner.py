@@ -236,18 +236,18 @@ def notices(scene, system):
 
 def _idle(system, times):
     """Warnings of what acts from outside on supports alone, at some times."""
-    for family in system.families:
-        if family.internal or family.angular_velocity is not None:
+    for term in system.terms:
+        if term.balance.internal or term.frame.angular_velocity is not None:
             continue
-        times = sorted({*times, *family.times})
+        times = sorted({*times, *term.timing.times})
         between = [0.5 * (before + after) for before, after in itertools.pairwise(times)]
-        felt = [system.force_of(family, t, np.zeros((system.rows, 3))) != 0.0 for t in (*times, *between)[:MOST_TIMES]]
+        felt = [system.force_of(term, t, np.zeros((system.rows, 3))) != 0.0 for t in (*times, *between)[:MOST_TIMES]]
         acts = np.any(felt, axis=0)
         if acts.any() and not (acts & ~system.fixed).any():  # a node that a free body carries moves with it
             rows = np.flatnonzero(acts.any(axis=1))
             names = ", ".join(map(system.row_name, rows[:4])) + (", ..." if len(rows) > 4 else "")
-            text = f"the {family.name} on {names} acts only on supports, which carry it: it moves nothing"
-            yield Finding("idle-load", text, family.name)
+            text = f"the {term.name} on {names} acts only on supports, which carry it: it moves nothing"
+            yield Finding("idle-load", text, term.name)
 
 
 def _cpu_by_effect(system, solution):
@@ -262,15 +262,15 @@ def _cpu_by_effect(system, solution):
         from .dynamics.budget import steps_with_twin
 
         calls *= steps_with_twin(scene)
-    for family in system.families:
+    for term in system.terms:
         if state is None:
             break
         best = np.inf
         for _ in range(3):
             begin = time.perf_counter()
-            system.force_of(family, state.time, state.x, state.v)
+            system.force_of(term, state.time, state.x, state.v)
             best = min(best, time.perf_counter() - begin)
-        share[family.name] = share.get(family.name, 0.0) + best * calls
+        share[term.name] = share.get(term.name, 0.0) + best * calls
     if scene.solve.kind == "dynamic":
         share["all else"] = max(solution.cost["cpu_s"] - sum(share.values()), 0.0)
     return share

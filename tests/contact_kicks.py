@@ -19,7 +19,7 @@ class Solved:
     Parameters
     ----------
     system : refweb.system.system.System
-        Some of its families have losses that are solved for.
+        Some of its terms have losses that are solved for.
     x, v : ndarray, shape (rows, 3)
         Displacement [m] and velocity ahead of the kick [m/s].
     h : float
@@ -33,7 +33,7 @@ class Solved:
 
     Attributes
     ----------
-    families : list of refweb.effects.base.Family
+    terms : list of refweb.effects.base.ForceTerm
         Those with such losses.
     contacts, parts : ndarray
         Of `refweb.kernels.CONTACT`, and of `refweb.kernels.PART` from ``first`` of a contact on.
@@ -50,15 +50,15 @@ class Solved:
     """
 
     def __init__(self, system, x, v, h, f=None, mass=None, sweeps=1000):
-        net, self.families = system.net, [family for family in system.families if family.rubbing is not None]
+        net, self.terms = system.net, [term for term in system.terms if term.velocity.implicit is not None]
         mass = net.mass if mass is None else mass
         inverse = np.where(system.supported, 0.0, 1.0 / np.where(mass > 0.0, mass, 1.0)[:, None])
         contacts, parts = np.zeros(SPACE, CONTACT), np.zeros(SPACE * PARTS, PART)
         contacts["first"] = PARTS * np.arange(SPACE)
         ends, count = [], 0
-        for m, family in enumerate(self.families):
+        for m, term in enumerate(self.terms):
             begin = count
-            count = family.rubbing.detect(x, family.cells, family.data, contacts, parts, begin)
+            count = term.velocity.implicit.detect(x, term.cells, term.data, contacts, parts, begin)
             contacts["term"][begin:count] = m
             ends.append((begin, count))
         assert count <= SPACE
@@ -68,7 +68,7 @@ class Solved:
             if len(turns.carried):
                 contact_solver.carry(n, x, carriers, turns, contacts, parts)
             contact_solver.prepare(h, n, v, inverse, contacts, parts)
-        laws = Functions(LAW, [family.rubbing.law for family in self.families])
+        laws = Functions(LAW, [term.velocity.implicit.law for term in self.terms])
         total = np.zeros_like(v) if f is None else f.copy()
         for self.sweeps in range(sweeps):
             change = contact_solver.gauss_seidel(h, self.sweeps, total, inverse, contacts, parts, count, laws)
@@ -79,8 +79,8 @@ class Solved:
         if system.carried.any():
             system.drive(0.0, x.copy(), self.after)
         self.mean, self.power, self.felt = 0.5 * (v + self.after), 0.0, np.zeros(3)
-        for family, (begin, end) in zip(self.families, ends, strict=True):
-            out, memory = np.ones((len(family.cells), family.observed)), np.zeros((len(family.cells), 8), MEMORY)
+        for term, (begin, end) in zip(self.terms, ends, strict=True):
+            out, memory = np.ones((len(term.cells), term.columns)), np.zeros((len(term.cells), 8), MEMORY)
             contact_solver.commit(1, memory, self.mean, contacts, parts, begin, end, out)
             self.power += out[:, OWN].sum()
             self.felt += out[:, FELT:].sum(axis=0) if out.shape[1] > FELT else 0.0

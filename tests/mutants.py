@@ -223,8 +223,8 @@ MUTANTS = [
     Mutant("effects/damping", "max(pull, smallest)", "pull"),
     Mutant(
         "effects/damping",
-        "power -= weights[q] * data[c, LENGTH] * pull * rate",
-        "power += weights[q] * data[c, LENGTH] * pull * rate",
+        "power -= weights[q] * line.natural_length * pull * rate",
+        "power += weights[q] * line.natural_length * pull * rate",
     ),
     Mutant(
         "effects/bending", "f[cells[c, 1], r] += first_pull + last_pull", "f[cells[c, 1], r] += first_pull - last_pull"
@@ -239,8 +239,8 @@ MUTANTS = [
     Mutant("effects/drag/implicit_drag", "node.velocity[0] + 0.5 * h * rate[0]", "node.velocity[0] + h * rate[0]"),
     Mutant("effects/drag/table", "[self.normal, math.pi * self.tangential]", "[self.normal, self.tangential]"),
     Mutant("system/contact_forces", "felt[partner_row, FORCE] -= x", "felt[partner_row, FORCE] += x"),
-    Mutant("system/contact_forces", "float(cell % known[ELEMENTS])", "float(cell)"),
-    Mutant("dynamics/integrators/contacts", "if known[FAMILY] in near:", "if False:"),
+    Mutant("system/contact_forces", "float(cell % term.elements)", "float(cell)"),
+    Mutant("dynamics/integrators/contacts", 'if term["number"] in near:', "if False:"),
     Mutant("results/observables/overlap", "forces.pair_rows(body_b, bodies)", "[forces.row(body_b)]"),
     Mutant("results/observables/overlap", "if body_b is None else", "if body is None else"),
     Mutant("effects/contact/penalty", "out[c, FELT + k] += push * g[k]", "out[c, FELT + k] -= push * g[k]"),
@@ -418,7 +418,7 @@ MUTANTS = [
         "factor = 1.0",
     ),
     Mutant("dynamics/twin_error", "error=result.error + float(change[i])", "error=result.error"),
-    Mutant("dynamics/history", 'scales["stress"] = 0, 1.0 / net.area', 'scales["stress"] = 0, net.area'),
+    Mutant("dynamics/history", 'scales["stress"] = tension, 1.0 / net.area', 'scales["stress"] = tension, net.area'),
     Mutant(
         "dynamics/history",
         "float(extremes.values[slot]), float(extremes.times[slot])",
@@ -490,8 +490,8 @@ MUTANTS = [
     ),
     Mutant(
         "results/observables/line",
-        "return tension / net.line_data[:, AXIAL_STIFFNESS]",
-        "return tension / net.line_data[:, AXIAL_STIFFNESS] / 2.0",
+        "return tension / net.line_data.ea",
+        "return tension / net.line_data.ea / 2.0",
     ),
     Mutant("results/observables/observable", "changes[0] + 3.0 * max(changes[1:])", "changes[0]"),
     Mutant("results/state", "self.element_strain <= self.system.net.slackness", "self.element_strain <= 0.0"),
@@ -551,7 +551,7 @@ MUTANTS = [
         "self.per_cell() if per_cell is",
         "self.__dict__.setdefault('one', self.per_cell()) if per_cell is",
     ),
-    Mutant("system/broken_lines", "changed.families.append(held_energy(net))", "pass"),
+    Mutant("system/broken_lines", "changed.terms.append(held_energy(net))", "pass"),
     Mutant(
         "dynamics/integrators/rupture", "_holding(self.inner.system.net.broken)", "_holding(course.breaks.elements)"
     ),

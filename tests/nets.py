@@ -151,9 +151,9 @@ def thrown(body, count, stiffness, duration=0.05):
     v[falling.supported] = 0.0
     method = CentralDifference(falling, step_size=duration / count * (1.0 + 1e-12))
     run, stored = method.start(None, v), []
-    family = next(family for family in falling.families if family.contact)
+    term = next(term for term in falling.terms if term.contact.with_lines)
     for row in np.linspace(0.0, duration, 11)[1:]:
         method.advance(run, np.array([row]))
-        stored.append(falling.energy_of(family, row, run.x).max())
+        stored.append(falling.energy_of(term, row, run.x).max())
     assert run.nsteps == count
     return run.x.copy(), run.drift, np.sqrt(2.0 * max(stored) / stiffness)

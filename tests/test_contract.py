@@ -146,31 +146,29 @@ def test_effect(name, i, law, seed):
         return drive(net, system)
     if system.constraints:
         return constraint(net, system, seed)
-    if system.line_drives:
-        return line_drive(name, i, law, seed)
-    assert system.families
-    for family in system.families:
-        alone = SimpleNamespace(on=lambda _, family=family: family)
-        check_family(net, System(net, [alone], np.zeros(net.points.shape, dtype=bool)), family, seed)
+    assert system.terms
+    for term in system.terms:
+        alone = SimpleNamespace(on=lambda _, term=term: term)
+        check_term(net, System(net, [alone], np.zeros(net.points.shape, dtype=bool)), term, seed)
 
 
-def check_family(net, system, family, seed):
-    """A family alone in its system."""
-    assert family.cells.dtype == np.int32 and len(family.cells) == len(family.data)
+def check_term(net, system, term, seed):
+    """A term alone in its system."""
+    assert term.cells.dtype == np.int32 and len(term.cells) == len(system.data_of(term, 0.0))
     x, v = state(net, seed)
     d = np.where(system.supported, 0.0, state(net, seed + 100)[0])
     # Steps that cross no kink: the lines of this net are at least 1e-3 of strain from it at these states.
     steps = np.array([2e-3, 1e-3, 5e-4, 2.5e-4])
     t = 0.7
 
-    if family.energy is not None:
+    if term.energy is not None:
         exact = -np.sum(system.force(t, x, v) * d)
         remainder = [abs(system.energy(t, x + h * d) - system.energy(t, x) - h * exact) for h in steps]
-        scale = 1e-13 * abs(system.energy_of(family, t, x)).sum()
+        scale = 1e-13 * abs(system.energy_of(term, t, x)).sum()
         assert max(remainder) <= 10 * scale or abs(slope(remainder, steps) - 2) < 0.1
 
     force = system.force(t, x, v)
-    if family.stiffness is None:
+    if term.tangent.stiffness is None:
         np.testing.assert_array_equal(system.force(t, x + d, v), force)
     else:
         K = system.pattern.matrix(system.stiffness(t, x, v))
@@ -178,34 +176,36 @@ def check_family(net, system, family, seed):
         product = K @ d.ravel()[system.free]
         remainder = [np.linalg.norm(f + h * product) for h, f in zip(steps, forces, strict=True)]
         assert max(remainder) <= 1e-13 * np.abs(force).sum() or abs(slope(remainder, steps) - 2) < 0.1
-        if family.energy is not None:
+        if term.energy is not None:
             assert abs(K - K.T).max() <= 1e-13 * abs(K).max()
         values = np.linalg.eigvalsh(system.pattern.matrix(system.stiffness(t, x, v, definite=True)).toarray())
         assert values[0] >= -1e-12 * values[-1]
 
-    if family.damping is not None:
+    if term.velocity.damping is not None:
         C = system.pattern.matrix(system.damping(t, x, v))
         forces = [system.force(t, x, v + h * d).ravel()[system.free] - force.ravel()[system.free] for h in steps]
         product = C @ d.ravel()[system.free]
         remainder = [np.linalg.norm(f + h * product) for h, f in zip(steps, forces, strict=True)]
         assert max(remainder) <= 1e-13 * np.abs(force).sum() or abs(slope(remainder, steps) - 2) < 0.1
         values = np.linalg.eigvalsh((C + C.T).toarray())
-        assert values[0] >= -1e-12 * values[-1] and (values[-1] > 0.0 or family.power is None)
+        assert values[0] >= -1e-12 * values[-1] and (values[-1] > 0.0 or term.balance.power is None)
 
-    if family.power is not None:
+    if term.balance.power is not None:
         (out,) = system.forces(t, x, v)[1]
-        np.testing.assert_allclose(out[:, family.power].sum(), np.sum(force * v), rtol=1e-12)
-        assert family.book == "work" or out[:, family.power].max() <= 0.0
+        np.testing.assert_allclose(out[:, term.balance.power].sum(), np.sum(force * v), rtol=1e-12)
+        assert term.balance.column == "work" or out[:, term.balance.power].max() <= 0.0
 
-    if family.internal:
+    if term.balance.internal:
         position, moment = net.points + x, len(net.points) - net.spins
         size = np.abs(force).sum()
         assert np.abs(force[:moment].sum(axis=0)).max() <= 1e-14 * size
-        felt = [body for body in net.bodies if body.row in family.cells]
+        felt = [body for body in net.bodies if body.row in term.cells]
         if any(not body.shape.once for body in felt):
             return  # bodies with axes, which do not turn
         moments = np.vstack([np.cross(position, force)[:moment], force[moment:]])
-        if family.damping is None or all(body.spin is not None for body in felt):  # else the supports have a moment
+        if term.velocity.damping is None or all(
+            body.spin is not None for body in felt
+        ):  # else the supports have a moment
             assert np.abs(moments.sum(axis=0)).max() <= 1e-14 * size
         turn = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
         turn *= np.linalg.det(turn)
@@ -256,22 +256,22 @@ def test_derivatives_in_hard_states(name, i, law, place):
     x, v = np.zeros((2, *net.points.shape))
     x[: net.nodes], v[: net.nodes] = place(net.points[: net.nodes], noise[0, : net.nodes])
     d, t = noise[1], 0.7
-    for family in system.families:
-        alone = SimpleNamespace(on=lambda _, family=family: family)
+    for term in system.terms:
+        alone = SimpleNamespace(on=lambda _, term=term: term)
         one = System(net, [alone], np.zeros(net.points.shape, dtype=bool))
         d = np.where(one.supported, 0.0, d)
         force = one.force(t, x, v)
         assert np.isfinite(force).all()
-        if family.energy is not None:
+        if term.energy is not None:
 
             def gain(h):
-                return np.sum(one.energy_of(family, t, x + h * d) - one.energy_of(family, t, x - h * d))  # noqa: B023
+                return np.sum(one.energy_of(term, t, x + h * d) - one.energy_of(term, t, x - h * d))  # noqa: B023
 
             assert agrees(gain, -2.0 * np.sum(force * d))
-        for part, dx, dv in ((family.stiffness, d, 0.0 * d), (family.damping, 0.0 * d, d)):
+        for part, dx, dv in ((term.tangent.stiffness, d, 0.0 * d), (term.velocity.damping, 0.0 * d, d)):
             if part is None:
                 continue
-            values = one.stiffness(t, x, v) if part is family.stiffness else one.damping(t, x, v)
+            values = one.stiffness(t, x, v) if part is term.tangent.stiffness else one.damping(t, x, v)
             assert np.isfinite(values).all()
 
             def change(h, dx=dx, dv=dv):
@@ -294,7 +294,7 @@ def test_extension(name, i):
     np.testing.assert_array_equal(longer.points[:rows], net.points)
     assert (longer.mass[:rows] >= net.mass).all() and len(longer.mass) == len(longer.points) >= rows
     assert longer.web is net.web and longer.cells is net.cells
-    np.testing.assert_array_equal(longer.line_data[:, : net.line_data.shape[1]], net.line_data)
+    np.testing.assert_array_equal(longer.line_data.matrix[:, : net.line_data.matrix.shape[1]], net.line_data.matrix)
     added = getattr(effect, "mass", 0.0) or 0.0
     times = len(effect.node) if added and hasattr(effect, "node") else 1
     np.testing.assert_allclose(longer.mass.sum() - net.mass.sum(), times * added, rtol=1e-14)
@@ -329,8 +329,8 @@ def test_point_masses_add_up():
 
 def test_contact_is_per_body():
     """The table of a body replaces the stiffness for that body alone."""
-    (family,) = make("Contact", 1, "linear")[1].families
-    assert len(family.cells) == 18 and set(family.data[:9, 1]) == {1e2} and set(family.data[9:, 1]) == {1e4}
+    (term,) = make("Contact", 1, "linear")[1].terms
+    assert len(term.cells) == 18 and set(term.data[:9, 1]) == {1e2} and set(term.data[9:, 1]) == {1e4}
     with pytest.raises(InputError, match='bodies."walls" is not a body, did you mean "wall"'):
         CLASSES["Contact"](stiffness=1.0, bodies=dict(walls=dict(stiffness=1.0))).on(make("Contact", 0, "linear")[0])
 
@@ -436,7 +436,10 @@ def constraint(net, system, seed):
     assert np.abs(np.cross(net.points + x, force).sum(axis=0)).max() <= 1e-15 * size
 
 
-def line_drive(name, i, law, seed):
+@pytest.mark.parametrize("name, i", [case for case in cases("extend") if case[0] in ("Reel", "Temperature")])
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("seed", range(3))
+def test_natural_lengths(name, i, law, seed):
     """Lengths are a factor times what they are otherwise, in any order of times; ∂E/∂L is the slope of energy."""
     net, effect = skew_net(law), example(name, i)
     own, free = net.natural_length.copy(), np.zeros((len(net.points), 3), dtype=bool)
@@ -447,7 +450,7 @@ def line_drive(name, i, law, seed):
         lengths, others = system.natural_length(time), alone.natural_length(time)
         assert (lengths > 0.0).all()
         np.testing.assert_allclose(lengths, others * np.where(net.line == 0, 0.95, 1.0), rtol=1e-15)
-    driven = np.concatenate([drive.cells[:, 0] for drive in system.line_drives])
+    driven = np.concatenate([elements for elements, _ in system.net.factors])
     np.testing.assert_array_equal(np.delete(lengths, driven), np.delete(own, driven))
     np.testing.assert_array_equal(system.net.natural_length, own)
     energy, lengths, slopes = system.energy(t, x), system.natural_length(t), system.length_force(t, x)

@@ -250,21 +250,20 @@ TABLES = {
 }
 SOLVED = ("detection", "law")
 LISTED = ("force", "energy", "bound", "bound of damping", *SOLVED)
-LISTED += ("motion", "lengths", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
-FAMILY = {"force": 1, "energy": 1, "bound": 1}
-KERNELS = {name: FAMILY for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
-KERNELS |= {name: {**FAMILY, "impulse": 1} for name in ("gravity", "load")}
-KERNELS |= {name: {**FAMILY, "near": 1} for name in ("contact", "self_contact")}
+LISTED += ("motion", "work of lengths", "impulse", "near", "meets", "watch", "passing", "probe")
+TERM = {"force": 1, "energy": 1, "bound": 1}
+KERNELS = {name: TERM for name in ("gravity", "load", "contact", "pressure", "thrust", "bending")}
+KERNELS |= {name: {**TERM, "impulse": 1} for name in ("gravity", "load")}
+KERNELS |= {name: {**TERM, "near": 1} for name in ("contact", "self_contact")}
 KERNELS["self_contact"] |= {"meets": 1, "watch": 1}
 KERNELS["contact"] |= {"passing": 1}
 KERNELS["attach"] = {"motion": 1}  # to a body that is fixed
-KERNELS |= {"damping": {**FAMILY, "bound of damping": 1}, "motion": {"motion": 1}}
+KERNELS |= {"damping": {**TERM, "bound of damping": 1}, "motion": {"motion": 1}}
 KERNELS["frame"] = {"force": 2, "energy": 2, "bound": 2, "bound of damping": 1}  # centrifugal and Coriolis
 KERNELS["orbit"] = KERNELS["frame"]
-KERNELS["rupture"] = FAMILY
-KERNELS["drag"] = {**FAMILY, **dict.fromkeys(SOLVED, 1)}
-KERNELS |= {name: {"lengths": 1} for name in ("reel", "temperature")}
-KERNELS |= {name: {} for name in ("point_mass", "velocity", "body", "fold")}
+KERNELS["rupture"] = TERM
+KERNELS["drag"] = {**TERM, **dict.fromkeys(SOLVED, 1)}
+KERNELS |= {name: {} for name in ("reel", "temperature", "point_mass", "velocity", "body", "fold")}
 """Kernels that each effect adds to the lists of the compiled loop, which takes no links."""
 
 
@@ -395,11 +394,11 @@ def handed(monkeypatch):
 
 def summed(*effects):
     """The same from `KERNELS`; a web alone has its elasticity, and one work of lengths serves all that change them."""
-    total = dict.fromkeys(LISTED, 0) | FAMILY
+    total = dict.fromkeys(LISTED, 0) | TERM
     for name in effects:
         for which, number in KERNELS[name].items():
             total[which] += number * (2 if name == "drag" and {"body", "contact"} & set(effects) else 1)
-    total["work of lengths"] = min(total["lengths"], 1)
+    total["work of lengths"] = int(bool({"reel", "temperature"} & set(effects)))
     return total
 
 
@@ -410,7 +409,7 @@ def test_kernels_with_an_effect_alone(handed, name):
 
 
 def test_kernels_of_friction(handed, monkeypatch):
-    """A second family, with the four kernels that solve for it, and no bound of damping."""
+    """A second term, with the four kernels that solve for it, and no bound of damping."""
     monkeypatch.setitem(TABLES, "contact", {**TABLES["contact"], "friction": 0.3})
     rubbing = {**summed("contact"), "force": 3, "energy": 3, "bound": 3, **dict.fromkeys(SOLVED, 1)}
     assert handed("contact") == rubbing

@@ -188,7 +188,7 @@ def test_every_table_and_key(tmp_path):
             refweb.Observe(name="line 1", quantity="tension", line=1, reduce="min"),
         ],
     )
-    assert len(scene.build().families) == 4
+    assert len(scene.build().terms) == 4
 
 
 def test_defaults(tmp_path):

@@ -44,7 +44,7 @@ class Allowance:
     def of(self, unit):
         net, state = self.solution.state.system.net, self.solution.state
         size = max(np.abs(net.points + state.x).max(), 1.0)
-        stiff = net.line_data[:, 1]
+        stiff = net.line_data.ea
         tension = 16.0 * EPS * size * (stiff / net.natural_length).sum()
         stretch = np.abs(state.element_tension).max() + tension
         speed = np.abs(state.v).max()

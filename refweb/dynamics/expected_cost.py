@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS, LENGTH
 from ..net.rotation import RigidRotations
 from ..net.rotation_bounds import carry_rates
 from ..registry import INTEGRATORS
@@ -28,44 +27,42 @@ class Rule(NamedTuple):
 def ruling(integrator, system, reach, speed):
     """The `Rule` of the bound of stability at the web's position, for what bodies touch within ``reach`` [m].
 
-    The row whose bound is the smallest says it, by the family with the largest part in that: of stiffness, or where
+    The row whose bound is the smallest says it, by the term with the largest part in that: of stiffness, or where
     that alone would let steps be over √2 times as long, of damping.
     """
     net = system.net
     moving = np.flatnonzero(~system.supported.all(axis=1) & (net.mass > 0.0))
-    stiff, lossy = (
-        _parts(system, [getattr(family, name) for family in system.families], reach, speed)[:, moving]
-        / net.mass[moving]
-        for name in ("bound", "damping_bound")
-    )
+    terms = system.terms
+    bounds = [term.tangent.bound for term in terms], [term.velocity.bound for term in terms]
+    stiff, lossy = (_parts(system, part, reach, speed)[:, moving] / net.mass[moving] for part in bounds)
     both = np.sqrt(lossy.sum(axis=0) ** 2 + 4.0 * stiff.sum(axis=0)) + lossy.sum(axis=0)
     largest = both.max(initial=0.0)
     if not largest > 0.0:
         return Rule(np.inf, "nothing, as nothing vibrates")
     worst = int(both.argmax())
     damped = largest > np.sqrt(2.0) * 2.0 * np.sqrt(stiff[:, worst].sum())
-    family = system.families[int((lossy if damped else stiff)[:, worst].argmax())]
+    term = terms[int((lossy if damped else stiff)[:, worst].argmax())]
     row = int(moving[worst])
     if damped:
         by = f"damping at {system.row_name(row)}"
-    elif family.lines:
+    elif term.over_lines:
         of_it = [row, *(node for body in net.bodies if row in (body.row, body.spin) for node in body.carried)]
-        at = np.flatnonzero(np.isin(family.cells, of_it).any(axis=1))
+        at = np.flatnonzero(np.isin(term.cells, of_it).any(axis=1))
         data = net.line_data[at]
-        by = f"elasticity of line {net.line[at[(data[:, AXIAL_STIFFNESS] / data[:, LENGTH]).argmax()]]}"
+        by = f"elasticity of line {net.line[at[(data.ea / data.natural_length).argmax()]]}"
     else:
-        name = "friction" if family.rubbing is not None else family.name
+        name = "friction" if term.velocity.implicit is not None else term.name
         by = f"{name} at {system.row_name(row)}"
     return Rule(integrator.safety * integrator.stretch * 4.0 / largest, by)
 
 
 def _parts(system, bounds, reach, speed):
-    """Parts of each family in the bounds of the row sums, shape (families, rows)."""
+    """Parts of each term in the bounds of the row sums, shape (terms, rows)."""
     rates, parts, turns = np.zeros(system.rows), [], RigidRotations.of(system.net)
-    for family, bound in zip(system.families, bounds, strict=True):
-        before, data = rates.copy(), system.net.line_data if family.lines else family.data
+    for term, bound in zip(system.terms, bounds, strict=True):
+        before, data = rates.copy(), system.data_of(term, 0.0)
         if bound is not None:
-            bound(reach, speed, np.zeros((system.rows, 3)), system.net.mass, rates, family.cells, data)
+            bound(reach, speed, np.zeros((system.rows, 3)), system.net.mass, rates, term.cells, data)
         parts.append(rates - before)
         carry_rates(parts[-1], turns)
     return np.array(parts)

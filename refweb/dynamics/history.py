@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..effects.base import pairs_of
-from ..net.net import AXIAL_STIFFNESS, SLACKNESS, SMOOTHING
+from ..effects.base import STRAIN, pairs_of
 from ..net.tension_laws import SMOOTH
 from ..results import probes
 from ..results.columns import FIRST, components, dynamic_energies, vectors
@@ -32,14 +31,14 @@ def _probes_of_warnings(system, followed, step_size):
     are probes that are looked at in any case: where one of them is of tensions, the largest of which is that of the
     largest strain, strains need no look of their own. How fast bodies are counts where the ``step_size`` is given [s].
     """
-    net, scales = system.net, {}
+    net, tension, scales = system.net, system.tension_column, {}
     if (net.laws == SMOOTH).any():
-        scales["stress"] = 0, 1.0 / net.area
+        scales["stress"] = tension, 1.0 / net.area
     if np.isfinite(net.strength).any():
-        scales["utilisation"] = 0, 1.0 / (net.area * net.strength)
-    tell = [scale for column, scale in scales.values() if column == 0]
+        scales["utilisation"] = tension, 1.0 / (net.area * net.strength)
+    tell = [scale for _, scale in scales.values()]
     if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
-        scales["strain"] = 1, np.ones(len(net.cells))
+        scales["strain"] = STRAIN, np.ones(len(net.cells))
     by_name = {
         name: probes.Probe(probes.line, [column, 0, len(scale)], scale[:, None], 1)
         for name, (column, scale) in scales.items()
@@ -51,9 +50,9 @@ def _probes_of_warnings(system, followed, step_size):
         from ..results.observables.overlap import probe_of
 
         by_name |= {("overlap", body.name): probe_of(system, body)._replace(sign=1.0) for body in net.bodies}
-    for i in (i for i, family in enumerate(system.families) if family.crossing is not None):
-        cells = len(system.families[i].cells)
-        by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, family=i)
+    for i in (i for i, term in enumerate(system.terms) if term.contact.crossing is not None):
+        cells = len(system.terms[i].cells)
+        by_name["lines"] = probes.Probe(probes.deepest, [0, cells], np.zeros((1, 1)), sign=1.0, term=i)
     if pairs_of(system):
         from ..results.observables.overlap import probe_of_speed, probes_between
 
@@ -66,15 +65,15 @@ def _probes_of_warnings(system, followed, step_size):
 def _of_tension(probe):
     """Tell if a probe follows the largest of all tensions, each times a scale, and no mean of it."""
     every = probe.kernel is probes.line and list(probe.rows[1:]) == [0, len(probe.data)]
-    return every and probe.rows[0] == 0 and probe.sign > 0.0 and not probe.average
+    return every and probe.rows[0] != STRAIN and probe.sign > 0.0 and not probe.average
 
 
 def _tells_strain(system, scale):
     """Tell if the largest tension times a scale is that of the most strained element in any case."""
-    net, lines = system.net, [family for family in system.families if family.lines]
+    net, lines = system.net, [term for term in system.terms if term.over_lines]
     if net.law is None or len(scale) != len(net.cells) or len(lines) > 1:  # tension of damping tells of no strain
         return False
-    numbers = np.column_stack([scale * net.line_data[:, AXIAL_STIFFNESS], net.line_data[:, SLACKNESS : SMOOTHING + 1]])
+    numbers = np.column_stack([scale * net.line_data.ea, net.line_data.slackness, net.line_data.smoothing])
     return bool(np.allclose(numbers, numbers[0], rtol=1e-12, atol=0.0))
 
 
@@ -154,7 +153,7 @@ class Watch:
 
     def _weights_of_columns(self, energies):
         """Weights of the columns of a `History` in each column of ``history.csv``, shape (columns there, columns)."""
-        unit = History.empty(0, len(self.probes), self.system.families)
+        unit = History.empty(0, len(self.probes), self.system.terms)
         unit = History(unit.names, np.eye(len(unit.names)), unit.probed)
         columns = [unit.time]
         for o in self._observables:
@@ -298,8 +297,9 @@ class Watch:
         follows = (_of_tension(p) and _tells_strain(self.system, p.data[:, 0]) for p in self.probes)
         at = next(i for i, yes in enumerate(follows) if yes)
         cell = int(places[at])
-        tension, (stiffness, *law) = values[at] / self.probes[at].data[cell, 0], net.line_data[cell, 1:4]
-        return float(net.law.strain(tension, stiffness, *law)) if tension > 0.0 else 0.0, int(net.line[cell])
+        tension, numbers = values[at] / self.probes[at].data[cell, 0], net.line_data[cell]
+        strain = net.law.strain(tension, numbers.ea, numbers.slackness, numbers.smoothing) if tension > 0.0 else 0.0
+        return float(strain), int(net.line[cell])
 
     def overlap_of_lines(self, course):
         """(Deepest overlap of lines in all steps [m], its time [s], its cell), None where lines do not touch lines."""

@@ -59,7 +59,9 @@ def remarks_on(start, system):
     before = np.zeros((system.rows, 3)) if start.x is None else start.x
     driven = before.copy()
     system.drive(0.0, driven)
-    inner = [(family.contact, system.energy_of(family, 0.0, driven)) for family in system.families if family.internal]
+    inner = [
+        (term.contact.with_lines, system.energy_of(term, 0.0, driven)) for term in system.terms if term.balance.internal
+    ]
     moved = np.flatnonzero((driven != before).any(axis=1))
     if len(moved):
         stored = sum(energy.sum() for _, energy in inner)

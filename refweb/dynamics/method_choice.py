@@ -72,7 +72,7 @@ def decided(scene, system):
     steps = max(scene.solve.duration / (0.5 * bound), float(corners))
     seconds = steps * step_price(system)
     price = f"{steps:.3g} explicit steps, some {seconds:.2g} s of CPU time"
-    if listed := [family.name for family in system.families if family.finder is not None]:
+    if listed := [term.name for term in system.terms if term.contact.finder is not None]:
         why = f"[{listed[0]}] finds its pairs as they come near, which explicit steps alone take: {price}"
         return Choice(given_to(scene, "central-difference"), why)
     damped, slow = _damped(system, bound), seconds > QUICK_RUN and steps > STEP_OF_CVODE * corners
@@ -97,7 +97,7 @@ def decided(scene, system):
 def _undamped(system):
     """The system without the bounds of damping."""
     calm = copy.copy(system)
-    calm.families = [replace(family, damping_bound=None) for family in system.families]
+    calm.terms = [replace(term, velocity=term.velocity._replace(bound=None)) for term in system.terms]
     return calm
 
 
@@ -106,11 +106,15 @@ def step_price(system, touched=False):
 
     Where forces depend on velocity their step is iterated, the longer the more of its bound damping takes away.
     """
-    others = sum(len(family.cells) for family in system.families if not family.lines)
+    others = sum(len(term.cells) for term in system.terms if not term.over_lines)
     price = PER_STEP + PER_ELEMENT * len(system.net.cells) + PER_CELL * others
     if touched:
-        price += sum(len(f.cells) * (PER_TOUCH if f.rubbing is None else PER_RUB) for f in system.families if f.contact)
-    damped = any(family.damping is not None and family.rubbing is None for family in system.families)
+        price += sum(
+            len(f.cells) * (PER_TOUCH if f.velocity.implicit is None else PER_RUB)
+            for f in system.terms
+            if f.contact.with_lines
+        )
+    damped = any(term.velocity.damping is not None and term.velocity.implicit is None for term in system.terms)
     if damped:
         price *= 1.0 + min(_damped(system, _bound(system)), 7.0)
     return price

@@ -296,8 +296,8 @@ class Simulation:
             for event, time in zip(self.scene.event, course.events["time"][: len(self.scene.event)], strict=True)
         ]
         spent = dict(nsteps=course.nsteps, **course.drifts, **self.integrator.spent(course))
-        outer = (f for f in self.system.families if not f.internal and f.impulse is None)
-        if integrated := sorted({family.name for family in outer}):
+        outer = (f for f in self.system.terms if not f.balance.internal and f.balance.impulse is None)
+        if integrated := sorted({term.name for term in outer}):
             spent["integrated_impulses"] = integrated
         choice = {} if self._ways is None else self._ways.record()
         solution.solver = {**SOLVER, "method": self.scene.solve.method, **choice, **spent}

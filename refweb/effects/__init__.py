@@ -9,11 +9,10 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
 
     import numpy as np
 
-    from refweb.effects.base import Family
+    from refweb.effects.base import Balance, ForceTerm, Tangent
     from refweb.effects.vectors import cross
     from refweb.errors import InputError
     from refweb.kernels import BOUND, FORCE, STIFFNESS, kernel
-    from refweb.net.net import REFERENCE
     from refweb.tables import Several, Table, nodes, real, table, vector
 
 
@@ -61,10 +60,10 @@ its forces; `refweb.effects.base` has what else it may be. A whole file, ``refwe
             if net.order > 1:
                 raise InputError(f"[cable] order = {net.order} must be 1: a current runs straight from node to node")
             elements = np.flatnonzero(np.isin(net.line, net.web.find_lines(self.lines)))
-            reference = net.line_data[elements, REFERENCE : REFERENCE + 3]
+            reference = net.line_data.reference[elements]
             data = np.hstack([reference, np.tile(self.current * np.array(self.field), (len(elements), 1))])
-            own = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
-            return Family(name="current", cells=net.cells[elements], data=data, book="work", observed=1, power=0, **own)
+            tangent, balance = Tangent(stiffness, bound, symmetric=False), Balance("work", power=0)
+            return ForceTerm("current", net.cells[elements], data, force, balance, tangent=tangent)
 
 A line in `refweb.registry.EFFECTS` makes it known to scenes, messages and all methods::
 
@@ -87,17 +86,18 @@ Nodes are found by ``net.web.find(self.node)``, lines by ``net.web.find_lines(se
 that order and subdivision add in "all" as well. `refweb.effects.base.column` makes cells of one row each. A field reads
 and checks its value: ``real(above=0.0, unit="N/m")``; the others are in `refweb.tables`.
 
-A force with a potential has ``energy=energy, book="spring_energy"`` instead of a power: that name heads a column of
-``history.csv`` and counts in the total energy. It is observed once it has a
+A force with a potential has ``energy=energy`` and ``Balance("spring_energy")`` instead of a power: that name heads a
+column of ``history.csv`` and counts in the total energy. It is observed once it has a
 `refweb.results.observables.balances.Booked` and a line in `refweb.registry.OBSERVABLES`. Bounds keep explicit steps
 stable, not accurate: something stiff may need a smaller ``safety``. ``definite`` asks for a part of the stiffness that
 is positive semidefinite, such as none.
 
-The book of momentum integrates the force of an effect along the steps, which only tells whether a method gives what it
-has. It sees what steps miss where ``impulse=impulse`` brings ∫F dt as a kernel, and nothing of what is ``internal``.
+The balance of momentum integrates the force of an effect along the steps, which only tells whether a method gives what
+it has. It sees what steps miss where ``impulse=impulse`` of `Balance` brings ∫F dt as a kernel, and nothing of what is
+``internal``.
 
 A load with a factor over time is made by `refweb.effects.outer_load`; what changes natural lengths, by
-`refweb.effects.length_factor`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
+`refweb.effects.natural_lengths`; rows, mass and columns of numbers of the lines are added by ``extend(net)``, which
 returns another net. ``tests/test_contract.py`` holds forces against energies and stiffness against forces for every
 effect, and asks for numbers of one that refweb ships; ``tests/test_readme.py`` asks for its row in the README, and
 ``tests/reference`` for an ``Examples`` section of its docstring, which is its page in ``refweb help``.

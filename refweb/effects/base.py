@@ -4,8 +4,8 @@ An effect is a frozen value that holds physical numbers only. It has one or more
 matrix and knows no other effect.
 
 ``on(net)``
-    A `Family`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
-    `PrescribedMotion`, a `LineDrive`, a `Constraint` or a `BreakLimits`.
+    A `ForceTerm`, cells with their numbers and compiled kernels for force, energy and stiffness; a list of them; a
+    `PrescribedMotion`, a `Constraint` or a `BreakLimits`.
 ``extend(net)``
     The `refweb.net.net.Net` with more rows, mass or columns of numbers of its lines; comes before any ``on``, of what
     has no ``on`` first.
@@ -25,15 +25,16 @@ import numpy as np
 
 from ..errors import InputError
 
-TENSION, STRAIN, POWER = range(3)
-"""Columns of what families over the lines observe: tension [N], strain [1], and the power of one beside the law [W]."""
+TENSION, STRAIN, DAMPED_TENSION, POWER = range(4)
+"""Columns of what terms over the lines observe: tension by the law [N], strain [1], and of a force beside the law
+the tension with it [N] and its power [W]."""
 
 
 OWN, FELT, CONTACT_COLUMNS = 0, 1, 4
-"""Columns of what families of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
-a loss; the first of three of the force on the body that `Family.felt` names [N]; and their number."""
+"""Columns of what terms of contact with bodies observe: the depth [m] of a force with an energy, or the power [W] of
+a loss; the first of three of the force on the body that `ContactForce.felt` names [N]; and their number."""
 CONTACT = -2
-"""Number that stands, in place of that of a family, for what bodies feel of contact."""
+"""Number that stands, in place of that of a term, for what bodies feel of contact."""
 DEPTH, FORCE, ELEMENT, FELT_COLUMNS = 0, 1, 4, 5
 """Columns of that: the largest depth of lines in a body, or that of a pair of bodies [m]; the first of three of the
 force on the body [N]; the element of that depth, −1 where nothing touches; and their number."""
@@ -59,7 +60,7 @@ class ImplicitContactKernels(NamedTuple):
 
 
 class Crossing(NamedTuple):
-    """Check if cells of a family, each of two lines, can have passed through each other.
+    """Check if cells of a term, each of two lines, can have passed through each other.
 
     Attributes
     ----------
@@ -84,9 +85,158 @@ class Crossing(NamedTuple):
     elements: np.ndarray
 
 
+class Tangent(NamedTuple):
+    """Stiffness of a force.
+
+    Attributes
+    ----------
+    stiffness : kernel, optional
+        −∂f/∂x by cell, None where it is zero.
+    bound : kernel, optional
+        Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
+    symmetric : bool
+        Whether stiffness and damping are symmetric.
+    """
+
+    stiffness: Callable | None = None
+    bound: Callable | None = None
+    symmetric: bool = True
+
+
+class VelocityForce(NamedTuple):
+    """Dependence of a force on velocity.
+
+    Attributes
+    ----------
+    damping : kernel, optional
+        −∂f/∂v by cell; None where the force does not depend on velocity.
+    bound : kernel, optional
+        Bound on the row sums of |−∂f/∂v|; None where kicks are solved by ``implicit``.
+    implicit : ImplicitContactKernels, optional
+        Kernels that solve explicit kicks of a force that may be stiff; None where kicks iterate it.
+    """
+
+    damping: Callable | None = None
+    bound: Callable | None = None
+    implicit: ImplicitContactKernels | None = None
+
+
+class ContactForce(NamedTuple):
+    """Kind of a contact, and its search.
+
+    Attributes
+    ----------
+    felt : tuple of int
+        Columns of ``cells`` with the row of the body that feels the force in ``out``, see `FELT`, and, between bodies,
+        with that of the one that feels its negative; empty where no body touches.
+    pairs : tuple of (RigidBody, RigidBody)
+        The bodies of each cell, where it is the push of bodies on each other.
+    near : kernel, optional
+        Finds the cells that may act soon, for an explicit method: the others add nothing and show 0; None where all
+        are looked at.
+    finder : kernel, optional
+        As ``near``, where cells are elements of which any two may act on each other, or pairs of them: finds (numbers
+        of the elements, their rows, their data) of the pairs that may act soon. Such a term has no stiffness; None
+        where cells are what acts.
+    crossing : Crossing, optional
+        Check if lines have passed through lines, where those of its cells push each other.
+    passing : kernel, optional
+        Check if lines of its cells come as deep in a body as its middle in a drift, by `refweb.kernels.MEETS`, where it
+        is the push of contact with straight lines.
+    """
+
+    felt: tuple = ()
+    pairs: tuple = ()
+    near: Callable | None = None
+    finder: Callable | None = None
+    crossing: Crossing | None = None
+    passing: Callable | None = None
+
+    @property
+    def with_lines(self):
+        """True for contact of lines with bodies."""
+        return len(self.felt) == 1
+
+
+class Balance(NamedTuple):
+    """Part of a force in the balances of energy and momentum.
+
+    Attributes
+    ----------
+    column : str
+        Column of the energy balance that its energy or power belongs to: "work", "dissipated_energy", or an energy of
+        its own.
+    power : int, optional
+        Column of ``out`` with the power of the force [W], where ``column`` is "work" or "dissipated_energy".
+    internal : bool
+        True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
+    impulse : kernel, optional
+        Impulse of all cells until a time, exact in time and displacement, for the balance of momentum; None where there
+        is no such formula: then it is integrated along the steps. Where forces depend on velocity it is linear in
+        displacement.
+    moment_free : bool
+        Whether forces that are not internal have no moment about the centre of mass of all that there is.
+    twists : bool
+        Whether forces that are internal have moments that the twist of lines would bear: they do not keep angular
+        momentum, and feel a rotation as a whole.
+    """
+
+    column: str
+    power: int | None = None
+    internal: bool = False
+    impulse: Callable | None = None
+    moment_free: bool = False
+    twists: bool = False
+
+
+class MovingFrame(NamedTuple):
+    """Frame whose forces of inertia a term has.
+
+    Attributes
+    ----------
+    angular_velocity : sequence of 3 float, optional
+        That of the frame [rad/s], where it turns.
+    orbit_radius : float, optional
+        Radius of the orbit [m], where forces are linear in distances from its origin that are small against it.
+    """
+
+    angular_velocity: tuple | None = None
+    orbit_radius: float | None = None
+
+
+class Timing(NamedTuple):
+    """Times of a force.
+
+    Attributes
+    ----------
+    times : sequence of float
+        Times at which the force has a corner [s]; no step of an implicit method passes one.
+    at_rest : bool
+        Whether it acts on what does not move; statics leaves out what does not.
+    """
+
+    times: tuple = ()
+    at_rest: bool = True
+
+
+class CellElements(NamedTuple):
+    """Elements of the net that cells act through, and with which they end.
+
+    Attributes
+    ----------
+    numbers : ndarray of int, shape (cells,) or (cells, 2), optional
+        Elements of each cell; None for what acts on nodes.
+    disable : callable, optional
+        Changes rows of ``data`` in place so that their cells do nothing, where one of their elements is broken.
+    """
+
+    numbers: np.ndarray | None = None
+    disable: Callable | None = None
+
+
 @dataclass(frozen=True, eq=False)
-class Family:
-    """Cells of one kind with their kernels, whose signatures are in `refweb.kernels`.
+class ForceTerm:
+    """Force of cells of one kind with its kernels, whose signatures are in `refweb.kernels`.
 
     Attributes
     ----------
@@ -94,147 +244,80 @@ class Family:
         Name of the effect.
     cells : ndarray of int32, shape (cells, arity)
         Rows that each cell couples.
-    data : ndarray, shape (cells, columns)
-        Numbers of each cell.
+    data : ndarray, shape (cells, columns), optional
+        Numbers of each cell. None where the cells are the elements of the net: kernels then see the numbers of its
+        lines at the time, `refweb.system.system.System.line_data`, and ``out`` is one array for all such terms. It has
+        the columns from `TENSION` on.
     force : kernel
         Adds to the forces.
-    book : str
-        Column of the energy book that its energy or power belongs to: "work", "dissipated_energy", or an energy of
-        its own.
+    balance : Balance
+        Part in the balances of energy and momentum.
     energy : kernel, optional
-        Potential of the force, where there is one; that of a force with a ``power`` is linear in time between its
-        ``times``.
-    stiffness : kernel, optional
-        −∂f/∂x by cell, None where it is zero.
-    bound : kernel, optional
-        Bound on the row sums of |K|, for the step of an explicit method; None where it is zero.
-    observed : int
-        Number of values per cell that ``force`` writes to its ``out``.
-    power : int, optional
-        Column of ``out`` with the power of the force [W], for a family booked as "work" or "dissipated_energy".
-    lines : bool
-        Whether the cells are the elements of the net, and ``data`` the numbers of its lines, `Net.line_data`, whose
-        natural lengths may follow time. ``out`` is then one array for all such families: the whole tension and the
-        strain, in the columns `TENSION` and `STRAIN`, and the `POWER` of a force beside that of the law.
-    contact : bool
-        Whether it is contact of lines with bodies.
-    felt : tuple of int
-        Where it is contact with bodies, columns of ``cells`` with the row of the body that feels the force in ``out``,
-        see `FELT`, and, between bodies, with that of the one that feels its negative.
-    pairs : tuple of (RigidBody, RigidBody)
-        The bodies of each cell, where it is the push of bodies on each other.
-    angular_velocity : sequence of 3 float, optional
-        That of the frame [rad/s], where the forces are those of inertia in a frame that turns.
-    orbit_radius : float, optional
-        Radius of the orbit [m], where forces are linear in distances from its origin that are small against it.
-    damping : kernel, optional
-        −∂f/∂v by cell; None where the force does not depend on velocity.
-    damping_bound : kernel, optional
-        Bound on the row sums of |−∂f/∂v|; None where kicks are solved by ``rubbing``.
-    near : kernel, optional
-        Finds the cells that may act soon, for an explicit method: the others add nothing and show 0; None where all
-        are looked at.
-    finder : kernel, optional
-        As ``near``, where cells are elements of which any two may act on each other, or pairs of them: finds (numbers
-        of the elements, their rows, their data) of the pairs that may act soon. Such a family has no stiffness; None
-        where cells are what acts.
-    rubbing : ImplicitContactKernels, optional
-        How explicit kicks are solved for a force that depends on velocity and may be stiff; None where they iterate it.
-    crossing : Crossing, optional
-        What tells whether lines have passed through lines, where those of its cells push each other.
-    passing : kernel, optional
-        Whether lines of its cells come as deep in a body as its middle in a drift, by `refweb.kernels.MEETS`, where it
-        is the push of contact with straight lines.
-    internal : bool
-        True where the forces are of the net on itself: their resultant is zero and a rigid motion is not felt.
-    impulse : kernel, optional
-        What the forces of all cells have given until a time, exact in time and displacement, for the book of momentum;
-        None where there is no such formula: then it is integrated along the steps. Where forces depend on velocity it
-        is linear in displacement.
-    moment_free : bool
-        Whether forces that are not internal have no moment about the centre of mass of all that there is.
-    twists : bool
-        Whether forces that are internal have moments that the twist of lines would bear: they do not keep angular
-        momentum, and feel a rotation as a whole.
-    symmetric : bool
-        Whether stiffness and damping are symmetric.
-    at_rest : bool
-        Whether it acts on what does not move; statics leaves out what does not.
-    times : sequence of float
-        Times at which the force has a corner [s]; no step of an implicit method passes one.
-    elements : ndarray of int, shape (cells,) or (cells, 2), optional
-        Elements of the net that each cell acts through, and with which it ends; None for what acts on nodes.
-    disable_cells : callable, optional
-        Changes rows of ``data`` in place so that their cells do nothing, where one of their ``elements`` is broken.
+        Potential of the force, where there is one; that of a force with a power is linear in time between its times.
+    tangent, velocity, contact, frame, timing, elements
+        Parts that not all terms have, see the classes.
     """
 
     name: str
     cells: np.ndarray
-    data: np.ndarray
+    data: np.ndarray | None
     force: Callable
-    book: str
+    balance: Balance
     energy: Callable | None = None
-    stiffness: Callable | None = None
-    bound: Callable | None = None
-    observed: int = 0
-    power: int | None = None
-    lines: bool = False
-    contact: bool = False
-    felt: tuple = ()
-    pairs: tuple = ()
-    angular_velocity: tuple | None = None
-    orbit_radius: float | None = None
-    damping: Callable | None = None
-    damping_bound: Callable | None = None
-    near: Callable | None = None
-    finder: Callable | None = None
-    rubbing: ImplicitContactKernels | None = None
-    crossing: Crossing | None = None
-    passing: Callable | None = None
-    internal: bool = False
-    impulse: Callable | None = None
-    moment_free: bool = False
-    twists: bool = False
-    symmetric: bool = True
-    at_rest: bool = True
-    times: tuple = ()
-    elements: np.ndarray | None = None
-    disable_cells: Callable | None = None
+    tangent: Tangent = Tangent()
+    velocity: VelocityForce = VelocityForce()
+    contact: ContactForce = ContactForce()
+    frame: MovingFrame = MovingFrame()
+    timing: Timing = Timing()
+    elements: CellElements = CellElements()
+
+    @property
+    def over_lines(self):
+        """True if the cells are the elements of the net."""
+        return self.data is None
+
+    @property
+    def columns(self):
+        """Number of values per cell that ``force`` writes to its ``out``."""
+        if self.contact.felt:
+            return CONTACT_COLUMNS
+        return int(self.contact.crossing is not None) if self.balance.power is None else self.balance.power + 1
 
     @property
     def dead(self):
         """True for a load that follows from time alone, with a power and a potential."""
-        return self.power is not None and self.energy is not None and self.stiffness is None and self.damping is None
+        linear = self.tangent.stiffness is None and self.velocity.damping is None
+        return linear and self.balance.power is not None and self.energy is not None
 
 
 def pairs_of(system):
-    """Pairs of bodies of a system that may touch each other, in the order of families and their cells."""
-    return [pair for family in system.families for pair in family.pairs]
+    """Pairs of bodies of a system that may touch each other, in the order of terms and their cells."""
+    return [pair for term in system.terms for pair in term.contact.pairs]
 
 
-def refuse_found(families, what):
-    """Refuse families whose pairs are found, `Family.finder`, of which there is no tangent, where ``what`` needs one.
+def refuse_found(terms, what):
+    """Refuse terms whose pairs are found, `ContactForce.finder`, where ``what`` needs a tangent.
 
     Raises
     ------
     InputError
         For the first of them.
     """
-    for family in families:
-        if family.finder is not None:
+    for term in terms:
+        if term.contact.finder is not None:
             raise InputError(
-                f"[{family.name}] has more pairs of elements than a tangent may hold, in a web of {len(family.cells)} "
+                f"[{term.name}] has more pairs of elements than a tangent may hold, in a web of {len(term.cells)} "
                 f'elements, and {what} needs one: use method = "central-difference" and start = "web"'
             )
 
 
 def without(columns):
-    """A `Family.disable_cells` that leaves nothing in some columns, a number or a slice."""
+    """A `CellElements.disable` that leaves nothing in some columns, a number or a slice."""
 
-    def disable_cells(numbers):
+    def disable(numbers):
         numbers[:, columns] = 0.0
 
-    return disable_cells
+    return disable
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,28 +414,6 @@ class BreakLimits:
         return bool(np.isfinite(self.limits).any())
 
 
-@dataclass(frozen=True, eq=False)
-class LineDrive:
-    """Natural lengths that are prescribed over time; ``kernel`` (signature `LINES`) multiplies them.
-
-    Attributes
-    ----------
-    cells : ndarray of int32, shape (elements, 1)
-        The elements it changes.
-    data : ndarray, shape (rows, columns)
-        Numbers of the kernel.
-    kernel : kernel
-        Multiplies the natural lengths at time t; what multiplies them before or after does not matter.
-    times : sequence of float
-        Times at which the factor has a corner [s].
-    """
-
-    cells: np.ndarray
-    data: np.ndarray
-    kernel: Callable
-    times: tuple = ()
-
-
 def column(rows):
-    """Row numbers as the cells of a family that couples nothing: int32, shape (rows, 1)."""
+    """Row numbers as the cells of a term that couples nothing: int32, shape (rows, 1)."""
     return np.ascontiguousarray(np.asarray(rows, dtype=np.int32).reshape(-1, 1))

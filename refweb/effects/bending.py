@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..tables import Table, real, table
-from .base import Family, without
+from .base import Balance, CellElements, ForceTerm, Tangent, without
 from .vectors import cross, dot
 
 LARGEST = math.radians(30.0)
@@ -186,7 +186,7 @@ class Bending(Table):
     stiffness: float = real(above=0, unit="N·m²")
 
     def on(self, net):
-        """The family of all springs.
+        """The term of all springs.
 
         Two supported nodes that follow each other clamp a line in the middle between them.
         """
@@ -205,16 +205,13 @@ class Bending(Table):
         beside = beside[kind.ravel()][elements].max(axis=1)  # of two lines beside each other each continues one
         spring = self.stiffness / net.natural_length[elements].mean(axis=1) / beside
         vectors = net.points[rows[:, 1:]] - net.points[rows[:, :-1]]
-        return Family(
+        return ForceTerm(
             name="bending",
             cells=np.ascontiguousarray(rows, dtype=np.int32),
             data=np.column_stack([spring, vectors.reshape(-1, 6)]),
             force=force,
             energy=energy,
-            stiffness=stiffness,
-            bound=bound,
-            book="bending_energy",
-            internal=True,
-            elements=elements,
-            disable_cells=without(0),
+            tangent=Tangent(stiffness, bound),
+            balance=Balance("bending_energy", internal=True),
+            elements=CellElements(elements, without(0)),
         )

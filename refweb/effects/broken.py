@@ -1,6 +1,6 @@
 """Values of broken elements: tension and strain 0, and the energy that they had, which stays.
 
-Every system with broken elements has this family, whether a ``[rupture]`` broke them or the web came with them.
+Every system with broken elements has this term, whether a ``[rupture]`` broke them or the web came with them.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import functools
 
 from ..errors import InputError
 from ..kernels import ENERGY, FORCE, kernel
-from ..net.net import AXIAL_STIFFNESS
-from .base import STRAIN, TENSION, Family
+from .base import DAMPED_TENSION, STRAIN, TENSION, Balance, ForceTerm, Timing
+from .line_kernels import line_at
 
 HELD = "rupture_energy"
 """Column of the numbers of the lines with what a broken element held [J]."""
@@ -23,9 +23,11 @@ def kernels(column):
     @kernel(FORCE)
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
-            if data[c, AXIAL_STIFFNESS] == 0.0:
+            if line_at(data, c).ea == 0.0:
                 out[c, TENSION] = 0.0
                 out[c, STRAIN] = 0.0
+                if out.shape[1] > DAMPED_TENSION:
+                    out[c, DAMPED_TENSION] = 0.0
 
     @kernel(ENERGY)
     def energy(t, x, cells, data, out):
@@ -36,7 +38,7 @@ def kernels(column):
 
 
 def held_energy(net):
-    """The `Family` of what broken elements held, and of their tension and strain, which are 0.
+    """The `ForceTerm` of what broken elements held, and of their tension and strain, which are 0.
 
     Raises
     ------
@@ -48,16 +50,13 @@ def held_energy(net):
             'there is [solve] mass = "consistent", which ties the ends of a line together that breaks: it must be '
             '"lumped"'
         )
-    force, energy = kernels(net.column(HELD))
-    return Family(
+    force, energy = kernels(net.line_data.column(HELD))
+    return ForceTerm(
         name="rupture",
         cells=net.cells,
-        data=net.line_data,
+        data=None,
         force=force,
         energy=energy,
-        book="rupture_energy",
-        observed=2,
-        lines=True,
-        internal=True,
-        at_rest=False,
+        balance=Balance("rupture_energy", internal=True),
+        timing=Timing(at_rest=False),
     )

@@ -23,27 +23,27 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, IMPULSE, STIFFNESS, kernel
-from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import above_floor, curvature, prepared_stress, tangent
 from ..tables import Table, real, table
-from .base import POWER, TENSION, Family, column
-from .line_kernels import gradient, law_of, pull_together, strain
+from .base import DAMPED_TENSION, POWER, Balance, ForceTerm, Tangent, Timing, VelocityForce, column
+from .line_kernels import gradient, law_of, line_at, pull_together, strain
 
 
 @kernel()
-def viscous(law, e, rate, time, axial, slack, smooth):
+def viscous(law, e, rate, time, line):
     """N [N]."""
-    pull, smallest = time * rate * tangent(law, e, axial, slack, smooth), -above_floor(law, e, axial, slack, smooth)
+    pull = time * rate * tangent(law, e, line.ea, line.slackness, line.smoothing)
+    smallest = -above_floor(law, e, line.ea, line.slackness, line.smoothing)
     return max(pull, smallest)
 
 
 @kernel()
-def slopes(law, e, rate, time, axial, slack, smooth):
+def slopes(law, e, rate, time, line):
     """(∂N/∂ε [N], ∂N/∂ε̇ [N s])."""
-    slope = tangent(law, e, axial, slack, smooth)
-    if time * rate * slope < -above_floor(law, e, axial, slack, smooth):
+    slope = tangent(law, e, line.ea, line.slackness, line.smoothing)
+    if time * rate * slope < -above_floor(law, e, line.ea, line.slackness, line.smoothing):
         return -slope, 0.0
-    return time * rate * curvature(law, e, axial, slack, smooth), time * slope
+    return time * rate * curvature(law, e, line.ea, line.slackness, line.smoothing), time * slope
 
 
 @functools.cache
@@ -68,19 +68,18 @@ def kernels(law, tau, gradients, weights):
     def force(t, x, v, f, cells, data, out):
         for c in range(cells.shape[0]):
             largest = power = 0.0
+            line, line_law = line_at(data, c), law_of(law, data, c)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 v0, v1, v2 = gradient(v, cells, c, q, nodes, flat)
-                rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / data[c, LENGTH]
-                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                line_law = law_of(law, data, c)
-                pull = viscous(line_law, e, rate, data[c, tau], axial, slack, smooth)
-                tension = pull + prepared_stress(line_law, e, axial, slack, smooth, data[c, G0], data[c, R0])
+                rate = (p0 * v0 + p1 * v1 + p2 * v2) * inverse / line.natural_length
+                pull = viscous(line_law, e, rate, data[c, tau], line)
+                tension = pull + prepared_stress(line_law, e, line.ea, line.slackness, line.smoothing, line.g0, line.r0)
                 if q == 0 or tension > largest:
                     largest = tension
-                power -= weights[q] * data[c, LENGTH] * pull * rate
+                power -= weights[q] * line.natural_length * pull * rate
                 pull_together(f, cells, c, q, nodes, flat, weights[q] * pull * inverse, p0, p1, p2)
-            out[c, TENSION] = largest
+            out[c, DAMPED_TENSION] = largest
             out[c, POWER] = power
 
     @kernel(STIFFNESS)
@@ -89,15 +88,14 @@ def kernels(law, tau, gradients, weights):
         if definite:  # nothing of it is
             return
         for c in range(cells.shape[0]):
-            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
-            line_law = law_of(law, data, c)
+            line, line_law, time = line_at(data, c), law_of(law, data, c), data[c, tau]
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p, speed = (p0 * inverse, p1 * inverse, p2 * inverse), (p0 * w[0] + p1 * w[1] + p2 * w[2]) * inverse
-                rate, share = speed / data[c, LENGTH], weights[q] / data[c, LENGTH]
-                by_strain, by_rate = slopes(line_law, e, rate, time, axial, slack, smooth)
-                across = weights[q] * viscous(line_law, e, rate, time, axial, slack, smooth) * inverse
+                rate, share = speed / line.natural_length, weights[q] / line.natural_length
+                by_strain, by_rate = slopes(line_law, e, rate, time, line)
+                across = weights[q] * viscous(line_law, e, rate, time, line) * inverse
                 along, turn = share * by_strain - across, share * by_rate * inverse
                 for i in range(3):
                     for j in range(3):
@@ -112,14 +110,13 @@ def kernels(law, tau, gradients, weights):
     def damping(t, x, v, blocks, cells, data, definite):
         blocks[:] = 0.0
         for c in range(cells.shape[0]):
-            axial, slack, smooth, time = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING], data[c, tau]
-            line_law = law_of(law, data, c)
+            line, line_law, time = line_at(data, c), law_of(law, data, c), data[c, tau]
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
                 w = gradient(v, cells, c, q, nodes, flat)
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
-                rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / data[c, LENGTH]
-                along = weights[q] / data[c, LENGTH] * slopes(line_law, e, rate, time, axial, slack, smooth)[1]
+                rate = (p[0] * w[0] + p[1] * w[1] + p[2] * w[2]) / line.natural_length
+                along = weights[q] / line.natural_length * slopes(line_law, e, rate, time, line)[1]
                 for a in range(nodes):
                     for b in range(nodes):
                         d = along * flat[q * nodes + a] * flat[q * nodes + b]
@@ -132,7 +129,8 @@ def kernels(law, tau, gradients, weights):
         # The stiffness has no bound of its own: in a step that this bound allows it is below that of the law unless
         # nodes move faster than sound, but at the kink of a smoothed law, which such a step passes at once.
         for c in range(cells.shape[0]):
-            coefficient = data[c, tau] * data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
+            line = line_at(data, c)
+            coefficient = data[c, tau] * line.ea / line.natural_length
             for q in range(points):
                 total = 0.0
                 for a in range(nodes):
@@ -218,44 +216,34 @@ class Damping(Table):
         return net.with_column("damping_time", self.time) if self.time else net
 
     def on(self, net):
-        """The families of all lines, whose tension is that with damping, and of all nodes with mass."""
-        families = []
+        """The terms of all lines, whose tension is that with damping, and of all nodes with mass."""
+        terms = []
         if self.time:
             element = tuple(map(tuple, net.gradients.tolist())), tuple(net.weights.tolist())
-            force, stiffness, damping, bound = kernels(net.law_number, net.column("damping_time"), *element)
-            families.append(
-                Family(
+            force, stiffness, damping, bound = kernels(net.law_number, net.line_data.column("damping_time"), *element)
+            terms.append(
+                ForceTerm(
                     name="damping",
                     cells=net.cells,
-                    data=net.line_data,
+                    data=None,
                     force=force,
-                    stiffness=stiffness,
-                    book="dissipated_energy",
-                    observed=3,
-                    power=POWER,
-                    lines=True,
-                    damping=damping,
-                    damping_bound=bound,
-                    internal=True,
-                    symmetric=False,
-                    at_rest=False,
+                    tangent=Tangent(stiffness, symmetric=False),
+                    velocity=VelocityForce(damping, bound),
+                    balance=Balance("dissipated_energy", POWER, internal=True),
+                    timing=Timing(at_rest=False),
                 )
             )
         if self.rate:
             nodes = net.heavy[net.heavy < net.nodes]
-            families.append(
-                Family(
+            terms.append(
+                ForceTerm(
                     name="damping",
                     cells=column(nodes),
                     data=self.rate * net.mass[nodes, None],
                     force=drag,
-                    book="dissipated_energy",
-                    observed=1,
-                    power=0,
-                    damping=drag_damping,
-                    damping_bound=drag_bound,
-                    impulse=drag_impulse,
-                    at_rest=False,
+                    velocity=VelocityForce(drag_damping, drag_bound),
+                    balance=Balance("dissipated_energy", 0, impulse=drag_impulse),
+                    timing=Timing(at_rest=False),
                 )
             )
-        return families
+        return terms

@@ -15,11 +15,10 @@ import functools
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from ..net.net import AXIAL_STIFFNESS, G0, LENGTH, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import energy_density, prepared_stress, stress, tangent
 from ..tables import Table, table
-from .base import STRAIN, TENSION, Family
-from .line_kernels import law_of, pull_together, strain
+from .base import STRAIN, TENSION, Balance, ForceTerm, Tangent
+from .line_kernels import law_of, line_at, pull_together, strain
 
 
 @functools.cache
@@ -44,9 +43,8 @@ def kernels(law, gradients, weights):
     def pull_at(x, cells, data, c, q):
         """(dx/dξ, w T/|dx/dξ|, T, ε) at quadrature point q of element c."""
         p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
-        axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-        line_law = law_of(law, data, c)
-        tension = prepared_stress(line_law, e, axial, slack, smooth, data[c, G0], data[c, R0])
+        line, line_law = line_at(data, c), law_of(law, data, c)
+        tension = prepared_stress(line_law, e, line.ea, line.slackness, line.smoothing, line.g0, line.r0)
         return p0, p1, p2, weights[q] * tension * inverse, tension, e
 
     @kernel()
@@ -87,23 +85,21 @@ def kernels(law, gradients, weights):
     def energy(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             total = 0.0
+            line, line_law = line_at(data, c), law_of(law, data, c)
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                line_law = law_of(law, data, c)
-                total += weights[q] * energy_density(line_law, e, axial, slack, smooth)
-            out[c] = total * data[c, LENGTH]
+                total += weights[q] * energy_density(line_law, e, line.ea, line.slackness, line.smoothing)
+            out[c] = total * line.natural_length
 
     @kernel(STIFFNESS)
     def stiffness(t, x, v, blocks, cells, data, definite):
         for c in range(cells.shape[0]):
             blocks[c] = 0.0
+            line, line_law = line_at(data, c), law_of(law, data, c)
             for q in range(points):
                 p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)
-                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                line_law = law_of(law, data, c)
-                along = weights[q] * tangent(line_law, e, axial, slack, smooth) / data[c, LENGTH]
-                tension = stress(line_law, e, axial, slack, smooth)
+                along = weights[q] * tangent(line_law, e, line.ea, line.slackness, line.smoothing) / line.natural_length
+                tension = stress(line_law, e, line.ea, line.slackness, line.smoothing)
                 across = 0.0 if definite and tension < 0.0 else weights[q] * tension * inverse
                 p = (p0 * inverse, p1 * inverse, p2 * inverse)
                 for a in range(nodes):
@@ -117,7 +113,8 @@ def kernels(law, gradients, weights):
     @kernel(BOUND)
     def bound(reach, speed, x, mass, rates, cells, data):
         for c in range(cells.shape[0]):
-            axial = data[c, AXIAL_STIFFNESS] / data[c, LENGTH]
+            line = line_at(data, c)
+            axial = line.ea / line.natural_length
             for q in range(points):
                 total = 0.0
                 for a in range(nodes):
@@ -135,12 +132,11 @@ def kernels(law, gradients, weights):
     def length_force(t, x, cells, data, out):
         for c in range(cells.shape[0]):
             total = 0.0
+            line, line_law = line_at(data, c), law_of(law, data, c)
             for q in range(points):
                 e = strain(x, cells, data, c, q, nodes, flat)[4]
-                axial, slack, smooth = data[c, AXIAL_STIFFNESS], data[c, SLACKNESS], data[c, SMOOTHING]
-                line_law = law_of(law, data, c)
-                pulled = (1.0 + e) * stress(line_law, e, axial, slack, smooth)
-                total += weights[q] * (energy_density(line_law, e, axial, slack, smooth) - pulled)
+                pulled = (1.0 + e) * stress(line_law, e, line.ea, line.slackness, line.smoothing)
+                total += weights[q] * (energy_density(line_law, e, line.ea, line.slackness, line.smoothing) - pulled)
             out[c] = total
 
     return force_of_four if points == 1 else force, energy, stiffness, bound, every_strain, length_force
@@ -154,7 +150,7 @@ def of(net):
 def strains(net, x):
     """Strain at each quadrature point of each element at displacement x, shape (cells, points)."""
     strain = np.empty((len(net.cells), len(net.weights)))
-    of(net)[4](0.0, x, net.cells, net.line_data, strain.ravel())
+    of(net)[4](0.0, x, net.cells, net.line_data.matrix, strain.ravel())
     return strain
 
 
@@ -168,18 +164,14 @@ class Elasticity(Table):
     """Tension of every line by the law of its cable, see `refweb.net.tension_laws`."""
 
     def on(self, net):
-        """The family of all lines; ``out`` is tension [N] and strain."""
+        """The term of all lines; ``out`` is tension [N] and strain."""
         force, energy, stiffness, bound, *_ = of(net)
-        return Family(
+        return ForceTerm(
             name="elasticity",
             cells=net.cells,
-            data=net.line_data,
+            data=None,
             force=force,
             energy=energy,
-            stiffness=stiffness,
-            bound=bound,
-            book="strain_energy",
-            observed=2,
-            lines=True,
-            internal=True,
+            tangent=Tangent(stiffness, bound),
+            balance=Balance("strain_energy", internal=True),
         )

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..tables import Several, Table, table, vector
-from .turning_axes import families
+from .base import Balance, MovingFrame
+from .turning_axes import force_terms
 
 
 @table
@@ -45,4 +46,4 @@ class Frame(Table):
         """Centrifugal and Coriolis force of all rows with mass."""
         speed = np.array(self.angular_velocity)
         across = (speed @ speed) * np.eye(3) - np.outer(speed, speed)
-        return families(net, speed, across, name="frame", book="frame_energy")
+        return force_terms(net, MovingFrame(tuple(speed)), across, name="frame", balance=Balance("frame_energy"))

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..kernels import ENERGY, FORCE, IMPULSE, kernel
 from ..tables import Several, Table, table, vector
-from .base import Family, column
+from .base import Balance, ForceTerm, column
 
 
 @kernel(FORCE)
@@ -53,15 +53,13 @@ class Gravity(Table):
     acceleration: Several = vector(unit="m/s²")
 
     def on(self, net):
-        """The family of all rows with mass; its energy is zero in the web's position."""
+        """The term of all rows with mass; its energy is zero in the web's position."""
         heavy = net.heavy
-        return Family(
+        return ForceTerm(
             name="gravity",
             cells=column(heavy),
             data=np.outer(net.mass[heavy], self.acceleration),
             force=force,
             energy=energy,
-            book="potential_energy",
-            impulse=impulse,
-            moment_free=True,
+            balance=Balance("potential_energy", impulse=impulse, moment_free=True),
         )

@@ -1,17 +1,40 @@
 """Common parts of kernels over line elements: gradients, strain, and forces along the line.
 
-``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers.
+``gradients`` are dN/dξ of the reference element, by quadrature point and node, as one tuple of numbers. ``data`` of a
+kernel over lines is `refweb.net.line_data.LineData.matrix`: all terms of the compiled loop take matrices. `line_at`
+gives its columns their names.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ..kernels import kernel
-from ..net.net import LAW, LENGTH, REFERENCE
+from ..net.line_data import FIELDS
 from ..net.tension_laws import MIXED
+
+NATURAL_LENGTH, LAW = 0, int(np.dtype(FIELDS).itemsize // 8)
+"""Column of natural lengths, and that of the number of each element's law, where these differ."""
+
+
+class Line(NamedTuple):
+    """Numbers of an element, see `refweb.net.line_data.LineData`."""
+
+    natural_length: float
+    ea: float
+    slackness: float
+    smoothing: float
+    g0: float
+    r0: float
+
+
+@kernel()
+def line_at(data, c):
+    """The `Line` of cell c."""
+    return Line(data[c, 0], data[c, 1], data[c, 2], data[c, 3], data[c, 4], data[c, 5])
 
 
 @kernel()
@@ -53,8 +76,7 @@ def law_of(law, data, c):
 def strain(x, cells, data, c, q, nodes, gradients):
     """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
     u0, u1, u2 = gradient(x, cells, c, q, nodes, gradients)
-    r0, r1, r2, r = data[c, REFERENCE], data[c, REFERENCE + 1], data[c, REFERENCE + 2], data[c, REFERENCE + 3]
-    natural = data[c, LENGTH]
+    natural, r0, r1, r2, r = data[c, 0], data[c, 6], data[c, 7], data[c, 8], data[c, 9]
     p0, p1, p2 = r0 + u0, r1 + u1, r2 + u2
     length = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
     square = (2.0 * r0 + u0) * u0 + (2.0 * r1 + u1) * u1 + (2.0 * r2 + u2) * u2 + (r - natural) * (r + natural)

@@ -70,8 +70,8 @@ class Load(Table):
     factor: Several = rows(2, default=None, increasing=True)
 
     def on(self, net):
-        """The family of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
+        """The term of the loaded nodes; its energy is −(force)·(displacement), ``out`` its power [W]."""
         loaded = net.web.find(self.node)
         data = np.tile(self.force, (len(loaded), 1))
-        kernels = dict(force=force, energy=energy, impulse=impulse)
+        kernels = dict(impulse=impulse, force=force, energy=energy)
         return outer_load(net, "load", column(loaded), data, self.factor, **kernels)

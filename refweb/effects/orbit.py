@@ -16,7 +16,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..tables import Several, Table, real, rows, table
-from .turning_axes import families
+from .base import Balance, MovingFrame
+from .turning_axes import force_terms
 
 GRAVITATION = 3.986004418e14
 """Gravitational parameter of the Earth [m³/s²], IERS Conventions (2010), table 1.1."""
@@ -93,8 +94,9 @@ class Orbit(Table):
         return float(np.cbrt(GRAVITATION / self.mean_motion) / np.cbrt(self.mean_motion))
 
     def on(self, net):
-        """The families of all rows with mass."""
+        """The terms of all rows with mass."""
         n = np.sqrt(GRAVITATION / self.radius) / self.radius if self.mean_motion is None else self.mean_motion
         frame = self._frame()
         pull, speed = n**2 * frame.T @ np.diag([3.0, 0.0, -1.0]) @ frame, n * frame[2]
-        return families(net, speed.tolist(), pull, name="orbit", book="orbit_energy", orbit_radius=self.radius)
+        frame = MovingFrame(tuple(speed.tolist()), self.radius)
+        return force_terms(net, frame, pull, name="orbit", balance=Balance("orbit_energy"))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels import kernel
-from .base import Family
+from .base import Balance, ForceTerm, Timing
 from .time_tables import flattened, integrate, interpolate
 
 
@@ -30,8 +30,8 @@ def factor_until(t, data, start):
     return (data[start + 1] + 0.5 * data[start + 2] * t) * t
 
 
-def outer_load(net, name, cells, data, factor, **kernels):
-    """The `Family` of a load.
+def outer_load(net, name, cells, data, factor, impulse=None, **parts):
+    """The `ForceTerm` of a load.
 
     Parameters
     ----------
@@ -45,19 +45,19 @@ def outer_load(net, name, cells, data, factor, **kernels):
         Numbers of each cell; in what kernels see those of the factor follow, from ``columns`` on.
     factor : sequence of (t, factor) or None
         Linear in between, end values held.
-    **kernels
-        ``force``, which writes its power [W] to ``out[c, 0]``, and what else a `Family` has.
+    impulse : kernel, optional
+        That of a `Balance`.
+    **parts
+        ``force``, which writes its power [W] to ``out[c, 0]``, and other parts of a `ForceTerm`.
     """
     table = factor or ()
     largest = max((abs(value) for _, value in table), default=1.0)
     numbers = [largest, *((0.0, 1.0) if net.quasi_static else (1.0, 0.0)), *flattened(table)]
-    return Family(
+    return ForceTerm(
         name=name,
         cells=cells,
         data=np.hstack([data, np.tile(numbers, (len(cells), 1))]),
-        book="work",
-        observed=1,
-        power=0,
-        times=tuple(t for t, _ in table),
-        **kernels,
+        balance=Balance("work", power=0, impulse=impulse),
+        timing=Timing(tuple(t for t, _ in table)),
+        **parts,
     )

@@ -18,9 +18,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
-from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table, vector
-from .base import without
+from .base import CellElements, Tangent, without
 from .outer_load import factor_at, outer_load
 
 # Columns of data: p n; dX/dξ; the factor.
@@ -142,21 +141,18 @@ class Pressure(Table):
             raise InputError("normal = [0, 0, 0] must have a direction")
 
     def on(self, net):
-        """The family of the elements of these lines; ``out`` is the power [W]."""
+        """The term of the elements of these lines; ``out`` is the power [W]."""
         lines = net.web.find_lines(self.lines)
         at = np.flatnonzero(np.isin(net.line, lines))
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         sides = np.ones(len(net.web.lines)) if self.away_from is None else self._sides(net.web, lines, normal)
         pushed = self.value * sides[net.line[at], None] * normal
-        data = np.hstack([pushed, net.line_data[at, REFERENCE : REFERENCE + 3]])
+        data = np.hstack([pushed, net.line_data.reference[at]])
         force, stiffness, bound = kernels(len(net.places), *_integrals(net.places))
         arguments = dict(
             force=force,
-            stiffness=stiffness,
-            bound=bound,
-            symmetric=False,
-            elements=at,
-            disable_cells=without(slice(NORMAL, NORMAL + 3)),
+            tangent=Tangent(stiffness, bound, symmetric=False),
+            elements=CellElements(at, without(slice(NORMAL, NORMAL + 3))),
         )
         return outer_load(net, "pressure", np.ascontiguousarray(net.cells[at]), data, self.factor, **arguments)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import InputError
 from ..tables import Several, Table, nodes, rows, table
-from .length_factor import noted, scaled
+from .natural_lengths import with_factor
 
 
 @table
@@ -24,8 +24,8 @@ class Reel(Table):
     Raises
     ------
     InputError
-        For a factor that is not > 0, a table without rows, and times that do not increase; from ``on``, for a line or a
-        group that the web does not have.
+        For a factor that is not > 0, a table without rows, and times that do not increase; from ``extend``, for a line
+        or a group that the web does not have.
 
     Examples
     --------
@@ -46,9 +46,5 @@ class Reel(Table):
                 raise InputError(f"factor[{i}][1] = {factor:g} must be > 0 [1]: a line cannot be reeled in to nothing")
 
     def extend(self, net):
-        """The net that knows what becomes of its lengths."""
-        return noted(net, net.web.find_lines(self.lines), self.factor)
-
-    def on(self, net):
-        """The drive of the natural lengths."""
-        return scaled(net, net.web.find_lines(self.lines), self.factor)
+        """The net with the factor on its lines."""
+        return with_factor(net, net.web.find_lines(self.lines), self.factor)

@@ -1,7 +1,7 @@
 """Rupture: lines that break, and the energy that each held.
 
 A broken element has no stiffness: its tension, strain and energy are 0, and what acts through it ends. What it held,
-and what ended with it, is the energy of a family that does nothing else, so that the book of energies closes through
+and what ended with it, is the energy of a term that does nothing else, so that the book of energies closes through
 every break. `refweb.dynamics.integrators.rupture` finds the moments.
 """
 
@@ -102,7 +102,7 @@ class Rupture(Table):
         return replace(net, strength=strength).with_column(HELD, 0.0)
 
     def on(self, net):
-        """The elements that break and, but in statics, the family that holds what they held."""
+        """The elements that break and, but in statics, the term that holds what they held."""
         limits, count = net.strength * net.area, len(net.web.lines)
         for i, (line, _) in enumerate(self._due):
             if line >= count:

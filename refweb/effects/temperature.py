@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..messages import short
 from ..net.groups import givers
 from ..tables import Several, Table, by_group, checked, field, real, rows, table
-from .length_factor import noted, scaled
+from .natural_lengths import with_factor
 
 
 @accepts(any_of(real().metadata["read"].accepts, rows(2).metadata["read"].accepts))
@@ -51,7 +51,7 @@ class Temperature(Table):
     ------
     InputError
         For numbers that are not finite, times that do not increase, and 1 + α ΔT that is not > 0 on some lines; from
-        ``on``, for a group that no line has, and two groups that give the same key to one line.
+        ``extend``, for a group that no line has, and two groups that give the same key to one line.
 
     Examples
     --------
@@ -75,14 +75,10 @@ class Temperature(Table):
             )
 
     def extend(self, net):
-        """The net that knows what becomes of its lengths."""
+        """The net with a factor on the lines of each pair of α and ΔT."""
         for lines, factor in self._factors(net.web):
-            net = noted(net, lines, factor)
+            net = with_factor(net, lines, factor)
         return net
-
-    def on(self, net):
-        """The drives of the natural lengths, one for the lines of each pair of α and ΔT."""
-        return [scaled(net, lines, factor) for lines, factor in self._factors(net.web)]
 
     def _factors(self, web):
         """Lines of each pair of α and ΔT, and the table of their factor."""

@@ -17,9 +17,8 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import BOUND, FORCE, STIFFNESS, kernel
 from ..messages import quote
-from ..net.net import REFERENCE
 from ..tables import Several, Table, nodes, real, rows, table
-from .base import without
+from .base import CellElements, Tangent, without
 from .line_kernels import direction
 from .outer_load import factor_at, outer_load
 
@@ -107,7 +106,7 @@ class Thrust(Table):
     factor: Several = rows(2, default=None, increasing=True)
 
     def on(self, net):
-        """The family of one element; ``out`` is the power [W]."""
+        """The term of one element; ``out`` is the power [W]."""
         nodes_found = net.web.find(self.node)
         if len(nodes_found) != 1:
             raise InputError(f"node = {quote(self.node)} is {len(nodes_found)} nodes, must be one")
@@ -119,12 +118,13 @@ class Thrust(Table):
         power = np.arange(len(order))
         functions = np.linalg.inv(np.vander(net.places, increasing=True))
         slopes = sign * (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
-        reference = sign * net.line_data[cell, REFERENCE : REFERENCE + 3]
+        reference = sign * net.line_data.reference[cell]
         cells, data = np.ascontiguousarray(net.cells[[cell]][:, order]), [[self.force, *reference, *slopes[order]]]
         force, stiffness, bound = kernels(len(order))
-        force_kernels = dict(force=force, stiffness=stiffness, bound=bound, symmetric=False)
-        force_kernels |= dict(elements=np.array([cell]), disable_cells=without(0))
-        return outer_load(net, "thrust", cells, data, self.factor, **force_kernels)
+        parts = dict(
+            force=force, tangent=Tangent(stiffness, bound, False), elements=CellElements(np.array([cell]), without(0))
+        )
+        return outer_load(net, "thrust", cells, data, self.factor, **parts)
 
     def _line(self, web, node):
         """Number of the line that ends at a node."""

@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
-from .base import Family, column
+from .base import ForceTerm, Tangent, Timing, VelocityForce, column
 
 STIFFEST, MASS = 9, 10
 """Columns of data of the first part, behind G: the largest eigenvalue of −G, at least 0; the mass matrix of the cell,
@@ -132,35 +132,35 @@ def kernels_of_velocity(nodes):
     return coriolis, damping, damping_bound
 
 
-def families(net, speed, pull, **arguments):
-    """The families of all rows with mass; where mass is consistent those of the lines as well.
+def force_terms(net, frame, pull, **arguments):
+    """The terms of all rows with mass; where mass is consistent those of the lines as well.
 
     Parameters
     ----------
     net : refweb.net.net.Net
         What they act on.
-    speed : sequence of 3 float
-        Ω [rad/s].
+    frame : refweb.effects.base.MovingFrame
+        With Ω [rad/s].
     pull : array_like, shape (3, 3)
         G [1/s²].
     **arguments
-        ``name`` and ``book`` of the families, and what else they have.
+        ``name`` and ``balance`` of the terms.
     """
     heavy = net.heavy
     turning = [body for body in net.bodies if body.spin is not None and not body.shape.planar]
     spins = np.array([body.spin for body in turning if body.turn is None], int)
     masses = np.concatenate([net.mass[heavy], 0.5 * net.mass[spins]])  # what has 2 m for masses, and I for spins
     terms = [
-        _of_place(column(heavy), net.mass[heavy], net.points[heavy], pull, speed, arguments),
-        _of_velocity(column(np.concatenate([heavy, spins])), masses, speed, arguments),
+        _of_place(column(heavy), net.mass[heavy], net.points[heavy], pull, frame, arguments),
+        _of_velocity(column(np.concatenate([heavy, spins])), masses, frame, arguments),
     ]
     if (coupled := net.consistent_minus_lumped) is not None:
-        terms.append(_of_place(net.cells, coupled, net.points[net.cells], pull, speed, arguments))
-        terms.append(_of_velocity(net.cells, coupled, speed, arguments))
+        terms.append(_of_place(net.cells, coupled, net.points[net.cells], pull, frame, arguments))
+        terms.append(_of_velocity(net.cells, coupled, frame, arguments))
     if any(body.turn is not None for body in turning):
         from . import turning_bodies
 
-        terms += turning_bodies.families(net, speed, pull, arguments)
+        terms += turning_bodies.force_terms(net, frame.angular_velocity, pull, arguments)
     return terms
 
 
@@ -170,31 +170,29 @@ def _numbers(head, *parts):
     return np.ascontiguousarray(np.hstack([np.tile(head, (len(parts[0]), 1)), *flat]))
 
 
-def _of_place(cells, mass, points, pull, speed, arguments):
+def _of_place(cells, mass, points, pull, frame, arguments):
     stiffest = max(-float(np.linalg.eigvalsh(pull)[0]), 0.0)
     force, energy, stiffness, bound = kernels_of_place(cells.shape[1])
-    return Family(
+    return ForceTerm(
         cells=cells,
         data=_numbers([*np.ravel(pull), stiffest], mass, points),
         force=force,
         energy=energy,
-        stiffness=stiffness,
-        bound=bound if stiffest else None,  # what only lowers frequencies makes no step shorter
-        angular_velocity=tuple(speed),
+        tangent=Tangent(stiffness, bound if stiffest else None),  # what only lowers frequencies makes no step shorter
+        frame=frame,
         **arguments,
     )
 
 
-def _of_velocity(cells, mass, speed, arguments):
+def _of_velocity(cells, mass, frame, arguments):
     force, damping, damping_bound = kernels_of_velocity(cells.shape[1])
-    return Family(
+    return ForceTerm(
         cells=cells,
-        data=_numbers(speed, mass),
+        data=_numbers(frame.angular_velocity, mass),
         force=force,
-        damping=damping,
-        damping_bound=damping_bound,
-        symmetric=False,
-        at_rest=False,
-        angular_velocity=tuple(speed),
+        tangent=Tangent(symmetric=False),
+        velocity=VelocityForce(damping, damping_bound),
+        timing=Timing(at_rest=False),
+        frame=frame,
         **arguments,
     )

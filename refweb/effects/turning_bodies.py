@@ -17,7 +17,7 @@ import numpy as np
 
 from ..kernels import BOUND, ENERGY, FORCE, STIFFNESS, kernel
 from ..net.rotation import RigidRotations, matrix_at, times, to_quaternion
-from .base import Family
+from .base import ForceTerm, Tangent, Timing, VelocityForce
 from .vectors import cross
 
 PULL, SPEED, SPREAD, MOBILITY, LARGEST = 0, 9, 12, 21, 30
@@ -164,8 +164,8 @@ def damping_bound(reach, speed, x, mass, rates, cells, data):
         rates[cells[c, 0]] += 2.0 * math.sqrt(3.0 * size) * data[c, LARGEST]
 
 
-def families(net, speed, pull, arguments):
-    """The families of all bodies that turn in space, see `refweb.effects.turning_axes.families`."""
+def force_terms(net, speed, pull, arguments):
+    """The terms of all bodies that turn in space, see `refweb.effects.turning_axes.force_terms`."""
     turns = RigidRotations.of(net)
     tensors = [turns.moment[n] * np.linalg.inv(mobility) for n, mobility in enumerate(turns.mobility)]
     spreads = [0.5 * np.trace(tensor) * np.eye(3) - tensor for tensor in tensors]
@@ -176,11 +176,13 @@ def families(net, speed, pull, arguments):
     cells = np.ascontiguousarray(turns.rows[:, 1:], dtype=np.int32)
     head = np.tile([*np.ravel(pull), *speed], (len(cells), 1))
     parts = head, *(np.reshape(part, (len(cells), 9)) for part in (spreads, turns.mobility)), np.array(largest)
-    shared: dict = dict(
-        cells=cells, data=np.ascontiguousarray(np.column_stack(parts)), symmetric=False, at_rest=False, **arguments
-    )
-    still = Family(force=force, energy=energy, stiffness=stiffness, bound=bound, **shared)
-    moving = Family(
-        force=coriolis, stiffness=coriolis_stiffness, damping=damping, damping_bound=damping_bound, **shared
+    data = np.ascontiguousarray(np.column_stack(parts))
+    shared: dict = dict(cells=cells, data=data, timing=Timing(at_rest=False), **arguments)
+    still = ForceTerm(force=force, energy=energy, tangent=Tangent(stiffness, bound, symmetric=False), **shared)
+    moving = ForceTerm(
+        force=coriolis,
+        tangent=Tangent(coriolis_stiffness, symmetric=False),
+        velocity=VelocityForce(damping, damping_bound),
+        **shared,
     )
     return [still, moving]

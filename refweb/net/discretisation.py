@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .elements import gauss, line_element, values
+from .line_data import LineData
 from .net import Net
 from .tension_laws import NAMES, Law
 
@@ -141,15 +142,14 @@ def _elements(web, element, pieces, length):
 
 
 def _line_data(web, line, pieces, length, values):
-    """`Net.line_data` of elements, from the properties of each."""
+    """The `LineData` of elements, from the properties of each."""
     slackness, smoothing = values["slackness"], values["smoothing"]
     r0 = np.sqrt(slackness**2 + 4.0 * smoothing**2)
     g0 = 2.0 * smoothing**2 / np.where(r0 > 0.0, r0 + slackness, 1.0)
     reference = web.points[web.lines[:, 1]] - web.points[web.lines[:, 0]]
     size = np.linalg.norm(reference, axis=1)
-    data = [length, values["modulus"] * values["area"], slackness, smoothing, g0, r0]
-    data += [*(reference[line] / pieces).T, size[line] / pieces]
-    return np.ascontiguousarray(np.column_stack(data))
+    laws = length, values["modulus"] * values["area"], slackness, smoothing, g0, r0
+    return LineData.of([*laws, reference[line] / pieces, size[line] / pieces])
 
 
 def _masses(element, cells, share, rows, consistent):

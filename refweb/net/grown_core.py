@@ -8,7 +8,7 @@ beyond where one face is much nearer than the others; of a core that is a point 
 Further in, distance has creases where two faces are equally near. A line is deepest where it crosses one, a node there
 jumps from one face to the next, and at an edge of the core the push of a line over it drops to 1/√2 of itself. The
 normal of one face is then no slope of an energy, and a mixture of both is one for lines alone. So the depth t is that
-of the surface on which the point lies, of a family of rounded boxes: their half sizes are c − g(t), the radius of their
+of the surface on which the point lies, of a term of rounded boxes: their half sizes are c − g(t), the radius of their
 edges ρ(t) = r − t + g(t), and their faces are t below those of the body. g is 0 up to `EXACT` of r, then a parabola,
 then of the slope `WIDENING`: ρ falls from r to r/4 and then grows with depth. Where g exceeds a half size, a roof joins
 opposite faces. With b = (|l| − c + g)₊ of each axis, or √(l² + (g − c)²) + g − c where g > c, the depth solves

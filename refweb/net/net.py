@@ -1,7 +1,7 @@
 """Nets: the rows of the unknowns, their mass, and the lines between them, on which effects act.
 
-`refweb.net.discretisation` makes a net of a web; effects add rows, mass and columns of numbers to it, and leave what is
-there alone.
+`refweb.net.discretisation` makes a net of a web; effects add rows, mass and numbers of elements to it, and leave
+what is there alone.
 """
 
 from __future__ import annotations
@@ -16,16 +16,9 @@ import numpy as np
 from .tension_laws import MIXED
 
 if TYPE_CHECKING:
+    from .line_data import LineData
     from .tension_laws import Law
     from .web import Web
-
-LENGTH, AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0, R0, REFERENCE = range(7)
-"""Columns of `Net.line_data`, what a kernel over lines finds in ``data``; ``data[:, REFERENCE : REFERENCE + 4]`` is
-dX/dξ, constant because lines of a web are straight, and its magnitude. Effects add others by `Net.with_column`."""
-COLUMNS = ("length", "axial_stiffness", "slackness", "smoothing", "g0", "r0", "x", "y", "z", "distance")
-"""Names of these columns."""
-LAW = len(COLUMNS)
-"""Column of the number of each element's law, where these differ: the first that is added to a net."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +30,7 @@ class Net:
     web : refweb.net.web.Web
         Nodes and lines as the user numbered them.
     law : refweb.net.tension_laws.Law or None
-        Tension law of all lines; None where they have several, whose numbers are then in the column `LAW`.
+        Tension law of all lines; None where they have several, whose numbers then are ``line_data.law``.
     points : ndarray, shape (rows, 3)
         Reference positions [m]: the web's nodes, those that order and subdivision add, line by line and along each
         line, then bodies.
@@ -47,11 +40,8 @@ class Net:
         Rows that each element couples, in the order of dN/dξ: ends first. Elements of a line follow each other.
     line : ndarray of int32, shape (cells,)
         The web's line that each element belongs to.
-    line_data : ndarray, shape (cells, columns)
-        Natural length [m], EA [N], ε0, η, their (g0, r0) of `refweb.net.tension_laws`, then dX/dξ and its magnitude
-        [m], then what effects add.
-    columns : tuple of str
-        Names of its columns.
+    line_data : refweb.net.line_data.LineData
+        Numbers of each element.
     factors : tuple
         What reels and heat make of natural lengths: (elements, table of (t, factor)), they multiply.
     end : float
@@ -88,7 +78,7 @@ class Net:
     mass: np.ndarray
     cells: np.ndarray
     line: np.ndarray
-    line_data: np.ndarray
+    line_data: LineData
     area: np.ndarray
     strength: np.ndarray
     gradients: np.ndarray
@@ -101,7 +91,6 @@ class Net:
     consistent_minus_lumped: np.ndarray | None = None
     bodies: tuple = ()
     spins: int = 0
-    columns: tuple = COLUMNS
     factors: tuple = ()
     end: float = math.inf
 
@@ -113,7 +102,7 @@ class Net:
     @cached_property
     def laws(self):
         """Number of the law of each element, shape (cells,)."""
-        return np.full(len(self.cells), self.law.number) if self.law else self.line_data[:, LAW].astype(np.int64)
+        return np.full(len(self.cells), self.law.number) if self.law else self.line_data.law.astype(np.int64)
 
     @property
     def heavy(self):
@@ -130,22 +119,14 @@ class Net:
         """Order of the elements."""
         return self.cells.shape[1] - 1
 
-    def column(self, name):
-        """Number of a column of ``line_data``, for the kernels of the effect that added it."""
-        return self.columns.index(name)
-
     def with_column(self, name, values):
-        """The net with one more column in ``line_data``; ``values`` are one number or one for each element."""
-        if name in self.columns:
-            raise ValueError(f"there is a column {name} already")
-        column = np.broadcast_to(values, len(self.cells))
-        numbers = np.ascontiguousarray(np.column_stack([self.line_data, column]), dtype=float)
-        return replace(self, line_data=numbers, columns=(*self.columns, name))
+        """The net with one more field in ``line_data``; ``values`` are one number or one for each element."""
+        return replace(self, line_data=self.line_data.with_column(name, values))
 
     @property
     def broken(self):
         """Elements that are broken, which have no stiffness, shape (k,)."""
-        return np.flatnonzero(self.line_data[:, AXIAL_STIFFNESS] == 0.0)
+        return np.flatnonzero(self.line_data.ea == 0.0)
 
     def middle_of(self, lines):
         """Element at the middle of each of some lines, or the one behind it, shape (lines,)."""
@@ -154,12 +135,12 @@ class Net:
     @property
     def natural_length(self):
         """Natural length of each element [m], shape (cells,)."""
-        return self.line_data[:, LENGTH]
+        return self.line_data.natural_length
 
     @property
     def slackness(self):
         """Strain at or below which an element is slack, shape (cells,): ε0, which is 0 for laws without it."""
-        return self.line_data[:, SLACKNESS]
+        return self.line_data.slackness
 
     @cached_property
     def bars(self):
@@ -181,9 +162,9 @@ class Net:
         """Natural length of each bar [m], shape (bars,)."""
         return (self.natural_length[:, None] * self.weights).ravel()
 
-    def per_bar(self, column):
-        """A column of ``line_data`` for each bar, shape (bars,)."""
-        return np.repeat(self.line_data[:, column], len(self.weights))
+    def per_bar(self, values):
+        """Values of elements for each bar, shape (bars,)."""
+        return np.repeat(values, len(self.weights))
 
     def bar_vectors(self, x):
         """Vector of each bar [m] at the displacement x, shape (bars, 3)."""

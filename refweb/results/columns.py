@@ -14,22 +14,22 @@ FIRST = {"static": "step [1]", "dynamic": "time [s]"}
 
 def static_energies(system):
     """Names of the energies of an equilibrium: work is left out where other loads than dead ones act."""
-    stored = dict.fromkeys(family.book for family in system.families if family.energy is not None)
-    works = [family for family in system.families if family.book == "work"]
-    known = works and all(family.energy is not None for family in works)
+    stored = dict.fromkeys(term.balance.column for term in system.terms if term.energy is not None)
+    works = [term for term in system.terms if term.balance.column == "work"]
+    known = works and all(term.energy is not None for term in works)
     return [*(book for book in stored if book != "work"), "total_energy", *(["work"] if known else [])]
 
 
 def dynamic_energies(system):
     """Names of the energies of a motion."""
-    books = dict.fromkeys(family.book for family in system.families)
-    works = "work" in books or system.drives or system.line_drives
+    books = dict.fromkeys(term.balance.column for term in system.terms)
+    works = "work" in books or system.drives or system.net.factors
     return ["kinetic_energy", *(book for book in books if book != "work"), *(["work"] if works else []), "total_energy"]
 
 
 def vectors(system):
     """Names of the vectors in the book of momentum."""
-    return VECTORS[: len(VECTORS) - all(family.internal for family in system.families)]
+    return VECTORS[: len(VECTORS) - all(term.balance.internal for term in system.terms)]
 
 
 def components(names):

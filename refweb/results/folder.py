@@ -299,7 +299,7 @@ class Folder:
             if state.system.weakness is not None:
                 arrays |= {
                     "broken": net.broken,
-                    "broken_energies": net.line_data[net.broken, net.column("rupture_energy")],
+                    "broken_energies": net.line_data.rupture_energy[net.broken],
                 }
             arrays |= run or {}
             write_atomically(self.path / "checkpoint.npz", lambda file: np.savez(file, **arrays))

@@ -3,7 +3,7 @@
 A probe has the signature ``value = probe(t, x, v, f, lines, rows, data, where)``: ``x``, ``v`` and ``f`` are the
 displacement of each row of the unknowns, its velocity and the whole force on it, shape (rows, 3); ``lines`` holds
 tension and strain of each element, shape (cells, 2 or more); ``rows`` and ``data`` are the probe's own numbers, or
-``data`` is what a family shows of its cells at that state. Where ``where[1]`` is `PLACE` it writes the row or element
+``data`` is what a term shows of its cells at that state. Where ``where[1]`` is `PLACE` it writes the row or element
 it stands at to ``where[0]``.
 """
 
@@ -41,8 +41,8 @@ class Probe(NamedTuple):
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
     average : float
         Length of a window [s] whose mean is looked at instead of the value, 0 for none.
-    family : int
-        Number of the family of the system whose values per cell stand in place of ``data``, or
+    term : int
+        Number of the term of the system whose values per cell stand in place of ``data``, or
         `refweb.effects.base.CONTACT` for what bodies feel of contact, −1 for none.
     """
 
@@ -51,7 +51,7 @@ class Probe(NamedTuple):
     data: np.ndarray
     sign: float = 0.0
     average: float = 0.0
-    family: int = -1
+    term: int = -1
 
 
 @kernel()

@@ -34,14 +34,14 @@ class State:
     @cached_property
     def _forces(self):
         force, per_cell = self.system.forces(self.time, self.x, self.v)
-        contact = {i: per_cell[i][:, OWN] for i, f in enumerate(self.system.families) if f.contact}
-        felt = self.system.contact_forces.of(per_cell) if any(f.felt for f in self.system.families) else None
+        contact = {i: per_cell[i][:, OWN] for i, f in enumerate(self.system.terms) if f.contact.with_lines}
+        felt = self.system.contact_forces.of(per_cell) if any(f.contact.felt for f in self.system.terms) else None
         return force, per_cell.tension, contact, felt
 
     def overlap(self, body):
         """Depth of the deepest contact of each element with a body [m], 0 where they do not touch, shape (cells,)."""
-        family, cells = self.system.contact_forces.lines_on(body)
-        return self._forces[2][family][cells]
+        term, cells = self.system.contact_forces.lines_on(body)
+        return self._forces[2][term][cells]
 
     def _by_line(self, values):
         """Largest value over the elements of each line."""
@@ -127,9 +127,9 @@ class State:
         Work is that of dead loads, and left out where other loads act, whose work depends on the path.
         """
         book = {}
-        for family in (f for f in self.system.families if f.energy is not None):
-            energy = float(self.system.energy_of(family, self.time, self.x).sum())
-            book[family.book] = book.get(family.book, 0.0) + energy
+        for term in (f for f in self.system.terms if f.energy is not None):
+            energy = float(self.system.energy_of(term, self.time, self.x).sum())
+            book[term.balance.column] = book.get(term.balance.column, 0.0) + energy
         work = -book.pop("work", 0.0)
         book |= {"total_energy": sum(book.values()), "work": work}
         return {name: book[name] for name in static_energies(self.system)}
@@ -160,7 +160,8 @@ def strain_remark(strain):
 def floor_remark(net, stress):
     """A warning where the smooth law's floor exceeds 1 % of the largest stress [Pa]."""
     if (smooth := net.laws == SMOOTH).any():
-        floor = float((Law("smooth").floor(*net.line_data[smooth, 1:4].T) / net.area[smooth]).max())
+        lines = net.line_data[smooth]
+        floor = float((Law("smooth").floor(lines.ea, lines.slackness, lines.smoothing) / net.area[smooth]).max())
         if floor > 0.01 * stress:
             yield Finding(
                 "law-floor",

@@ -6,7 +6,6 @@ import numpy as np
 
 from ..effects.elasticity import strains
 from ..kernels import kernel
-from ..net.net import AXIAL_STIFFNESS
 
 
 class Bars:
@@ -30,7 +29,7 @@ class Bars:
     """
 
     def __init__(self, net, x):
-        axial = net.per_bar(AXIAL_STIFFNESS)
+        axial = net.per_bar(net.line_data.ea)
         self.natural = net.bar_lengths
         self.stiffness = axial / self.natural
         vector = net.bar_vectors(x)

@@ -20,7 +20,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import SolverError
-from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor
 
 ANCHOR = 1e-10
@@ -47,7 +46,7 @@ def check_speed(system, t):
     """Refuse a frame that turns at the limit or above it, with that limit."""
     net, factor = system.at(t).net, Factor(system.pattern)
     taken, allowed = _centrifugal(system), drifting(system)
-    axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    axial = net.line_data.ea / net.natural_length
     tension_stiffness = system.assemble_lines(net.unit_tension * axial[:, None, None])
     for part in system.unsupported_parts:
         tension_stiffness[system.pattern.diagonal[part.unknowns]] += ANCHOR * axial.max()
@@ -62,10 +61,10 @@ def check_speed(system, t):
     while high - low > 1e-13 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if stands(middle) else (low, middle)
-    family = system.rotating[0]
-    speed = np.linalg.norm(family.angular_velocity)
-    key = "angular_velocity" if family.name == "frame" else "mean_motion"
+    term = system.rotating[0]
+    speed = np.linalg.norm(term.frame.angular_velocity)
+    key = "angular_velocity" if term.name == "frame" else "mean_motion"
     raise SolverError(
-        f"no equilibrium: [{family.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
+        f"no equilibrium: [{term.name}] turns at {speed:.6g} rad/s, must be below {high * speed:.8g} rad/s, where "
         f"centrifugal forces outgrow any tension: lower {key} or the masses, or raise modulus × area"
     )

@@ -72,7 +72,7 @@ def duality_bound(system, equilibrium, factor=None):
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
     bars = Bars(net, x)
-    outer = sum(system.force_of(f, equilibrium.step, x) for f in system.families if not f.internal)
+    outer = sum(system.force_of(f, equilibrium.step, x) for f in system.terms if not f.balance.internal)
     factor, bound = factor or Factor(system.pattern), None
     balance = _Balance(system, bars, x, outer)
     if factor.shift is not None:

@@ -103,8 +103,8 @@ class Relaxation:
         self.system, self.progress = system, progress or (lambda text: None)
         self.limit, self.tolerance, self.scale = limit, tolerance, 0.0
         self._stalled = TOUCHING if system.contact else STALLED
-        self._kernels = Functions(FORCE, [f.force for f in system.families])
-        self._cells = Arrays(INDICES, [f.cells for f in system.families])
+        self._kernels = Functions(FORCE, [f.force for f in system.terms])
+        self._cells = Arrays(INDICES, [f.cells for f in system.terms])
         self._per_cell = Arrays(MATRIX, system.per_cell())
 
     def solve(self, t, x):
@@ -113,7 +113,7 @@ class Relaxation:
         check_supported(system, t)
         x = x.copy()
         system.drive(t, x)
-        inverse, data = self._inverse_mass(t), Arrays(MATRIX, [f.data for f in system.at(t).families])
+        inverse, data = self._inverse_mass(t), Arrays(MATRIX, [system.data_of(f, t) for f in system.terms])
         v, done, error, best, since = np.zeros_like(x), 0, np.inf, np.inf, 0
         while True:
             f, per_cell = system.forces(t, x)
@@ -150,8 +150,8 @@ class Relaxation:
         """Factor of the forces [m/N], shape (rows, 3): 0 where nothing moves."""
         system = self.system
         rates, x = np.zeros(system.rows), np.zeros((system.rows, 3))
-        for family in system.at(t).families:
-            if family.bound is not None:
-                family.bound(np.inf, 0.0, x, np.ones(system.rows), rates, family.cells, family.data)
+        for term in system.terms:
+            if term.tangent.bound is not None:
+                term.tangent.bound(np.inf, 0.0, x, np.ones(system.rows), rates, term.cells, system.data_of(term, t))
         moving = ~system.supported & (rates > 0.0)[:, None]
         return np.where(moving, 4.0 * SAFETY**2 / np.where(rates > 0.0, rates, 1.0)[:, None], 0.0)

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, SolverError
-from ..net.net import AXIAL_STIFFNESS
 
 TOLERANCE = 1e-10
 """Residual at which an iteration stops; `LIMIT` is what it may end at when rounding allows no further step."""
@@ -146,9 +145,9 @@ def force_scale(system, t, x, tension):
     At least 1/`LIMIT` of what rounding of the displacements makes of EA, which is more than those where a net is slack
     under loads below 1e-7 EA.
     """
-    stiffness = system.net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
+    stiffness = system.net.line_data.ea / system.natural_length(t)
     rounding = np.finfo(float).eps * stiffness.max() * np.abs(x).max()
-    outer = [f for f in system.families if not f.lines]
+    outer = [f for f in system.terms if not f.over_lines]
     loads = [np.linalg.norm(system.force_of(f, t, x), axis=1).max() for f in outer]
     return max([*loads, np.abs(tension).max(initial=0.0), rounding / LIMIT])
 

@@ -17,7 +17,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ..effects.elasticity import strains
-from ..net.net import AXIAL_STIFFNESS
 
 SAMPLES = 3
 """Number of moves at no cost that stand for all of them, at random."""
@@ -126,7 +125,7 @@ def between_slack_lines(system, equilibrium):
     A line is taut where the bound proves it: its tension exceeds its error, at each quadrature point.
     """
     net, x = system.at(equilibrium.step).net, equilibrium.x
-    tension = net.line_data[:, AXIAL_STIFFNESS, None] * strains(net, x)
+    tension = net.line_data.ea[:, None] * strains(net, x)
     taut = (tension > equilibrium.duality_bound.tension[:, None]).all(axis=1)
     pairs = np.vstack([net.cells[:, [0, k]] for k in range(1, net.cells.shape[1])])
     joined = np.tile(taut, net.cells.shape[1] - 1)

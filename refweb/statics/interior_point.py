@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS, SLACKNESS
 from ..system.factorization import Factor
 from .equilibrium import NotFound, add_spent
 
@@ -105,9 +104,9 @@ class InteriorPoint:
         net = system.at(t).net
         self._bars, self._reference = net.bars, net.points
         self._ends = net.weights[:, None] * net.gradients
-        self._stiffness = net.per_bar(AXIAL_STIFFNESS) / net.bar_lengths
-        self._natural = net.bar_lengths * (1.0 + net.per_bar(SLACKNESS))
-        outer = (system.force_of(f, t, x) for f in system.families if not f.internal)
+        self._stiffness = net.per_bar(net.line_data.ea) / net.bar_lengths
+        self._natural = net.bar_lengths * (1.0 + net.per_bar(net.slackness))
+        outer = (system.force_of(f, t, x) for f in system.terms if not f.balance.internal)
         self._outer = sum(outer, np.zeros((system.rows, 3)))
         load = np.abs(self._outer.ravel()[system.free]).max(initial=0.0)
         self.loaded, self._load = bool(load > 0.0), max(load, np.finfo(float).tiny)

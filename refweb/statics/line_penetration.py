@@ -19,7 +19,7 @@ class LinePassage:
     Parameters
     ----------
     system : refweb.system.system.System
-        With a family of lines against lines.
+        With a term of lines against lines.
     chosen : bool
         Whether the stiffness is refweb's choice.
 
@@ -32,7 +32,7 @@ class LinePassage:
     """
 
     def __init__(self, system, chosen):
-        self._system, self._family = system, system.families[pressed(system)]
+        self._system, self._term = system, system.terms[pressed(system)]
         self._x = np.zeros((system.rows, 3)) if system.laid is None else system.laid
         self.deepest, self.why = Passage(system, UNFOLLOWED, chosen), UNFOLLOWED
 
@@ -46,16 +46,16 @@ class LinePassage:
         SolverError
             For one, where the stiffness was given.
         """
-        family, still = self._family, np.zeros((self._system.rows, 3))
-        depth = np.zeros((len(family.cells), 1))
-        family.force(state.time, state.x, still, np.zeros_like(still), family.cells, family.data, depth)
+        term, still = self._term, np.zeros((self._system.rows, 3))
+        depth = np.zeros((len(term.cells), 1))
+        term.force(state.time, state.x, still, np.zeros_like(still), term.cells, term.data, depth)
         if len(depth):
             cell = int(depth.argmax())
             self.deepest.record(float(depth[cell, 0]), None)
             self.deepest.refuse(float(depth[cell, 0]), f"load step {state.time:g}", cell)
         met, path = np.zeros(4, dtype=np.int64), state.x - self._x
-        numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, family.cells, family.data, met
-        if self.why == UNFOLLOWED and family.crossing.meets(*numbers):
+        numbers = 0.0, 0.0, 0.0, 1.0, self._x, path, still, still, term.cells, term.data, met
+        if self.why == UNFOLLOWED and term.contact.crossing.meets(*numbers):
             self.why = (
                 f"{lines_of(self._system.net, met)} meet on their straight ways to load step {state.time:g}; smaller "
                 "load_steps may tell whether they pass or slide around each other"

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS, G0
 from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.static_system import at_rest
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent, where_nothing_touches
@@ -117,7 +116,7 @@ def _by_stiffening(newton, t, x, spent):
     softer = SOFTEST * newton.axial / load if load > 0.0 else 1.0
     while softer > 1.0:
         numbers = system.net.line_data.copy()
-        numbers[:, AXIAL_STIFFNESS] /= softer
+        numbers.ea /= softer
         state = Newton(system.with_line_data(numbers), newton.progress, t).solve(t, x)
         add_spent(spent, state.stats)
         x, softer = state.x, softer / 10.0
@@ -130,6 +129,6 @@ def _by_patience(newton, t, x):
         return newton.solve(t, x, limit=PATIENCE)
     except NotFound as error:
         data = newton.system.net.line_data
-        push = f"{(data[:, AXIAL_STIFFNESS] * data[:, G0]).max():.3g} N"
+        push = f"{(data.ea * data.g0).max():.3g} N"
         text = f'{error}, or law = "tension-only": slack lines push with up to {push}'
         raise NotFound(text, error.stats) from None

@@ -19,7 +19,6 @@ import numpy as np
 
 from ..effects.elasticity import strains
 from ..errors import SolverError
-from ..net.net import AXIAL_STIFFNESS, G0, R0, SLACKNESS, SMOOTHING
 from ..net.tension_laws import LINEAR, Law
 from .equilibrium import WITH_A_WAY_AROUND, NotFound, add_spent
 
@@ -76,8 +75,8 @@ def lowest(newton, state):
 def _without_smoothing(newton, state):
     """The equilibrium of the same net at η = 0, by the interior point where Newton's method does not end."""
     numbers = newton.system.net.line_data.copy()
-    numbers[:, [SMOOTHING, G0]] = 0.0
-    numbers[:, R0] = np.abs(numbers[:, SLACKNESS])
+    numbers.smoothing[:] = numbers.g0[:] = 0.0
+    numbers.r0[:] = np.abs(numbers.slackness)
     plain, t = type(newton)(newton.system.with_line_data(numbers), newton.progress, state.step), state.step
     try:
         return plain.solve(t, state.x, limit=WITH_A_WAY_AROUND)
@@ -93,7 +92,7 @@ def _forces(system, plain):
     """Forces of the bars in an equilibrium at η = 0, vectors [N] of shape (bars, 3)."""
     net = system.at(plain.step).net
     strain = strains(net, plain.x).ravel()
-    axial, slackness = net.per_bar(AXIAL_STIFFNESS), net.per_bar(SLACKNESS)
+    axial, slackness = net.per_bar(net.line_data.ea), net.per_bar(net.slackness)
     line = net.bar_vectors(plain.x)
     length = np.linalg.norm(line, axis=1)
     tension = axial * np.maximum(strain - slackness, 0.0)
@@ -103,7 +102,8 @@ def _forces(system, plain):
 def _above(system, state, forces):
     """Bound of the energy of a state above the lowest one [J], by forces that balance the loads."""
     net = system.at(state.step).net
-    axial, slackness, smoothing, g0 = map(net.per_bar, (AXIAL_STIFFNESS, SLACKNESS, SMOOTHING, G0))
+    lines = net.line_data
+    axial, slackness, smoothing, g0 = map(net.per_bar, (lines.ea, lines.slackness, lines.smoothing, lines.g0))
     law = Law("smooth")  # which without smoothing is that of lines that only pull
     size = np.linalg.norm(forces, axis=1)
     g = size / axial + g0  # = (s + √(s² + 4η²))/2 at s = ε − ε0, so that s = g − η²/g
@@ -119,4 +119,4 @@ def _above(system, state, forces):
 
 def _scale(system, state):
     """Energy of the lines and of the loads [J], without signs."""
-    return sum(float(np.abs(system.energy_of(f, state.step, state.x)).sum()) for f in system.families)
+    return sum(float(np.abs(system.energy_of(f, state.step, state.x)).sum()) for f in system.terms)

@@ -33,7 +33,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS
 from ..system import conjugate_gradients
 from ..system.factorization import Factor, Lu
 from .bars import Bars
@@ -100,8 +99,8 @@ class Newton:
         self.progress = progress or (lambda text: None)
         net = system.net if first is None else system.at(first).net
         self.geometric = system.assemble_lines(net.unit_tension / net.natural_length[:, None, None])
-        self.stiffest = (net.line_data[:, AXIAL_STIFFNESS] / net.natural_length).max()
-        self.axial = net.line_data[:, AXIAL_STIFFNESS].max()
+        self.stiffest = (net.line_data.ea / net.natural_length).max()
+        self.axial = net.line_data.ea.max()
         self.follows, self.turns, self.drifting = not system.conservative, bool(system.rotating), 0
         self.factor = (Lu if self.follows else Factor)(system.pattern)
         if self.turns:
@@ -351,7 +350,7 @@ class Newton:
     def _disturbing(self, state):
         """Forces on the unknowns [N]: what is left of the residual, and what rounding makes, of random sign, thrice."""
         system, net = self.system, self.system.net
-        stiffness = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(state.step)
+        stiffness = net.line_data.ea / system.natural_length(state.step)
         moved = np.linalg.norm(state.x, axis=1)[net.cells].max(axis=1)
         size = np.zeros(system.rows)
         np.add.at(size, net.cells, np.finfo(float).eps * (np.abs(state.tension) + stiffness * moved)[:, None])

@@ -170,7 +170,7 @@ class Simulation:
 
 def _load(system, equilibrium):
     """Sum of the sizes of the forces of ``[[load]]`` at an equilibrium [N], None without any."""
-    forces = [system.force_of(f, equilibrium.step, equilibrium.x) for f in system.families if f.name == "load"]
+    forces = [system.force_of(f, equilibrium.step, equilibrium.x) for f in system.terms if f.name == "load"]
     return float(np.linalg.norm(sum(forces), axis=1).sum()) if forces else None
 
 
@@ -185,7 +185,7 @@ def _passage_of(scene, system):
 
 def _lines_of(scene, system):
     """The `refweb.statics.line_penetration.LinePassage` of a scene, None without lines that touch lines."""
-    if not any(family.crossing is not None for family in system.families):
+    if not any(term.contact.crossing is not None for term in system.terms):
         return None
     from .line_penetration import LinePassage
 

@@ -41,7 +41,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS, LENGTH
 from ..net.tension_laws import LINEAR, TENSION_ONLY
 from ..system.factorization import Factor, Lu, negative_pivots
 from .equilibrium import Stability
@@ -97,7 +96,7 @@ def _ask_of_kinks(system, rest, state):
     kinked = (net.laws == TENSION_ONLY) & (abs(strain).reshape(len(net.laws), -1).min(axis=1) <= KINK)
     if state.stability.sign not in (0, 1) or not kinked.any():
         return
-    numbers[kinked, LENGTH] *= 1.0 + 4.0 * KINK
+    numbers.natural_length[kinked] *= 1.0 + 4.0 * KINK
     if Question(system, rest.with_line_data(numbers), state).answer().sign == -1:
         why = f"{np.count_nonzero(kinked)} elements are between slack and taut, and slack they would not hold it"
         state.stability = Stability(None, why, loose=True)
@@ -159,7 +158,7 @@ class Question:
     def _ridge(self):
         """Values of what stiffness counts as none."""
         rest, net = self.rest, self.rest.at(self.t).net
-        axial = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+        axial = net.line_data.ea / net.natural_length
         ridge = TINY * rest.assemble_lines(net.unit_tension * axial[:, None, None])
         for part in rest.unsupported_parts:  # which no pivot is to be 0 for
             ridge[rest.pattern.diagonal[part.unknowns]] += HELD * axial.max()

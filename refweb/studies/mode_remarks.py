@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..findings import Finding
-from ..net.net import SMOOTHING
 from ..net.tension_laws import LINEAR
 from ..results.state import floor_remark
 from ..statics.remarks import remark_on_open
@@ -25,7 +24,7 @@ def remarks_on(computed, state, equilibrium):
         text = f"{computed.zero} directions have no stiffness: they have no frequency and are not listed"
         yield Finding("no-stiffness", text)
     yield from remark_on_open(state, equilibrium)
-    kinked = (net.laws != LINEAR) & (net.line_data[:, SMOOTHING] == 0.0)
+    kinked = (net.laws != LINEAR) & (net.line_data.smoothing == 0.0)
     if count := np.count_nonzero(kinked & (abs(state.element_strain - net.slackness) <= STRAIN)):
         text = f"{count} elements are between slack and taut, and count as taut: there no vibration is linear"
         yield Finding("kink", text)
@@ -34,7 +33,7 @@ def remarks_on(computed, state, equilibrium):
 
 def left_out(system):
     """Effects that the modes of a system leave out."""
-    if any(family.damping is not None and family not in system.rotating for family in system.families):
+    if any(term.velocity.damping is not None and term not in system.rotating for term in system.terms):
         yield Finding("left-out", "forces that depend on velocity, such as damping, are left out")
     if free := [body.name for body in system.net.bodies if not body.fixed]:
         yield Finding("left-out", f"free bodies wait, and the web does not feel them: {', '.join(free)}", "body")

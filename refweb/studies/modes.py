@@ -154,9 +154,9 @@ def _at_rest(system):
     rest = at_rest(system)
     if rest.constraints:
         raise InputError("[[link]]: modes cannot hold lengths exactly: make it a stiff line")
-    for family in rest.families:
-        if family.stiffness is not None and not family.symmetric:
-            raise InputError(f"{family.name} has no potential, so there are no natural modes: leave it out")
+    for term in rest.terms:
+        if term.tangent.stiffness is not None and not term.tangent.symmetric:
+            raise InputError(f"{term.name} has no potential, so there are no natural modes: leave it out")
     if not len(rest.free):
         raise InputError("no node is free, so there are no modes: support fewer of them")
     return rest

@@ -15,7 +15,6 @@ import scipy.linalg
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from ..errors import SolverError
-from ..net.net import AXIAL_STIFFNESS
 from ..system.factorization import Factor
 
 STRAIN, ROUNDING = 1e-12, 1e-15
@@ -64,7 +63,7 @@ class Pencil:
         self.massive, self.massless = np.flatnonzero(diagonal > 0.0), np.flatnonzero(diagonal == 0.0)
         if not len(self.massive):
             raise SolverError("no mode: no free node has mass; give the cable a density, or nodes a [[point_mass]]")
-        axial = net.line_data[:, AXIAL_STIFFNESS] / system.natural_length(t)
+        axial = net.line_data.ea / system.natural_length(t)
         strained = system.assemble_lines(net.unit_tension * axial[:, None, None])
         self.strained = pattern.matrix(strained)
         taut = strained[pattern.diagonal]

@@ -64,7 +64,7 @@ class Pairs(NamedTuple):
 
 def coriolis(system):
     """G = −∂f/∂v of the unknowns [kg/s], a sparse matrix; None where no frame turns."""
-    speed = np.array(system.rotating[0].angular_velocity if system.rotating else (0.0, 0.0, 0.0))
+    speed = np.array(system.rotating[0].frame.angular_velocity if system.rotating else (0.0, 0.0, 0.0))
     if not speed.any():
         return None
     net = system.net

@@ -22,8 +22,8 @@ class _Cell:
 
     Attributes
     ----------
-    family, at : int
-        Number of the family in the pattern, and of the cell in it.
+    term, at : int
+        Number of the term in the pattern, and of the cell in it.
     own_rows : list of int
         Place among ``rows`` of each of its rows; −1 of one that is carried.
     parts : list of (int, int, int)
@@ -31,8 +31,8 @@ class _Cell:
         before its rows of rotation.
     """
 
-    def __init__(self, family, at, cell, turns):
-        self.family, self.at = family, at
+    def __init__(self, term, at, cell, turns):
+        self.term, self.at = term, at
         number = {int(node): c for c, (node, _) in enumerate(turns.carried)}
         rows: list = []
         for row in cell.tolist():
@@ -61,17 +61,17 @@ class Carried:
     ----------
     net : refweb.net.net.Net
         With the bodies.
-    families : list of refweb.effects.base.Family
+    terms : list of refweb.effects.base.ForceTerm
         Those of the pattern, in its order.
     """
 
-    def __init__(self, net, families):
-        self.turns, self._families, self._entries = RigidRotations.of(net), families, []
+    def __init__(self, net, terms):
+        self.turns, self._terms, self._entries = RigidRotations.of(net), terms, []
         turns, nodes = self.turns, self.turns.carried[:, 0]
         self._cells = [
-            _Cell(i, int(at), family.cells[at], turns)
-            for i, family in enumerate(families)
-            for at in np.flatnonzero(np.isin(family.cells, nodes).any(axis=1))
+            _Cell(i, int(at), term.cells[at], turns)
+            for i, term in enumerate(terms)
+            for at in np.flatnonzero(np.isin(term.cells, nodes).any(axis=1))
         ]
 
     @staticmethod
@@ -137,19 +137,18 @@ class Carried:
         return T, fast, turned, L
 
     def add_stiffness(self, values, system, t, x, v, blocks):
-        """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its families."""
+        """Add to the values of K of a system what these nodes have of it, of the blocks of −∂f/∂x of its terms."""
         self._arrange(system.pattern, system.free)
         state, damped = self._state(x, v), {}
-        for i, family in enumerate(self._families):
-            if family.damping is not None:
+        for i, term in enumerate(self._terms):
+            if term.velocity.damping is not None:
                 damped[i] = np.zeros_like(blocks[i])
-                data = system.line_data(t) if family.lines else family.data
-                family.damping(t, x, v, damped[i], family.cells, data, False)
+                term.velocity.damping(t, x, v, damped[i], term.cells, system.data_of(term, t), False)
         for cell, entries in zip(self._cells, self._entries, strict=True):
             T, _, turned, L = self._matrices(cell, state)
-            expanded = _beside(L @ blocks[cell.family][cell.at] @ T, blocks, cell)
-            if cell.family in damped:
-                expanded += L @ damped[cell.family][cell.at] @ turned
+            expanded = _beside(L @ blocks[cell.term][cell.at] @ T, blocks, cell)
+            if cell.term in damped:
+                expanded += L @ damped[cell.term][cell.at] @ turned
             _add(values, entries, expanded)
         force = system.force(t, x, v)
         for c, (node, n) in enumerate(self.turns.carried):
@@ -164,7 +163,7 @@ class Carried:
         state = self._state(x, v)
         for cell, entries in zip(self._cells, self._entries, strict=True):
             _, fast, _, L = self._matrices(cell, state)
-            _add(values, entries, _beside(L @ blocks[cell.family][cell.at] @ fast, blocks, cell))
+            _add(values, entries, _beside(L @ blocks[cell.term][cell.at] @ fast, blocks, cell))
 
 
 class Waiting(Carried):
@@ -194,7 +193,7 @@ def _entries(rows, size, number, keys):
 def _beside(expanded, blocks, cell):
     """A new block of a cell without what of it is in the pattern already."""
     T, L = cell.unmoved()
-    return expanded - L @ blocks[cell.family][cell.at] @ T
+    return expanded - L @ blocks[cell.term][cell.at] @ T
 
 
 def _add(values, entries, expanded):

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..net.net import AXIAL_STIFFNESS
-
 
 class Breaks(NamedTuple):
     """Broken lines, in the order in which they broke.
@@ -59,13 +57,13 @@ def torn(system, elements, energies):
     system = _breakable(system)
     net = system.net
     numbers = net.line_data.copy()
-    numbers[elements, AXIAL_STIFFNESS] = 0.0
-    numbers[elements, net.column("rupture_energy")] = energies
+    numbers.ea[elements] = 0.0
+    numbers.rupture_energy[elements] = energies
     changed = copy.copy(system)
     changed.net = replace(net, line_data=numbers)
     broken = np.zeros(len(net.cells), dtype=bool)
     broken[elements] = True
-    changed.families = [_severed(family, broken, numbers) for family in system.families]
+    changed.terms = [_severed(term, broken) for term in system.terms]
     for kept in ("unsupported_parts", "carriers"):
         changed.__dict__.pop(kept, None)
     changed.arrange()
@@ -73,7 +71,7 @@ def torn(system, elements, energies):
 
 
 def _breakable(system):
-    """The system, or where nothing of it may break one with the column, family and `BreakLimits` of broken elements."""
+    """The system, or where nothing of it may break one with the column, term and `BreakLimits` of broken elements."""
     if system.weakness is not None:
         return system
     from ..effects.base import BreakLimits
@@ -81,8 +79,8 @@ def _breakable(system):
 
     changed = copy.copy(system)
     changed.net = net = system.net.with_column(HELD, 0.0)
-    changed.families = [replace(f, data=net.line_data) if f.lines else f for f in system.families]
-    changed.families.append(held_energy(net))
+    changed.terms = [*system.terms]
+    changed.terms.append(held_energy(net))
     changed.weakness = BreakLimits(np.full(len(net.cells), np.inf))
     return changed
 
@@ -93,26 +91,25 @@ def with_broken_lines(system):
     return torn(system, elements, np.zeros(len(elements)))
 
 
-def _severed(family, broken, numbers):
-    """A family that does nothing through broken elements; ``numbers`` are those of the lines."""
-    if family.lines:
-        return replace(family, data=numbers)
-    if family.elements is None or family.disable_cells is None:
-        return family
-    left = replace(family, data=_without(family, family.data, broken[family.elements]))
-    if family.crossing is None:
+def _severed(term, broken):
+    """A term that does nothing through broken elements."""
+    if term.elements.numbers is None or term.elements.disable is None:
+        return term
+    left = replace(term, data=_without(term, term.data, broken[term.elements.numbers]))
+    crossing = term.contact.crossing
+    if crossing is None:
         return left
-    beside = _without(family, family.crossing.data, broken[family.crossing.elements])
-    return replace(left, crossing=family.crossing._replace(data=beside))
+    crossing = crossing._replace(data=_without(term, crossing.data, broken[crossing.elements]))
+    return replace(left, contact=term.contact._replace(crossing=crossing))
 
 
-def _without(family, data, ends):
+def _without(term, data, ends):
     """Numbers of cells that do nothing where an element of theirs ``ends``."""
     ends = ends if ends.ndim == 1 else ends.any(axis=1)
     if not ends.any():
         return data
     data, end_data = data.copy(), data[ends]
-    family.disable_cells(end_data)
+    term.elements.disable(end_data)
     data[ends] = end_data
     return data
 
@@ -123,12 +120,12 @@ def tear(system, t, x, v, elements):
     What ends is the energy of the system less that of the torn one; of several that break together each has its share
     of that by what it held itself.
     """
-    energy = sum(system.energy_of(f, t, x)[elements] for f in system.families if f.lines and f.energy is not None)
-    stored = [f for f in system.families if f.book not in ("work", "dissipated_energy")]
-    before = sum(system.energy_of(family, t, x).sum() for family in stored)
+    energy = sum(system.energy_of(f, t, x)[elements] for f in system.terms if f.over_lines and f.energy is not None)
+    stored = [f for f in system.terms if f.balance.column not in ("work", "dissipated_energy")]
+    before = sum(system.energy_of(term, t, x).sum() for term in stored)
     changed = torn(system, elements, np.zeros(len(elements)))
-    left = [f for f in changed.families if f.book not in ("work", "dissipated_energy")]
-    lost = before - sum(changed.energy_of(family, t, x).sum() for family in left)
+    left = [f for f in changed.terms if f.balance.column not in ("work", "dissipated_energy")]
+    lost = before - sum(changed.energy_of(term, t, x).sum() for term in left)
     share = (
         np.abs(energy) / np.abs(energy).sum()
         if np.abs(energy).sum() > 0.0

@@ -1,22 +1,26 @@
 """Contact of bodies: its force on each, the depth of lines in each, and the depth of pairs in each other.
 
 Each contact shows, in its cell, how deep it is and the force on the body that it touches, where two bodies touch that
-on the second of them, see `refweb.effects.base.Family.felt`. What a body feels is the sum over its cells, and nothing
-else is: where nothing touches it, that is zero whatever else acts. One kernel sums for all: over the cells that are
-near in a step of the compiled loop, over all in a state.
+on the second of them, see `refweb.effects.base.ContactForce.felt`. What a body feels is the sum over its cells, and
+nothing else is: where nothing touches it, that is zero whatever else acts. One kernel sums for all: over the cells that
+are near in a step of the compiled loop, over all in a state.
 """
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from numba import from_dtype, types
 
 from ..effects.base import DEPTH, ELEMENT, FELT, FELT_COLUMNS, FORCE, OWN, pairs_of
 from ..kernels import kernel
 
-FAMILY, BODY, OTHER, ELEMENTS, PAIRS, CHOSEN = range(6)
-"""Columns of what is known of a family of contact: its number; columns of its cells with the row of the body that it
-touches, and of the other one or −1; the number of elements where it is the push of lines, else 0; the row of the depth
-of its first pair where it is the push of bodies, else −1; and where the numbers of chosen cells stand, −1 for none."""
+CONTACT_TERM = np.dtype([(name, np.int64) for name in ("number", "body", "partner", "elements", "pairs", "chosen")])
+"""A term of contact: its number; columns of its cells with the row of the body that it touches, and of the other one or
+−1; the number of elements where it is the push of lines, else 0; the row of the depth of its first pair where it is the
+push of bodies, else −1; and where the numbers of chosen cells stand, −1 for none."""
+ContactTermArray = Annotated[np.ndarray, types.Array(from_dtype(CONTACT_TERM), 1, "C")]
 
 
 class ContactForces:
@@ -31,23 +35,23 @@ class ContactForces:
     ----------
     first : int
         Number of the row of the system that the first row is of.
-    families : ndarray of int, shape (families, 6)
-        What is known of each family of contact.
+    terms : ndarray of `CONTACT_TERM`
+        Terms of contact.
     rows : int
         Number of rows.
     """
 
     def __init__(self, system):
-        self.first, elements, known = system.net.nodes, len(system.net.cells), []
+        self.first, elements, terms = system.net.nodes, len(system.net.cells), []
         self.rows = pairs = system.rows - self.first
-        self._cells, self._pairs = [family.cells for family in system.families], {}
-        for i, family in enumerate(system.families):
-            if family.felt:
-                body, partner = (*family.felt, -1)[:2]
-                lines = elements if family.contact and family.energy is not None else 0
-                known.append((i, body, partner, lines, pairs if family.pairs else -1, -1))
-                pairs += len(family.pairs)
-        self.families = np.array(known, dtype=np.int64).reshape(len(known), 6)
+        self._cells, self._pairs = [term.cells for term in system.terms], {}
+        for i, term in enumerate(system.terms):
+            if term.contact.felt:
+                body, partner = (*term.contact.felt, -1)[:2]
+                lines = elements if term.contact.with_lines and term.energy is not None else 0
+                terms.append((i, body, partner, lines, pairs if term.contact.pairs else -1, -1))
+                pairs += len(term.contact.pairs)
+        self.terms = np.array(terms, dtype=CONTACT_TERM)
         for n, pair in enumerate(pairs_of(system)):
             self._pairs[frozenset(body.row for body in pair)] = self.rows + n
         self.rows = pairs
@@ -61,11 +65,11 @@ class ContactForces:
         return felt[self.row(body), FORCE : FORCE + 3]
 
     def lines_on(self, body):
-        """(number of the family, slice of its cells) of the push of lines on a body; cells are in order of elements."""
-        for known in self.families:
-            indices = np.flatnonzero(self._cells[known[FAMILY]][:, known[BODY]] == body.row)
-            if known[ELEMENTS] and len(indices):
-                return int(known[FAMILY]), slice(int(indices[0]), int(indices[-1]) + 1)
+        """(number of the term, slice of its cells) of the push of lines on a body; cells are in order of elements."""
+        for term in self.terms:
+            indices = np.flatnonzero(self._cells[term["number"]][:, term["body"]] == body.row)
+            if term["elements"] and len(indices):
+                return int(term["number"]), slice(int(indices[0]), int(indices[-1]) + 1)
         raise ValueError(f'nothing touches body "{body.name}"')
 
     def pair_rows(self, body, others):
@@ -74,13 +78,13 @@ class ContactForces:
         return [row for row in rows if row is not None]
 
     def of(self, per_cell):
-        """Contact of bodies where families write ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
+        """Contact of bodies where terms write ``per_cell``, shape (rows, `FELT_COLUMNS`)."""
         felt = np.empty((self.rows, FELT_COLUMNS))
         forget(felt)
         none = np.empty((0, 1), dtype=np.int32)
-        for known in self.families:
-            i = known[FAMILY]
-            add_felt(self.first, known, self._cells[i], none, per_cell[i], felt)
+        for term in self.terms:
+            i = term["number"]
+            add_felt(self.first, term, self._cells[i], none, per_cell[i], felt)
         return felt
 
 
@@ -94,22 +98,22 @@ def forget(felt):
 
 
 @kernel(leaf=True)
-def add_felt(first, known, cells, chosen, out, felt):
-    """Add what bodies feel of the cells of a family; of those that are ``chosen`` where any are, shape (cells, 1)."""
+def add_felt(first, term, cells, chosen, out, felt):
+    """Add what bodies feel of the cells of a term; of those that are ``chosen`` where any are, shape (cells, 1)."""
     for c in range(cells.shape[0]):
         x, y, z, cell_depth = out[c, FELT], out[c, FELT + 1], out[c, FELT + 2], out[c, OWN]
         if cell_depth == 0.0 and x == 0.0 and y == 0.0 and z == 0.0:
             continue
-        body, cell = cells[c, known[BODY]] - first, chosen[c, 0] if chosen.shape[0] else c
+        body, cell = cells[c, term.body] - first, chosen[c, 0] if chosen.shape[0] else c
         felt[body, FORCE] += x
         felt[body, FORCE + 1] += y
         felt[body, FORCE + 2] += z
-        if known[OTHER] >= 0:
-            partner_row = cells[c, known[OTHER]] - first
+        if term.partner >= 0:
+            partner_row = cells[c, term.partner] - first
             felt[partner_row, FORCE] -= x
             felt[partner_row, FORCE + 1] -= y
             felt[partner_row, FORCE + 2] -= z
-        if known[ELEMENTS] > 0 and cell_depth > felt[body, DEPTH]:
-            felt[body, DEPTH], felt[body, ELEMENT] = cell_depth, float(cell % known[ELEMENTS])
-        if known[PAIRS] >= 0:
-            felt[known[PAIRS] + cell, DEPTH] = cell_depth
+        if term.elements > 0 and cell_depth > felt[body, DEPTH]:
+            felt[body, DEPTH], felt[body, ELEMENT] = cell_depth, float(cell % term.elements)
+        if term.pairs >= 0:
+            felt[term.pairs + cell, DEPTH] = cell_depth

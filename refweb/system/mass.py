@@ -25,7 +25,7 @@ class Mass:
     pattern : refweb.system.sparsity.Pattern
         Where the entries of the unknowns stand.
     lines : int, optional
-        Number of the lines among the families of the pattern; needed where mass is consistent.
+        Number of the lines among the terms of the pattern; needed where mass is consistent.
     """
 
     def __init__(self, net, free, pattern, lines=None):

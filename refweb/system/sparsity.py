@@ -32,7 +32,7 @@ def _different(keys):
 class Pattern:
     """CSC pattern of the free components of all cells that couple them.
 
-    It has every diagonal entry, and off the diagonal only what some family couples; slack or zero entries stay in it.
+    It has every diagonal entry, and off the diagonal only what some term couples; slack or zero entries stay in it.
 
     Parameters
     ----------
@@ -41,11 +41,11 @@ class Pattern:
     free : ndarray of int
         Components that are not supported, in the order of the unknowns.
     cells : list of ndarray of int32, shape (cells, arity)
-        One entry per family with stiffness.
+        One entry per term with stiffness.
     library : refweb.system.factorization.Library
         What factorizes symmetric matrices.
     also : list of ndarray of int32, shape (cells, arity)
-        Other cells that are coupled, by what is no family.
+        Other cells that are coupled, by what is no term.
 
     Attributes
     ----------
@@ -65,9 +65,7 @@ class Pattern:
         number.ravel()[free] = np.arange(n, dtype=np.int32)
         # By blocks of two rows, of which there are a ninth: column × rows + row, in the order of the columns.
         keys = [np.arange(rows) * (rows + 1)]
-        keys += [
-            (family[:, None, :].astype(np.int64) * rows + family[:, :, None]).reshape(-1) for family in (*cells, *also)
-        ]
+        keys += [(term[:, None, :].astype(np.int64) * rows + term[:, :, None]).reshape(-1) for term in (*cells, *also)]
         blocks = _different(np.concatenate(keys))
         of_cells = [np.searchsorted(blocks, key) for key in keys]
         coupled = np.zeros(len(blocks), dtype=bool)
@@ -75,10 +73,10 @@ class Pattern:
             coupled[block] = True
         places = self._places(number, blocks // max(rows, 1), blocks % max(rows, 1), coupled)
         self.slots = []
-        for family, block in zip(cells, of_cells[1 : 1 + len(cells)], strict=True):
-            arity = family.shape[1]
-            slots = places[block].reshape(len(family), arity, arity, 3, 3).transpose(0, 1, 4, 2, 3)
-            self.slots.append(np.ascontiguousarray(slots).reshape(len(family), 9 * arity**2))
+        for term, block in zip(cells, of_cells[1 : 1 + len(cells)], strict=True):
+            arity = term.shape[1]
+            slots = places[block].reshape(len(term), arity, arity, 3, 3).transpose(0, 1, 4, 2, 3)
+            self.slots.append(np.ascontiguousarray(slots).reshape(len(term), 9 * arity**2))
         self.diagonal = places[of_cells[0]][:, range(3), range(3)].ravel()[free]
 
     def _places(self, number, column, row, coupled):
@@ -122,14 +120,14 @@ class Pattern:
         return self.indices[self.upper], starts.astype(np.int32)
 
     def assemble(self, blocks):
-        """Values of the pattern from one array of blocks (cells, 3 arity, 3 arity) per family."""
+        """Values of the pattern from one array of blocks (cells, 3 arity, 3 arity) per term."""
         values = np.zeros(len(self.indices))
         for block, slots in zip(blocks, self.slots, strict=True):
             _scatter(block, slots, values)
         return values
 
     def assemble_one(self, number, blocks):
-        """Values of the pattern from the blocks of one family, by its number."""
+        """Values of the pattern from the blocks of one term, by its number."""
         values = np.zeros(len(self.indices))
         _scatter(np.ascontiguousarray(blocks), self.slots[number], values)
         return values

@@ -20,7 +20,7 @@ def at_rest(system):
     """
     refuse_broken(system.net)
     waiting = [body.row for body in system.net.bodies if not body.fixed]
-    if not waiting and all(family.at_rest for family in system.families):
+    if not waiting and all(term.timing.at_rest for term in system.terms):
         return system
     _ = system.library  # both say what factorizes for either
     rest = copy.copy(system)
@@ -31,15 +31,15 @@ def at_rest(system):
     rest.supported[system.rows - system.net.spins :] = True
     if system.carriers:
         rest.carriers, rest.carried = system.carriers.waiting(system.net), np.zeros_like(system.carried)
-    rest.families = []
-    for family in system.families:
-        if not family.at_rest:
+    rest.terms = []
+    for term in system.terms:
+        if not term.timing.at_rest:
             continue
-        felt = ~np.isin(family.cells, waiting).any(axis=1)
+        felt = ~np.isin(term.cells, waiting).any(axis=1)
         if felt.all():
-            rest.families.append(family)
+            rest.terms.append(term)
         elif felt.any():
-            rest.families.append(replace(family, cells=family.cells[felt], data=family.data[felt]))
+            rest.terms.append(replace(term, cells=term.cells[felt], data=term.data[felt]))
     rest.arrange()
     return rest
 

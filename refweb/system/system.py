@@ -1,6 +1,6 @@
 """The sum of effects: M v' = f(t, x, v), x' = v, with supports eliminated.
 
-A `System` concatenates the families of its effects once and has the interface of one of them: force, energy, stiffness.
+A `System` concatenates the terms of its effects once and has the interface of one of them: force, energy, stiffness.
 ``x`` is the displacement of each row from its reference position, shape (rows, 3); a solver sees only the system.
 
 Where effects prescribe natural lengths, the numbers of the lines are a function of time, `System.line_data`: every
@@ -18,9 +18,10 @@ from functools import cached_property
 
 import numpy as np
 
-from ..effects.base import BreakLimits, Constraint, Family, LineDrive, PrescribedMotion
+from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, ForceTerm, PrescribedMotion
+from ..effects.elasticity import length_force
+from ..effects.natural_lengths import NaturalLengths, set_lengths
 from ..findings import Finding
-from ..net.net import LENGTH
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
 from .forces import Forces, PerCell
@@ -43,12 +44,10 @@ class System:
 
     Attributes
     ----------
-    families : list of refweb.effects.base.Family
+    terms : list of refweb.effects.base.ForceTerm
         One per effect that adds forces.
     drives : list of refweb.effects.base.Drive
         One per effect that prescribes motion; its rows are supported as well.
-    line_drives : list of refweb.effects.base.LineDrive
-        One per effect that prescribes natural lengths.
     constraints : list of refweb.effects.base.Constraint
         One per effect that keeps distances; no force of the system holds them.
     weakness : refweb.effects.base.Weakness or None
@@ -71,12 +70,11 @@ class System:
             if hasattr(effect, "on"):
                 part = effect.on(net)
                 acting += part if isinstance(part, list) else [part]
-        self.families = [a for a in acting if isinstance(a, Family)]
-        self.line_drives = [a for a in acting if isinstance(a, LineDrive)]
+        self.terms = [a for a in acting if isinstance(a, ForceTerm)]
         self.drives = [a for a in acting if isinstance(a, PrescribedMotion)]
         self.constraints = [a for a in acting if isinstance(a, Constraint)]
         self.weakness = next((a for a in acting if isinstance(a, BreakLimits)), None)
-        if sum(family.lines and family.power is not None for family in self.families) > 1:
+        if sum(term.over_lines and term.balance.power is not None for term in self.terms) > 1:
             raise ValueError("the lines have one column for a power: two effects must not both be `lines` with a power")
         self.supported = np.vstack([supported, np.zeros((self.rows - len(supported), 3), dtype=bool)])
         for body in net.bodies:
@@ -130,13 +128,13 @@ class System:
 
     @property
     def lines(self):
-        """The `Family` of the lines by their law; None where they have no tension."""
-        return next((family for family in self.families if family.lines), None)
+        """The `ForceTerm` of the lines by their law; None where they have no tension."""
+        return next((term for term in self.terms if term.over_lines), None)
 
     @property
     def _in_tangent(self):
-        """Families with a stiffness or a damping: those of the pattern, in its order."""
-        return [f for f in self.families if f.stiffness is not None or f.damping is not None]
+        """Terms with a stiffness or a damping: those of the pattern, in its order."""
+        return [f for f in self.terms if f.tangent.stiffness is not None or f.velocity.damping is not None]
 
     @cached_property
     def pattern(self):
@@ -165,8 +163,8 @@ class System:
 
     @property
     def _lines_in_tangent(self):
-        """Number of the lines among the families of the pattern; None where they have no tension."""
-        return next((i for i, family in enumerate(self._in_tangent) if family.lines), None)
+        """Number of the lines among the terms of the pattern; None where they have no tension."""
+        return next((i for i, term in enumerate(self._in_tangent) if term.over_lines), None)
 
     @cached_property
     def unsupported_parts(self):
@@ -176,9 +174,15 @@ class System:
         return find_parts(self)
 
     def per_cell(self):
-        """`PerCell` of new arrays; those of families over the lines are one."""
-        lines = np.zeros((len(self.net.cells), max([2, *(f.observed for f in self.families if f.lines)])))
-        return PerCell([lines if f.lines else np.zeros((len(f.cells), f.observed)) for f in self.families], lines)
+        """`PerCell` of new arrays; those of terms over the lines are one."""
+        lines = np.zeros((len(self.net.cells), max([2, *(f.columns for f in self.terms if f.over_lines)])))
+        arrays = [lines if f.over_lines else np.zeros((len(f.cells), f.columns)) for f in self.terms]
+        return PerCell(arrays, lines, self.tension_column)
+
+    @property
+    def tension_column(self):
+        """Column of what the lines observe that has their whole tension."""
+        return DAMPED_TENSION if any(f.over_lines and f.balance.power is not None for f in self.terms) else TENSION
 
     def blocks(self):
         """New arrays for `stiffness` and `damping` to fill, shape (cells, 3 arity, 3 arity) each."""
@@ -187,62 +191,64 @@ class System:
 
     @property
     def working(self):
-        """Sign of each family: 1 if its power counts as work, −1 if its power is energy lost, else 0."""
+        """Sign of each term: 1 if its power counts as work, −1 if its power is energy lost, else 0."""
         signs = {"work": 1, "dissipated_energy": -1}
-        return np.array([signs[f.book] if f.power is not None else 0 for f in self.families], dtype=np.int64)
+        return np.array(
+            [signs[f.balance.column] if f.balance.power is not None else 0 for f in self.terms], dtype=np.int64
+        )
 
     @property
     def corners(self):
         """Times at which a table of time has a corner [s], increasing."""
-        times = [t for part in (*self.families, *self.drives, *self.line_drives) for t in part.times]
+        times = [t for term in self.terms for t in term.timing.times]
+        times += [t for drive in self.drives for t in drive.times]
+        times += [t for _, table in self.net.factors for t, _ in table]
         return np.unique(np.array(times, dtype=float))
 
+    @cached_property
+    def lengths(self):
+        """The `NaturalLengths` that change with time."""
+        return NaturalLengths.of(self.net)
+
     def line_data(self, t):
-        """`Net.line_data` with the natural lengths of time t, shape (elements, columns)."""
-        if not self.line_drives:
+        """`Net.line_data` with the natural lengths of time t."""
+        if not self.net.factors:
             return self.net.line_data
         known = self._at_time
         if known is None or known[0] != t:
             numbers = self.net.line_data.copy()
-            for d in self.line_drives:
-                d.kernel(t, numbers, d.cells, d.data)
+            set_lengths(t, self.lengths, numbers.matrix)
             self._at_time = known = t, numbers
         return known[1]
 
     def natural_length(self, t):
         """Natural length of each element at time t [m], shape (elements,)."""
-        return self.line_data(t)[:, LENGTH]
+        return self.line_data(t).natural_length
 
     def at(self, t):
         """The system as it stands at time t: its natural lengths are those of that time, and stay."""
-        if not self.line_drives:
+        if not self.net.factors:
             return self
         view = self.with_line_data(self.line_data(t))
-        view.line_drives = []
+        view.net = replace(view.net, factors=())
         return view
 
     def with_line_data(self, numbers):
-        """The same system with other numbers of its lines, of the shape of `Net.line_data`."""
+        """The same system with other numbers of its lines, a `refweb.net.line_data.LineData`."""
         changed = copy.copy(self)
         changed.net = replace(self.net, line_data=numbers)
-        changed.families = [replace(f, data=numbers) if f.lines else f for f in self.families]
         changed._at_time = None
+        changed.__dict__.pop("lengths", None)
         return changed
 
-    def _data(self, family, t):
-        return self.line_data(t) if family.lines else family.data
-
-    @cached_property
-    def length_force_kernel(self):
-        """Kernel of ∂E/∂L of each element, E the energy of the lines."""
-        from ..effects.elasticity import length_force
-
-        return length_force(self.net)
+    def data_of(self, term, t):
+        """Numbers of the cells of a term at time t, shape (cells, columns)."""
+        return self.line_data(t).matrix if term.over_lines else term.data
 
     def length_force(self, t, x):
         """∂E/∂L of each element [N], shape (elements,): with the change of L the work of reels."""
         force = np.empty(len(self.net.cells))
-        self.length_force_kernel(t, x, self.net.cells, self.line_data(t), force)
+        length_force(self.net)(t, x, self.net.cells, self.line_data(t).matrix, force)
         return force
 
     def drive(self, t, x, v=None):
@@ -260,23 +266,23 @@ class System:
     def forces(self, t, x, v=None, per_cell=None):
         """The `Forces` at displacement x and velocity v, by default at rest; written to a `per_cell`, where given."""
         v, per_cell = self._zero if v is None else v, self.per_cell() if per_cell is None else per_cell
-        f, lines = np.zeros((self.rows, 3)), self.line_data(t)
-        for family, out in zip(self.families, per_cell, strict=True):
-            family.force(t, x, v, f, family.cells, lines if family.lines else family.data, out)
+        f = np.zeros((self.rows, 3))
+        for term, out in zip(self.terms, per_cell, strict=True):
+            term.force(t, x, v, f, term.cells, self.data_of(term, t), out)
         if self.carriers:
             self.carriers.add_forces_to_bodies(x, f)
         return Forces(f, per_cell)
 
-    def force_of(self, family, t, x, v=None):
-        """Force on every row of one family [N]."""
-        f, out = np.zeros((self.rows, 3)), np.zeros((len(family.cells), max(family.observed, 2)))
-        family.force(t, x, self._zero if v is None else v, f, family.cells, self._data(family, t), out)
+    def force_of(self, term, t, x, v=None):
+        """Force on every row of one term [N]."""
+        f, out = np.zeros((self.rows, 3)), np.zeros((len(term.cells), max(term.columns, 2)))
+        term.force(t, x, self._zero if v is None else v, f, term.cells, self.data_of(term, t), out)
         return f
 
     def outer_force(self, t, x=None, v=None):
         """Force on every row [N] of all but what the net does to itself, by default on the web as it is, at rest."""
         x = self._zero if x is None else x
-        outer = [self.force_of(family, t, x, v) for family in self.families if not family.internal]
+        outer = [self.force_of(term, t, x, v) for term in self.terms if not term.balance.internal]
         return sum(outer, np.zeros((self.rows, 3)))
 
     @cached_property
@@ -302,30 +308,30 @@ class System:
         """Name of a row in messages: a node by its number, a body by its name."""
         return f"node {row}" if row < self.net.nodes else f'body "{row_names(self.net.bodies)[row - self.net.nodes]}"'
 
-    def energy_of(self, family, t, x):
-        """Energy of each cell of one family [J]."""
-        out = np.zeros(len(family.cells))
-        if family.energy is None:
+    def energy_of(self, term, t, x):
+        """Energy of each cell of one term [J]."""
+        out = np.zeros(len(term.cells))
+        if term.energy is None:
             return out
-        family.energy(t, x, family.cells, self._data(family, t), out)
+        term.energy(t, x, term.cells, self.data_of(term, t), out)
         return out
 
     def energy(self, t, x):
         """Total potential Π [J]: that of the lines and of all loads."""
-        return sum(self.energy_of(f, t, x).sum() for f in self.families)
+        return sum(self.energy_of(f, t, x).sum() for f in self.terms)
 
     def stiffness(self, t, x, v=None, definite=False, only=None, blocks=None):
         """Values of K = −∂f/∂x [N/m] in the fixed pattern.
 
-        ``definite`` leaves out what is negative; ``only`` are the families to take, by default all; ``blocks`` are
+        ``definite`` leaves out what is negative; ``only`` are the terms to take, by default all; ``blocks`` are
         `blocks` to write to, which a loop keeps.
         """
         v, blocks = self._zero if v is None else v, self.blocks() if blocks is None else blocks
-        for family, block in zip(self._in_tangent, blocks, strict=True):
-            if family.stiffness is None or not (only is None or family in only):
+        for term, block in zip(self._in_tangent, blocks, strict=True):
+            if term.tangent.stiffness is None or not (only is None or term in only):
                 block[:] = 0.0
             else:
-                family.stiffness(t, x, v, block, family.cells, self._data(family, t), definite)
+                term.tangent.stiffness(t, x, v, block, term.cells, self.data_of(term, t), definite)
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_stiffness(values, self, t, x, v, blocks)
@@ -334,7 +340,7 @@ class System:
     @property
     def symmetric(self):
         """True if K and C are symmetric."""
-        return all(f.symmetric for f in self.families) and not self.carried.any()
+        return all(f.tangent.symmetric for f in self.terms) and not self.carried.any()
 
     @cached_property
     def turning(self):
@@ -344,14 +350,14 @@ class System:
     @property
     def conservative(self):
         """True if every force has a potential."""
-        return self.symmetric and all(f.energy is not None for f in self.families)
+        return self.symmetric and all(f.energy is not None for f in self.terms)
 
     @property
     def dead(self):
         """True if the only internal forces are the tensions of the lines, and all others are dead loads."""
-        outer = [f for f in self.families if not f.internal]
-        inner = [f for f in self.families if f.internal]
-        return all(f.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
+        outer = [f for f in self.terms if not f.balance.internal]
+        inner = [f for f in self.terms if f.balance.internal]
+        return all(f.tangent.stiffness is None and f.energy is not None for f in outer) and inner == [self.lines]
 
     @property
     def convex(self):
@@ -361,7 +367,7 @@ class System:
     @property
     def contact(self):
         """True if the web may touch bodies."""
-        return any(family.contact for family in self.families)
+        return any(term.contact.with_lines for term in self.terms)
 
     @cached_property
     def contact_forces(self):
@@ -372,26 +378,26 @@ class System:
 
     @property
     def rotating(self):
-        """Families of the forces of inertia in a frame that turns, none where none does."""
-        return [family for family in self.families if family.angular_velocity is not None]
+        """Terms of the forces of inertia in a frame that turns, none where none does."""
+        return [term for term in self.terms if term.frame.angular_velocity is not None]
 
     @property
     def orbit_radius(self):
         """Radius of the orbit that the web is in [m], None where it is in none."""
-        return next((f.orbit_radius for f in self.families if f.orbit_radius is not None), None)
+        return next((f.frame.orbit_radius for f in self.terms if f.frame.orbit_radius is not None), None)
 
     def damping(self, t, x, v, blocks=None):
         """Values of C = −∂f/∂v [N s/m] in the fixed pattern; None where no force depends on velocity.
 
         ``blocks`` are `blocks` to write to, which a loop keeps.
         """
-        if not any(f.damping is not None for f in self.families):
+        if not any(f.velocity.damping is not None for f in self.terms):
             return None
         blocks = self.blocks() if blocks is None else blocks
-        for family, block in zip(self._in_tangent, blocks, strict=True):
+        for term, block in zip(self._in_tangent, blocks, strict=True):
             block[:] = 0.0
-            if family.damping is not None:
-                family.damping(t, x, v, block, family.cells, self._data(family, t), False)
+            if term.velocity.damping is not None:
+                term.velocity.damping(t, x, v, block, term.cells, self.data_of(term, t), False)
         values = self.pattern.assemble(blocks)
         if self.carriers:
             self.carriers.add_damping(values, self, x, v, blocks)

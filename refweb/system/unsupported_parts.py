@@ -20,8 +20,8 @@ def find_parts(system, touching=True):
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    families = [f for f in system.families if touching or f.name not in ("contact", "self_contact")]
-    cells = [f.cells for f in families if f.cells.shape[1] > 1]
+    terms = [f for f in system.terms if touching or f.name not in ("contact", "self_contact")]
+    cells = [f.cells for f in terms if f.cells.shape[1] > 1]
     pairs = np.vstack([np.column_stack([c[:, 0], c[:, k]]) for c in cells for k in range(1, c.shape[1])])
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(system.rows, system.rows))
     count, part = connected_components(graph, directed=False)

@@ -936,7 +936,7 @@ def test_histories_do_not_depend_on_the_clock(monkeypatch):
             np.testing.assert_array_equal(other[name], column, err_msg=name)
     system = damped.build()
     watch = Watch(damped, system)
-    some = History.empty(100, len(watch.probes), system.families)
+    some = History.empty(100, len(watch.probes), system.terms)
     some.values[:] = np.random.default_rng(0).normal(size=some.values.shape)
     for first, last in ((0, 1), (1, 4), (4, 100)):
         np.testing.assert_array_equal(watch.table(some[first:last]), watch.table(some)[first:last])

@@ -12,7 +12,7 @@ from refweb.dynamics.integrators import momentum_balance
 from refweb.dynamics.integrators.momentum_balance import CLOSURE, allowed
 from refweb.dynamics.integrators.step_limits import StepLimits
 from refweb.effects import gravity
-from refweb.effects.base import Family
+from refweb.effects.base import Balance, ForceTerm
 from refweb.effects.time_tables import flattened, integrate, interpolate
 from refweb.errors import EnergyDriftError
 from refweb.kernels import FORCE, kernel
@@ -224,8 +224,8 @@ class Couple(refweb.Velocity):
     """Forces on two nodes across their distance, which call themselves internal."""
 
     def on(self, net):
-        own = dict(force=couple, book="work", observed=1, power=0, internal=True)
-        return Family(name="couple", cells=np.array([[0, 1]], dtype=np.int32), data=np.array([[0.1]]), **own)
+        cells, balance = np.array([[0, 1]], dtype=np.int32), Balance("work", power=0, internal=True)
+        return ForceTerm("couple", cells, np.array([[0.1]]), couple, balance)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -106,8 +106,8 @@ def test_contract(effects, seed):
         system.drive(0.0, x, v)
         return x, v
 
-    conservative = [family for family in system.families if family.energy is not None]
-    f = sum(system.force_of(family, 0.0, x, v) for family in conservative)
+    conservative = [term for term in system.terms if term.energy is not None]
+    f = sum(system.force_of(term, 0.0, x, v) for term in conservative)
     raw, (moved, rate) = f.copy(), (d.copy(), d.copy())
     for body in bodies:
         q = quaternion_rate(1.0 + x[body.turn, 0], *x[body.spin], d[body.spin])
@@ -119,7 +119,7 @@ def test_contract(effects, seed):
             f[body.spin] += np.cross(arm, raw[node])
             rate[node] = d[body.row] + np.cross(omega, arm)
     energy = lambda h: sum(  # noqa: E731
-        system.energy_of(family, 0.0, placed(x + h * moved)[0]).sum() for family in conservative
+        system.energy_of(term, 0.0, placed(x + h * moved)[0]).sum() for term in conservative
     )
     slope = (energy(1e-5) - energy(-1e-5)) / 2e-5
     work = np.delete(np.where(system.supported, 0.0, f * d), turns, axis=0).sum()

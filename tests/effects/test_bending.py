@@ -294,10 +294,10 @@ def test_every_end_takes_the_line_that_continues_it_best(web, expected):
 def test_stiffness_is_over_the_mean_length():
     points = [[0, 0, 0], [1, 0, 0], [4, 0, 0]]
     web = refweb.Inline(points=points, lines=[[0, 1], [1, 2]], natural_length=[1.5, 2.5], supports=[])
-    (family,) = System(
+    (term,) = System(
         discretisation.build(web.web(), bar()), [Bending(stiffness=3.0)], np.zeros((3, 3), dtype=bool)
-    ).families
-    np.testing.assert_array_equal(family.data[:, 0], [1.5])
+    ).terms
+    np.testing.assert_array_equal(term.data[:, 0], [1.5])
 
 
 def test_free_beam_keeps_momentum_and_energy():

@@ -38,14 +38,14 @@ CABLE = refweb.Cable(law="linear", modulus=1e3, area=1e-4, density=100.0)
 
 
 def system(one, other, held=False, more=(), **contact):
-    """Two bodies that overlap, and nothing but their contact: each family a system of its own."""
+    """Two bodies that overlap, and nothing but their contact: each term a system of its own."""
     bodies = [
         refweb.Body(name="a", mass=1.0, position=(0, 0, 0), **SHAPES[one]),
         refweb.Body(name="b", **(dict(fixed=True) if held else dict(mass=2.0)), position=(0.5, 0, 0), **SHAPES[other]),
     ]
     net = discretisation.build(FAR, CABLE)
     whole = System(net, [*bodies, *more, refweb.Contact(between_bodies=True, **contact)], np.zeros((2, 3), dtype=bool))
-    own = [family for family in whole.families if family.pairs or family.cells.shape[1] == 6]
+    own = [term for term in whole.terms if term.contact.pairs or term.cells.shape[1] == 6]
     return [System(whole.net, [SimpleNamespace(on=lambda _, f=f: f)], whole.supported[:2]) for f in own]
 
 

@@ -47,7 +47,7 @@ class Kick:
         self.x, self.v = state(system, seed)
         self.h = float(10.0 ** np.random.default_rng(seed).uniform(-4, -1))
         solved = Solved(system, self.x, self.v, self.h)
-        self.families, self.contacts, self.sweeps = solved.families, solved.contacts, solved.sweeps
+        self.terms, self.contacts, self.sweeps = solved.terms, solved.contacts, solved.sweeps
         self.own, self.after, self.mean, self.power = solved.forces, solved.after, solved.mean, solved.power
         self.rows = solved.rows
 
@@ -87,7 +87,7 @@ def test_forces_of_contact_are_those_of_the_law(loss, column):
     for seed in range(60):
         own = {"ball": {loss: 0.3, "slip_velocity": 1.0}}
         kick = Kick(seed, refweb.Contact(stiffness=1e3, bodies=own))
-        (family,), contacts = kick.families, kick.contacts
+        (term,), contacts = kick.terms, kick.contacts
         body = kick.system.net.bodies[1].row
         at_node = any(kick.rows(contact)[1] == body for contact in contacts)  # where lines that end there touch as one
         if at_node or not np.abs(kick.own).max() > 1e-6 or kick.sweeps > 200:
@@ -96,11 +96,11 @@ def test_forces_of_contact_are_those_of_the_law(loss, column):
         for contact in contacts:
             theta, cell = contact["theta"][column], slice(contact["cell"], contact["cell"] + 1)
             seen = (1.0 - theta) * kick.v + theta * kick.after
-            where = family.cells[cell], family.data[cell]
-            family.force(0.0, kick.x, seen, total, *where, np.zeros((1, family.observed)))
+            where = term.cells[cell], term.data[cell]
+            term.force(0.0, kick.x, seen, total, *where, np.zeros((1, term.columns)))
         kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-8 * np.abs(kick.own).max())
-        found += bool(np.isin(family.cells[contacts["cell"], :2], kick.system.net.carried).any())
+        found += bool(np.isin(term.cells[contacts["cell"], :2], kick.system.net.carried).any())
     assert found > 10  # with a node that a body carries
 
 
@@ -111,14 +111,14 @@ def test_friction_of_lines_is_that_of_the_law():
         kick = Kick(seed, refweb.SelfContact(radius=0.1, stiffness=1e3, friction=0.5, slip_velocity=1.0))
         if not len(kick.contacts) or kick.sweeps > 200:
             continue
-        (family,), total = kick.families, np.zeros_like(kick.v)
+        (term,), total = kick.terms, np.zeros_like(kick.v)
         for contact in kick.contacts:
             theta, cell = contact["theta"][1], slice(contact["cell"], contact["cell"] + 1)
             seen = (1.0 - theta) * kick.v + theta * kick.after
-            family.force(0.0, kick.x, seen, total, family.cells[cell], family.data[cell], np.zeros((1, 1)))
+            term.force(0.0, kick.x, seen, total, term.cells[cell], term.data[cell], np.zeros((1, 1)))
         kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-8 * np.abs(kick.own).max())
-        found += bool(np.isin(family.cells[kick.contacts["cell"]], kick.system.net.carried).any())
+        found += bool(np.isin(term.cells[kick.contacts["cell"]], kick.system.net.carried).any())
     assert found > 10
 
 
@@ -127,8 +127,8 @@ def test_forces_of_drag_are_those_of_the_law():
     for seed in range(10):
         kick = Kick(seed, LOSSES["drag"])
         total = np.zeros_like(kick.v)
-        for one in kick.families:
-            one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), one.observed)))
+        for one in kick.terms:
+            one.force(0.0, kick.x, kick.mean, total, one.cells, one.data, np.zeros((len(one.cells), one.columns)))
         kick.system.carriers.add_forces_to_bodies(kick.x, total)
         np.testing.assert_allclose(total, kick.own, rtol=0, atol=1e-10 * np.abs(kick.own).max())
 

@@ -181,8 +181,8 @@ def test_energy_of_contact(shape, exponent):
     for a, b in web.points[web.lines] - [0.55, 0.5, 0.1]:
         deep = np.maximum(own_depth(shape, a + place * (b - a))[0], 0.0) ** (exponent + 1.0)
         own.append((window * deep).max() + (0.0 if shape == "sphere" else deep[0] + deep[-1]))
-    (family,) = [f for f in system.families if f.contact]
-    found = system.energy_of(family, 0.0, np.zeros((system.rows, 3)))
+    (term,) = [f for f in system.terms if f.contact.with_lines]
+    found = system.energy_of(term, 0.0, np.zeros((system.rows, 3)))
     expected = stiffness / (exponent + 1.0) * np.array(own)
     assert (expected > 0.0).sum() >= 4
     # Sampled places miss the largest by half a step of 1/1000, squared; the second derivatives are of order 10.
@@ -787,7 +787,7 @@ def test_a_ball_without_friction_keeps_its_spin():
     system = nets.system(nets.skew_web(), nets.skew_cable(), [ball, refweb.Contact(stiffness=1e3)], False)
     (body,) = system.net.bodies
     assert body.turn is None and tuple(system.initial_velocity()[body.spin]) == (0.0, 0.0, 1.0)
-    assert not any((family.cells == body.spin).any() for family in system.families)
+    assert not any((term.cells == body.spin).any() for term in system.terms)
 
 
 # Bounds of an explicit step

@@ -101,12 +101,12 @@ SHAPES = {
 
 
 def one_line(shape, order, exponent):
-    """(system, family of contact) of a line across a fixed body at the origin."""
+    """(system, term of contact) of a line across a fixed body at the origin."""
     web = refweb.Inline(points=[[-0.5, 0, 0], [0.5, 0, 0]], lines=[[0, 1]], supports=[]).web()
     body = refweb.Body(**{"name": "it", "shape": shape, "position": (0.0, 0.0, 0.0), "fixed": True, **SHAPES[shape]})
     cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1.0, order=order)
     system = nets.system(web, cable, [body, refweb.Contact(stiffness=1e3, exponent=exponent)], False)
-    return system, next(family for family in system.families if family.contact)
+    return system, next(term for term in system.terms if term.contact.with_lines)
 
 
 def deep_states(system, shape, count=25, seed=5):
@@ -121,10 +121,10 @@ def deep_states(system, shape, count=25, seed=5):
         yield x
 
 
-def force_of(system, family, x):
+def force_of(system, term, x):
     force = np.zeros_like(x)
-    out = np.zeros((len(family.cells), family.observed))
-    family.force(0.0, x, np.zeros_like(x), force, family.cells, family.data, out)
+    out = np.zeros((len(term.cells), term.columns))
+    term.force(0.0, x, np.zeros_like(x), force, term.cells, term.data, out)
     return force
 
 
@@ -134,23 +134,23 @@ def force_of(system, family, x):
 @pytest.mark.parametrize("shape", nets.some(SHAPES, 2))
 def test_force_is_minus_the_slope_of_energy_however_deep(shape, order, exponent):
     """Central differences along every coordinate of random lines through the body, and those of the force beside K."""
-    system, family = one_line(shape, order, exponent)
+    system, term = one_line(shape, order, exponent)
     step, touched, off = 1e-6, 0, []
     for x in deep_states(system, shape):
-        force = force_of(system, family, x)
+        force = force_of(system, term, x)
         size = np.abs(force).max()
         if size == 0.0:
             continue
         touched += 1
-        blocks = np.zeros((len(family.cells), *2 * (3 * family.cells.shape[1],)))
-        family.stiffness(0.0, x, np.zeros_like(x), blocks, family.cells, family.data, False)
-        rows = family.cells[0]
+        blocks = np.zeros((len(term.cells), *2 * (3 * term.cells.shape[1],)))
+        term.tangent.stiffness(0.0, x, np.zeros_like(x), blocks, term.cells, term.data, False)
+        rows = term.cells[0]
         for column, (row, axis) in enumerate([(row, axis) for row in rows for axis in range(3)]):
             d = np.zeros_like(x)
             d[row, axis] = step
-            ends = [system.energy_of(family, 0.0, x + sign * d).sum() for sign in (-1.0, 1.0)]
+            ends = [system.energy_of(term, 0.0, x + sign * d).sum() for sign in (-1.0, 1.0)]
             assert abs((ends[0] - ends[1]) / (2.0 * step) - force[row, axis]) < 1e-5 * size
-            change = (force_of(system, family, x - d) - force_of(system, family, x + d))[rows].ravel() / (2.0 * step)
+            change = (force_of(system, term, x - d) - force_of(system, term, x + d))[rows].ravel() / (2.0 * step)
             off.append(np.abs(change - blocks[0][:, column]).max() / np.abs(blocks).max())
     assert touched > 12
     # The tangent jumps where faces begin to share: a state within 1e-6 m of that is seldom among the random ones.
@@ -178,7 +178,7 @@ def over_an_edge(press, offset, solve, effects=(), **more):
 
 
 def depth_over_edge(first, second):
-    """Depth of a point that is so far below the two faces of the edge, by bisection over the family of its surfaces."""
+    """Depth of a point that is so far below the two faces of the edge, by bisection over the term of its surfaces."""
     r = 0.02 * SIZE
 
     def outside(t):

@@ -122,7 +122,7 @@ def test_steps_are_not_limited_by_drag():
     assert solution.solver["nsteps"] <= 404
     dry = swimming([refweb.Gravity(acceleration=(0.0, 0.0, -9.81))], duration=1.0).build()
     (_, body) = drag.on(dry.net)
-    assert body.bound is None and body.damping_bound is None
+    assert body.tangent.bound is None and body.velocity.bound is None
 
 
 def uniform(direction, velocity, **keys):

@@ -168,12 +168,12 @@ def test_no_equilibrium():
 # Work
 
 
-def work_around(system, family, path, count=64):
-    """∮ f · dx of a family along a smooth closed path x(s), s from 0 to 1, by the trapezoidal rule: exact for waves."""
+def work_around(system, term, path, count=64):
+    """∮ f · dx of a term along a smooth closed path x(s), s from 0 to 1, by the trapezoidal rule: exact for waves."""
     s, h, total = np.arange(count) / count, 1e-5, 0.0
     for place in s:
         rate = (path(place + h) - path(place - h)) / (2.0 * h)  # exact to h² (2π)³/6 = 4e-9
-        total += (system.force_of(family, 0.0, path(place)) * rate).sum() / count
+        total += (system.force_of(term, 0.0, path(place)) * rate).sum() / count
     return total
 
 
@@ -189,7 +189,7 @@ def test_work_of_pressure_on_an_open_line():
     def path(s):
         return np.array([np.zeros(3), circle(s, 0.5)])
 
-    np.testing.assert_allclose(work_around(system, system.families[1], path), -3.0 * np.pi * 0.25, rtol=1e-7)
+    np.testing.assert_allclose(work_around(system, system.terms[1], path), -3.0 * np.pi * 0.25, rtol=1e-7)
 
 
 def enclosed(net, x):
@@ -205,20 +205,20 @@ def enclosed(net, x):
 def test_pressure_in_a_loop_has_a_potential(order):
     """−p × the area within, whatever the shape: no work around a path, p × the growth of area between two shapes."""
     system = system_of(loop(7), cable(order=order), [refweb.Pressure(lines="all", normal=UP, value=3.0)], None, False)
-    net, family, rng = system.net, system.families[1], np.random.default_rng(0)
+    net, term, rng = system.net, system.terms[1], np.random.default_rng(0)
     one, other = (0.2 * rng.standard_normal(net.points.shape) for _ in range(2))
 
     def path(s):
         return one * np.cos(2.0 * np.pi * s) + other * np.sin(2.0 * np.pi * s)
 
-    scale = np.abs(system.force_of(family, 0.0, one)).sum()
-    assert abs(work_around(system, family, path)) < 1e-7 * scale
+    scale = np.abs(system.force_of(term, 0.0, one)).sum()
+    assert abs(work_around(system, term, path)) < 1e-7 * scale
     # The force is linear in x and the area quadratic: the mean of the ends is exact.
-    mean = 0.5 * (system.force_of(family, 0.0, one) + system.force_of(family, 0.0, other))
+    mean = 0.5 * (system.force_of(term, 0.0, one) + system.force_of(term, 0.0, other))
     growth = enclosed(net, other) - enclosed(net, one)
     np.testing.assert_allclose((mean * (other - one)).sum(), 3.0 * growth, atol=1e-13 * scale)
     # Round it, no net force, and no net moment about z.
-    force = system.force_of(family, 0.0, one)
+    force = system.force_of(term, 0.0, one)
     position = net.points + one
     turning = np.cross(position, force)[:, 2]
     assert np.abs(force.sum(axis=0)).max() < 1e-13 * scale and abs(turning.sum()) < 1e-13 * scale
@@ -233,7 +233,7 @@ def test_work_of_thrust():
         node = np.array([0.5 * np.sin(2.0 * np.pi * s), 0.0, 0.0])
         return np.array([node, node + circle(s, 1.0)])
 
-    np.testing.assert_allclose(work_around(system, system.families[1], path), np.pi * 3.0 * 0.5, rtol=1e-7)
+    np.testing.assert_allclose(work_around(system, system.terms[1], path), np.pi * 3.0 * 0.5, rtol=1e-7)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
@@ -243,20 +243,20 @@ def test_thrust_pulls_into_the_line(order):
     for node, line, along in [(0, 0, (1, 0, 0)), (1, 0, (-1, 0, 0)), (2, 1, (1, -1, 0)), (0, 2, (0, 1, 0))]:
         thrust = refweb.Thrust(node=node, line=line, force=2.0)
         system = system_of(web, cable(order=order, subdivide=2), [thrust])
-        force = system.force_of(system.families[1], 1.0, np.zeros((system.rows, 3)))
+        force = system.force_of(system.terms[1], 1.0, np.zeros((system.rows, 3)))
         np.testing.assert_allclose(force[node], 2.0 * np.array(along) / np.linalg.norm(along), atol=1e-15)
         assert np.count_nonzero(force.any(axis=1)) == 1
         if order == 3:
             continue  # rounding of its places leaves a direction in what follows
         together = -system.net.points  # all rows at one place
-        assert not system.force_of(system.families[1], 1.0, together).any()
-        assert not system.stiffness(1.0, together, only=system.families[1:]).any()
+        assert not system.force_of(system.terms[1], 1.0, together).any()
+        assert not system.stiffness(1.0, together, only=system.terms[1:]).any()
     # Curved, the tangent at the end and not the chord: a parabola y = s² through nodes of order 2.
     if order == 2:
         web = Web([[0, 0, 0], [1.0, 0, 0]], [[0, 1]])
         system = system_of(web, cable(order=2), [refweb.Thrust(node=1, line=0, force=1.0)])
         x = np.column_stack([np.zeros(3), system.net.points[:, 0] ** 2, np.zeros(3)])
-        force = system.force_of(system.families[1], 1.0, x)
+        force = system.force_of(system.terms[1], 1.0, x)
         np.testing.assert_allclose(force[1], -np.array([1.0, 2.0, 0.0]) / np.sqrt(5.0), atol=1e-15)
 
 
@@ -307,7 +307,7 @@ def exact():
     """Displacement of the unknowns at 0.01 s, by DOP853 at a tolerance of 1e-11, and the work by one more equation."""
     system = blown()
     free, mass = system.free, np.repeat(system.net.mass, 3)[system.free]
-    loads = [f for f in system.families if f.book == "work"]
+    loads = [f for f in system.terms if f.balance.column == "work"]
 
     def rate(t, y):
         x, v = np.zeros((system.rows, 3)), np.zeros((system.rows, 3))
@@ -376,15 +376,15 @@ def test_bounds_bound():
         refweb.Thrust(node=4, line=5, force=-3.0, factor=[(0.0, 0.0), (1.0, 2.0)]),
     ]
     rng, system = np.random.default_rng(0), system_of(nets.skew_web(), nets.skew_cable(), loads, None, False)
-    for family in system.families[1:]:
+    for term in system.terms[1:]:
         x = 0.05 * rng.standard_normal((system.rows, 3))
         rates = np.zeros(system.rows)
-        family.bound(0.0, 0.0, x, system.net.mass, rates, family.cells, family.data)
+        term.tangent.bound(0.0, 0.0, x, system.net.mass, rates, term.cells, term.data)
         for t in (0.0, 0.7, 1.0, 9.0):
-            blocks = np.empty((len(family.cells), 3 * family.cells.shape[1], 3 * family.cells.shape[1]))
-            family.stiffness(t, x, x, blocks, family.cells, family.data, False)
+            blocks = np.empty((len(term.cells), 3 * term.cells.shape[1], 3 * term.cells.shape[1]))
+            term.tangent.stiffness(t, x, x, blocks, term.cells, term.data, False)
             sums = np.zeros((system.rows, 3))
-            for cell, block in zip(family.cells, blocks, strict=True):
+            for cell, block in zip(term.cells, blocks, strict=True):
                 sums[cell] += np.abs(block).sum(axis=1).reshape(-1, 3)
             assert (sums <= rates[:, None] * (1.0 + 1e-12)).all()
 
@@ -412,7 +412,7 @@ def test_groups_and_names():
     ]
     given = scene(effects)
     system = given.build()
-    force = sum(system.force_of(f, 1.0, np.zeros((4, 3))) for f in system.families[1:])
+    force = sum(system.force_of(f, 1.0, np.zeros((4, 3))) for f in system.terms[1:])
     np.testing.assert_allclose(force, [[0, -1, 0], [0, -1 + 0.5, 0], [0, 1, 0], [0, 1, 0]], atol=1e-15)
     text = given.to_dict()
     assert refweb.Scene.from_dict(text).to_dict() == text

@@ -136,7 +136,7 @@ def test_limit_of_a_net():
     net = discretisation.build(web, cable)
     across = (axis @ axis) * np.eye(3) - np.outer(axis, axis)
     stiff, free = np.zeros((6, 6)), [1, 3, 4, 5]
-    for (i, j), axial, length in zip(web.lines, net.line_data[:, 1], web.natural_length, strict=True):
+    for (i, j), axial, length in zip(web.lines, net.line_data.ea, web.natural_length, strict=True):
         stiff[np.ix_([i, j], [i, j])] += axial / length * np.array([[1, -1], [-1, 1]])
     held = np.kron(stiff[np.ix_(free, free)], np.eye(3))
     taken = np.kron(np.diag(net.mass[free]), across)
@@ -193,7 +193,7 @@ def test_newton_and_relaxation_agree():
     np.testing.assert_allclose(relaxed.tension, newton.tension, rtol=0, atol=1e-8 * newton.tension.max())
     with_ball = turning(web, cable("tension-only"), 8.0, [*effects, ball, refweb.Contact(stiffness=1e5)], web.rim)
     (newton,), (relaxed,) = (solve(with_ball, [1.0]) for solve in (load_steps.solve, relaxation.solve))
-    assert sum(with_ball.energy_of(f, 1.0, newton.x).sum() for f in with_ball.families if f.contact) > 0.0
+    assert sum(with_ball.energy_of(f, 1.0, newton.x).sum() for f in with_ball.terms if f.contact.with_lines) > 0.0
     np.testing.assert_allclose(relaxed.tension, newton.tension, rtol=0, atol=1e-8 * newton.tension.max())
 
 

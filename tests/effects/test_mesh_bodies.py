@@ -28,12 +28,12 @@ def files(tmp_path_factory):
 
 
 def one_line(file, order=1, **contact):
-    """(system, family of contact) of a line of 1 m across a fixed body at the origin."""
+    """(system, term of contact) of a line of 1 m across a fixed body at the origin."""
     web = refweb.Inline(points=[[-0.5, 0, 0], [0.5, 0, 0]], lines=[[0, 1]], supports=[]).web()
     body = refweb.Body(name="it", shape="mesh", file=file, position=(0.0, 0.0, 0.0), axes=AXES, fixed=True)
     cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1.0, order=order)
     system = nets.system(web, cable, [body, refweb.Contact(**{"stiffness": 1e3, **contact})], False)
-    return system, next(family for family in system.families if family.contact)
+    return system, next(term for term in system.terms if term.contact.with_lines)
 
 
 def deep_states(system, count, seed=5):
@@ -47,9 +47,9 @@ def deep_states(system, count, seed=5):
         yield x
 
 
-def force_of(family, x):
-    force, out = np.zeros_like(x), np.zeros((len(family.cells), family.observed))
-    family.force(0.0, x, np.zeros_like(x), force, family.cells, family.data, out)
+def force_of(term, x):
+    force, out = np.zeros_like(x), np.zeros((len(term.cells), term.columns))
+    term.force(0.0, x, np.zeros_like(x), force, term.cells, term.data, out)
     return force
 
 
@@ -58,23 +58,23 @@ def force_of(family, x):
 @pytest.mark.parametrize("name", ["ell", "torus"])
 def test_force_is_minus_the_slope_of_energy(files, name, order, exponent):
     """However deep, with several places on an element, and the stiffness is that of the force."""
-    system, family = one_line(files[name], order, exponent=exponent)
+    system, term = one_line(files[name], order, exponent=exponent)
     step, touched = 1e-6, 0
     for x in deep_states(system, 30):
-        force = force_of(family, x)
+        force = force_of(term, x)
         if not force.any():
             continue
         touched += 1
-        blocks = np.zeros((1, *2 * (3 * family.cells.shape[1],)))
-        family.stiffness(0.0, x, np.zeros_like(x), blocks, family.cells, family.data, False)
+        blocks = np.zeros((1, *2 * (3 * term.cells.shape[1],)))
+        term.tangent.stiffness(0.0, x, np.zeros_like(x), blocks, term.cells, term.data, False)
         np.testing.assert_allclose(blocks[0], blocks[0].T, rtol=0, atol=1e-9 * np.abs(blocks).max())
         np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * np.abs(force).max())
-        for column, (row, axis) in enumerate([(row, axis) for row in family.cells[0] for axis in range(3)]):
+        for column, (row, axis) in enumerate([(row, axis) for row in term.cells[0] for axis in range(3)]):
             d = np.zeros_like(x)
             d[row, axis] = step
-            ends = [system.energy_of(family, 0.0, x + sign * d).sum() for sign in (-1.0, 1.0)]
+            ends = [system.energy_of(term, 0.0, x + sign * d).sum() for sign in (-1.0, 1.0)]
             assert abs((ends[0] - ends[1]) / (2.0 * step) - force[row, axis]) < 1e-5 * np.abs(force).max()
-            change = (force_of(family, x - d) - force_of(family, x + d))[family.cells[0]].ravel() / (2.0 * step)
+            change = (force_of(term, x - d) - force_of(term, x + d))[term.cells[0]].ravel() / (2.0 * step)
             assert np.abs(change - blocks[0][:, column]).max() < 1e-4 * np.abs(blocks).max()
     assert touched > 10
 
@@ -86,7 +86,7 @@ def test_energy_nowhere_jumps(files, name):
     Work is summed by trapezia of 1/1500 of a way, which leave some 1e-3 at kinks of the force; a jump would stay as the
     parts shrink.
     """
-    system, family = one_line(files[name])
+    system, term = one_line(files[name])
     rng, left, several = np.random.default_rng(1), [], 0
     for x in deep_states(system, 12, seed=9):
         d = np.zeros_like(x)
@@ -94,8 +94,8 @@ def test_energy_nowhere_jumps(files, name):
 
         def along(low, high, parts, x=x, d=d):
             at = np.linspace(low, high, parts + 1)
-            energy = np.array([system.energy_of(family, 0.0, x + s * d).sum() for s in at])
-            power = np.array([(force_of(family, x + s * d) * d).sum() for s in at])
+            energy = np.array([system.energy_of(term, 0.0, x + s * d).sum() for s in at])
+            power = np.array([(force_of(term, x + s * d) * d).sum() for s in at])
             return at, energy, np.diff(energy) + 0.5 * (power[1:] + power[:-1]) * np.diff(at)
 
         at, energy, off = along(0.0, 1.0, 500)
@@ -275,13 +275,13 @@ def test_shares_of_losses_are_those_of_the_rise():
 def test_friction_on_a_mesh_takes_energy(files):
     """In all states of random slip; what is lost is the power of the force that is felt."""
     system, _ = one_line(files["ell"], friction=0.4, damping=0.5, slip_velocity=0.1)
-    family = next(family for family in system.families if family.power is not None)
+    term = next(term for term in system.terms if term.balance.power is not None)
     rng, touched = np.random.default_rng(4), 0
     for x in deep_states(system, 30):
         v = rng.standard_normal(x.shape)
         v[system.net.bodies[0].row] = 0.0
-        force, out = np.zeros_like(x), np.zeros((1, family.observed))
-        family.force(0.0, x, v, force, family.cells, family.data, out)
+        force, out = np.zeros_like(x), np.zeros((1, term.columns))
+        term.force(0.0, x, v, force, term.cells, term.data, out)
         assert out[0, 0] <= 0.0 and (force * v).sum() == pytest.approx(out[0, 0], abs=1e-12 * np.abs(force).max())
         touched += out[0, 0] < 0.0
     assert touched > 10

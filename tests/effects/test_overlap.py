@@ -314,12 +314,12 @@ def test_pushes_along_a_line_are_as_told(overlap, radius):
     body = refweb.Body(position=(0.0, 0.0, 0.0), **own)
     cable = refweb.Cable(law="linear", modulus=1.0, area=1e-6, density=1.0)
     system = nets.system(web, cable, [body, refweb.Contact(stiffness=1.0 / overlap)], True)
-    (family,) = (one for one in system.families if one.contact)
+    (term,) = (one for one in system.terms if one.contact.with_lines)
 
     def pushed(place, height):
         x = np.zeros((system.rows, 3))
         x[: system.net.nodes] = place, 0.0, height
-        return system.force_of(family, 0.0, x)[: system.net.nodes].sum(axis=0)
+        return system.force_of(term, 0.0, x)[: system.net.nodes].sum(axis=0)
 
     slope = []
     for place in places + 0.1:

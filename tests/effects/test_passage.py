@@ -46,7 +46,7 @@ def depths(body, places):
 
 
 def pushing(system):
-    return next(family for family in system.families if family.passing is not None)
+    return next(term for term in system.terms if term.contact.passing is not None)
 
 
 def at(system, ends):
@@ -70,13 +70,13 @@ def test_middles_are_deeper_than_what_nothing_comes_to(shape):
 def test_lines_are_hardly_deeper_than_what_is_shown(shape, exponent):
     """By (p + 2)/(p + 1) at most, whatever the shape, of 301 places of a line; of a sphere not at all."""
     system = one_line(refweb.Body(name="it", position=(0, 0, 0), fixed=True, **SHAPES[shape]), exponent).build()
-    family, body, rng, largest = pushing(system), system.net.bodies[0], np.random.default_rng(1), 0.0
-    most, shown = limits_of(family, system.net.bodies)
+    term, body, rng, largest = pushing(system), system.net.bodies[0], np.random.default_rng(1), 0.0
+    most, shown = limits_of(term, system.net.bodies)
     assert most == MIDDLE * body.thickness and shown == (1.0 if shape == "sphere" else SHOWN)
     for _ in range(150):
         ends = rng.standard_normal((2, 3)) * 0.7 * body.extent
-        x, out = at(system, ends), np.zeros((1, family.observed))
-        family.force(0.0, x, 0 * x, np.zeros_like(x), family.cells, family.data, out)
+        x, out = at(system, ends), np.zeros((1, term.columns))
+        term.force(0.0, x, 0 * x, np.zeros_like(x), term.cells, term.data, out)
         share = np.linspace(0.0, 1.0, 301)[:, None]
         deep = depths(body, (1 - share) * ends[0] + share * ends[1]).max()
         if deep > 1e-3:
@@ -91,7 +91,7 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
     What is said to come there does, but for the way itself.
     """
     system = one_line(refweb.Body(name="it", position=(0, 0, 0), fixed=True, **SHAPES[shape])).build()
-    family, body, rng, seen = pushing(system), system.net.bodies[0], np.random.default_rng(2), [0, 0]
+    term, body, rng, seen = pushing(system), system.net.bodies[0], np.random.default_rng(2), [0, 0]
     most, still, met = MIDDLE * body.thickness, np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
     inverse = np.ones((system.rows, 3))
     for _ in range(60):
@@ -99,7 +99,7 @@ def test_drifts_that_come_to_the_middle_are_seen(shape):
         x, v, f = at(system, ends), still.copy(), still.copy()
         v[:2], f[:2] = way / 0.1 - 2.0 * way, 4.0 * way  # (v + ½ f) · 0.1 is the way
         v[:3], f[:3] = v[:3] + rng.standard_normal(3), f[:3] + 10.0 * rng.standard_normal(3)  # of line and body alike
-        found = family.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, family.cells, family.data, met)
+        found = term.contact.passing(0.0, 0.0, 0.5, 0.1, x, v, f, inverse, term.cells, term.data, met)
         share, deep = np.linspace(0.0, 1.0, 201)[:, None], -np.inf
         for part in np.linspace(0.0, 1.0, 41):
             first, last = ends + part * way

@@ -66,7 +66,7 @@ class Kick:
         self.v = np.where(system.supported, 0.0, 10.0 ** rng.uniform(-3, 1) * rng.standard_normal(shown))
         self.h = float(10.0 ** rng.uniform(-5, -1))
         self.f = loaded * 10.0 * rng.standard_normal(shown)
-        (self.family,) = (one for one in system.families if one.rubbing is not None)
+        (self.term,) = (one for one in system.terms if one.velocity.implicit is not None)
         solved = Solved(system, self.x, self.v, self.h, self.f, self.mass)
         self.contacts, self.rows, self.sweeps = solved.contacts, solved.rows, solved.sweeps
         self.own, self.after, self.mean = solved.forces, solved.after, solved.mean
@@ -75,7 +75,7 @@ class Kick:
     def by_law(self, column):
         """The forces of all contacts as the law has them at the velocities that each sees, with its own θ."""
         total = np.zeros_like(self.f)
-        for n, rows in enumerate(self.family.cells):
+        for n, rows in enumerate(self.term.cells):
             own = self.contacts["cell"] == n
             at_node = [
                 self.rows(contact)[1] == rows[2] and self.rows(contact)[0] in rows[:2] for contact in self.contacts
@@ -83,8 +83,8 @@ class Kick:
             for contact in self.contacts[own if own.any() else at_node]:  # lines that end at a node touch there as one
                 theta = contact["theta"][column]
                 seen = (1.0 - theta) * self.v + theta * self.after
-                one = self.family.cells[n : n + 1], self.family.data[n : n + 1], np.zeros((1, CONTACT_COLUMNS))
-                self.family.force(0.0, self.x, seen, total, *one)
+                one = self.term.cells[n : n + 1], self.term.data[n : n + 1], np.zeros((1, CONTACT_COLUMNS))
+                self.term.force(0.0, self.x, seen, total, *one)
         return total
 
 

@@ -461,14 +461,14 @@ def test_what_ends_with_an_element():
     x, v = 0.02 * rng.uniform(-1, 1, (whole.rows, 3)), rng.uniform(-1, 1, (whole.rows, 3))
     x[-2:], v[-2:] = 0.0, 0.0
     torn, held = tear(whole, 0.0, x, v, np.arange(4))
-    acting = {family.name for family in whole.families if np.abs(whole.force_of(family, 0.0, x, v)).max() > 0.0}
+    acting = {term.name for term in whole.terms if np.abs(whole.force_of(term, 0.0, x, v)).max() > 0.0}
     assert acting == {"elasticity", "contact", "bending", "drag", "damping", "pressure", "thrust"}
-    for family in torn.families:
-        if family.name != "drag" or family.cells.shape[1] > 1:  # of bodies it stays
-            assert not torn.force_of(family, 0.0, x, v)[: net.nodes].any(), family.name
-        cells = torn.stiffness(0.0, x, v, only=[family])
-        assert not np.abs(cells).max(initial=0.0) > 0.0 or family.name == "drag", family.name
-    before, after = (sum(s.energy_of(f, 0.0, x).sum() for f in s.families) for s in (whole, torn))
+    for term in torn.terms:
+        if term.name != "drag" or term.cells.shape[1] > 1:  # of bodies it stays
+            assert not torn.force_of(term, 0.0, x, v)[: net.nodes].any(), term.name
+        cells = torn.stiffness(0.0, x, v, only=[term])
+        assert not np.abs(cells).max(initial=0.0) > 0.0 or term.name == "drag", term.name
+    before, after = (sum(s.energy_of(f, 0.0, x).sum() for f in s.terms) for s in (whole, torn))
     np.testing.assert_allclose(after, before, rtol=1e-12)
     assert held.sum() == pytest.approx(before, rel=1e-12)
 

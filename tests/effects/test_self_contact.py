@@ -338,10 +338,10 @@ def test_what_is_near_along_the_net_does_not_touch():
     apart = [sorted(int(e) for e in row if e >= 0) for row in beside]
     gap = lambda a, b: 0.03 * (abs(a - b) - 1)  # noqa: E731
     assert apart == [[b for b in range(11) if abs(a - b) > 1 and gap(a, b) <= 0.1] for a in range(11)]
-    family = refweb.SelfContact(radius=0.05, stiffness=10.0).on(net)
+    term = refweb.SelfContact(radius=0.05, stiffness=10.0).on(net)
     f = np.zeros((12, 3))
-    family.force(0.0, 0.0 * f, 0.0 * f, f, family.cells, family.data, np.zeros((len(family.cells), 1)))
-    assert len(family.cells) and not f.any()
+    term.force(0.0, 0.0 * f, 0.0 * f, f, term.cells, term.data, np.zeros((len(term.cells), 1)))
+    assert len(term.cells) and not f.any()
 
 
 @pytest.mark.parametrize("radius, least, most", [(1e9, 2**0.5, 2**0.5), (1.0, 0.5**0.5 - 0.1, 1.0), (0.3, 0.1, 0.3)])
@@ -413,7 +413,7 @@ def test_pairs_that_are_found_give_the_same_run(monkeypatch):
     for limit in (20_000, 0):
         monkeypatch.setattr(table, "LISTED", limit)
         system, course, history = thrown(strings(damping=2.0, step_size=1e-5))
-        assert [family.finder is None for family in system.families][-1] == bool(limit)
+        assert [term.contact.finder is None for term in system.terms][-1] == bool(limit)
         runs.append((course.x, course.v, history.energies.sum(axis=1), course.work))
     for one, other in zip(*runs, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
@@ -424,7 +424,7 @@ def test_free_strings_keep_energy_and_momenta():
     drifts = []
     for finer in (1, 2, 4):
         system, course, history = thrown(strings(held=False, duration=0.008), safety=0.2 / finer)
-        stored = [family.book for family in system.families].index("self_contact_energy")
+        stored = [term.balance.column for term in system.terms].index("self_contact_energy")
         assert history.energies[:, stored].max() > 1e-5
         drifts.append(course.drift)
         mass, place = system.net.mass[:, None], system.net.points
@@ -820,8 +820,8 @@ def test_near_along_the_net_is_what_is_so_in_the_run(reels, pushed):
         solve=refweb.Dynamic(duration=0.12),
         accuracy=refweb.Accuracy(error="none"),
     )
-    family = next(family for family in scene.build().families if family.crossing is not None)
-    assert ([0, 1] in family.elements.tolist()) == pushed
+    term = next(term for term in scene.build().terms if term.contact.crossing is not None)
+    assert ([0, 1] in term.elements.numbers.tolist()) == pushed
 
 
 # Friction

@@ -198,4 +198,4 @@ def test_a_scene_is_read_and_written():
 )
 def test_refusals(table, message):
     with pytest.raises(InputError, match=message):
-        refweb.Temperature.read("[temperature]", table).on(nets.skew_net())
+        refweb.Temperature.read("[temperature]", table).extend(nets.skew_net())

@@ -37,8 +37,8 @@ def touching(effect, bodies=BODIES):
     return System(net, [*bodies, effect], np.zeros((len(net.points), 3), dtype=bool))
 
 
-def alone(system, family):
-    return System(system.net, [SimpleNamespace(on=lambda _: family)], np.zeros(system.net.points.shape, dtype=bool))
+def alone(system, term):
+    return System(system.net, [SimpleNamespace(on=lambda _: term)], np.zeros(system.net.points.shape, dtype=bool))
 
 
 def state(net, seed, near=0.05):
@@ -65,10 +65,10 @@ def test_contract(effect, seed):
     d = 0.1 * np.random.default_rng(seed + 100).standard_normal(x.shape)
     spins, turns = ([getattr(body, name) for body in bodies] for name in ("spin", "turn"))
     steps, linear = np.array([2e-3, 1e-3, 5e-4, 2.5e-4]), len(net.points) - net.spins
-    for family in system.families:
-        one = alone(system, family)
+    for term in system.terms:
+        one = alone(system, term)
         f = one.force(0.0, x, v)
-        if family.energy is not None:
+        if term.energy is not None:
             moved = d.copy()
             for body in bodies:
                 rate = quaternion_rate(1.0 + x[body.turn, 0], *x[body.spin], d[body.spin])
@@ -81,17 +81,17 @@ def test_contract(effect, seed):
             w = v.copy()
             w[spins] = [body.turning(x, v) for body in bodies]
             (out,), power = one.forces(0.0, x, v)[1], (f * w).sum()
-            expected = out[:, 0].sum() if family.power is not None else 0.0
+            expected = out[:, 0].sum() if term.balance.power is not None else 0.0
             assert power == pytest.approx(expected, rel=1e-12, abs=1e-13 * np.abs(f * w).sum()) and expected <= 0.0
         for dx, dv in ((d, 0.0 * d), (0.0 * d, d)):
-            if (family.damping if dv.any() else family.stiffness) is None:
+            if (term.velocity.damping if dv.any() else term.tangent.stiffness) is None:
                 continue
             values = one.stiffness(0.0, x, v) if dx.any() else one.damping(0.0, x, v)
             product = one.pattern.matrix(values) @ (dx + dv).ravel()[one.free]
             changes = [(one.force(0.0, x + h * dx, v + h * dv) - f).ravel()[one.free] for h in steps]
             left = [np.linalg.norm(change + h * product) for h, change in zip(steps, changes, strict=True)]
             assert abs(np.polyfit(np.log(steps), np.log(left), 1)[0] - 2.0) < 0.1 or left[-1] < 1e-6 * np.abs(f).sum()
-        if not family.internal:
+        if not term.balance.internal:
             continue
         size = np.abs(f).sum()
         moment = np.cross(net.points + x, f)[:linear].sum(axis=0) + f[spins].sum(axis=0)

@@ -127,26 +127,26 @@ PLACES = [
 def test_force_is_minus_the_slope_of_energy(body, place, exponent):
     scene = net_scene({**body, "position": place}, solve=STATIC, contact={"exponent": exponent})
     system = scene.build()
-    (family,) = [family for family in system.families if family.contact]
+    (term,) = [term for term in system.terms if term.contact.with_lines]
     rng = np.random.default_rng(3)
     x, v = 0.03 * rng.standard_normal((2, system.rows, 3))
-    force, out = np.zeros_like(x), np.zeros((len(family.cells), family.observed))
-    family.force(0.0, x, v, force, family.cells, family.data, out)
+    force, out = np.zeros_like(x), np.zeros((len(term.cells), term.columns))
+    term.force(0.0, x, v, force, term.cells, term.data, out)
     assert (out[:, 0] > 0.0).sum() >= 3
     np.testing.assert_allclose(force.sum(axis=0), 0.0, atol=1e-12 * np.abs(force).sum())
-    blocks = np.zeros((len(family.cells), *2 * (3 * family.cells.shape[1],)))
-    family.stiffness(0.0, x, v, blocks, family.cells, family.data, False)
+    blocks = np.zeros((len(term.cells), *2 * (3 * term.cells.shape[1],)))
+    term.tangent.stiffness(0.0, x, v, blocks, term.cells, term.data, False)
     for _ in range(5):
         d = rng.standard_normal(x.shape)
         step = 1e-6
-        ends = [system.energy_of(family, 0.0, x + h * d).sum() for h in (step, -step)]
+        ends = [system.energy_of(term, 0.0, x + h * d).sum() for h in (step, -step)]
         assert (ends[1] - ends[0]) / (2.0 * step) == pytest.approx(np.sum(force * d), rel=1e-6)
         product = np.zeros_like(x)
-        own = d[family.cells].reshape(len(family.cells), -1)
-        np.add.at(product, family.cells, np.einsum("cij,cj->ci", blocks, own).reshape(*family.cells.shape, 3))
+        own = d[term.cells].reshape(len(term.cells), -1)
+        np.add.at(product, term.cells, np.einsum("cij,cj->ci", blocks, own).reshape(*term.cells.shape, 3))
         change = np.zeros_like(x)
         for h in (step, -step):
-            family.force(0.0, x + h * d, v, moved := np.zeros_like(x), family.cells, family.data, out)
+            term.force(0.0, x + h * d, v, moved := np.zeros_like(x), term.cells, term.data, out)
             change += np.sign(h) * moved / (2.0 * step)
         np.testing.assert_allclose(change, -product, rtol=0, atol=2e-6 * np.abs(product).max())
 

@@ -10,7 +10,7 @@ import nets
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from test_contract import agrees, check_family, state
+from test_contract import agrees, check_term, state
 
 import refweb
 import refweb.effects
@@ -99,14 +99,14 @@ def test_it_keeps_what_every_effect_keeps(current, seed):
     """As `tests/test_contract.py` asks of those that refweb ships; its bound is above the row sums of its stiffness."""
     net, free = nets.skew_net("linear"), np.zeros((6, 3), dtype=bool)
     system = System(net, [current(lines=[0, "tie"], current=3.0, field=(1.0, -2.0, 0.5))], free)
-    (family,) = system.families
-    check_family(net, system, family, seed)
+    (term,) = system.terms
+    check_term(net, system, term, seed)
     (x, v), d = state(net, seed), state(net, seed + 100)[0]
     product = system.pattern.matrix(system.stiffness(0.0, x, v)) @ d.ravel()
     assert np.abs(product).max() > 0.1
     assert agrees(lambda h: (system.force(0.0, x + h * d) - system.force(0.0, x - h * d)).ravel(), -2.0 * product)
     rates = np.zeros(len(net.points))
-    family.bound(np.inf, 0.0, x, net.mass, rates, family.cells, family.data)
+    term.tangent.bound(np.inf, 0.0, x, net.mass, rates, term.cells, term.data)
     sums = np.abs(system.pattern.matrix(system.stiffness(0.0, x, v)).toarray()).sum(axis=1).reshape(-1, 3).max(axis=1)
     assert (sums <= rates * (1.0 + 1e-15)).all()
 

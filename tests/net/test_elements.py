@@ -240,8 +240,8 @@ def test_line_of_zero_length(law, start, moved):
 def test_lines_taken_together_pull_as_each_alone(law):
     """Four at once, and what is left of them: whatever their number, forces are those of the lines one by one."""
     net = skew_system(law)
-    force, x, none = net.families[0].force, displacement(3), np.zeros((6, 3))
-    cells, data = net.net.cells, net.net.line_data
+    force, x, none = net.terms[0].force, displacement(3), np.zeros((6, 3))
+    cells, data = net.net.cells, net.net.line_data.matrix
     assert len(cells) > 8
     for count in range(len(cells) + 1):
         together, alone, shown, one = none.copy(), none.copy(), np.zeros((count, 2)), np.zeros((1, 2))

@@ -257,8 +257,8 @@ def test_thrust_along_the_line_of_a_group():
     end = int(net.web.rim[0])
     (line,) = np.flatnonzero((net.web.lines == end).any(axis=1))
     for name in ("anchors", int(line)):
-        family = refweb.Thrust(node=end, line=name, force=1.0).on(net)
-        assert sorted(family.cells[0]) == sorted(net.web.lines[line])
+        term = refweb.Thrust(node=end, line=name, force=1.0).on(net)
+        assert sorted(term.cells[0]) == sorted(net.web.lines[line])
     centre = net.web.centre
     with pytest.raises(InputError, match=r'line = "anchors": 4 of its lines end at node \d+, must be one'):
         refweb.Thrust(node=centre, line="anchors", force=1.0).on(net)

@@ -153,24 +153,25 @@ def test_each_line_has_its_law(order):
         alone = made(refweb.Cable(law=law, **own, **given, groups={name: refweb.Group(area=2e-4) for name in groups}))
         here = of == law
         assert here.any()
-        for there, mine in zip(alone.families, mixed.families, strict=True):
+        for there, mine in zip(alone.terms, mixed.terms, strict=True):
             pairs = []
-            for family, system in ((there, alone), (mine, mixed)):
-                for block, kernel in zip(blocks, (family.stiffness, family.damping), strict=True):
+            for term, system in ((there, alone), (mine, mixed)):
+                data = system.data_of(term, 0.0)
+                for block, kernel in zip(blocks, (term.tangent.stiffness, term.velocity.damping), strict=True):
                     block[:] = 0.0
                     if kernel is not None:
-                        kernel(0.0, x, v, block, family.cells, family.data, False)
-                f, out = np.zeros_like(x), np.zeros((len(family.cells), 3))
-                family.force(0.0, x, v, f, family.cells, family.data, out)
+                        kernel(0.0, x, v, block, term.cells, data, False)
+                f, out = np.zeros_like(x), np.zeros((len(term.cells), 4))
+                term.force(0.0, x, v, f, term.cells, data, out)
                 f[:] = 0.0  # then of these lines alone
-                some = np.zeros((here.sum(), 3))
-                family.force(0.0, x, v, f, family.cells[here], family.data[here], some)
-                pairs.append([out[here], f, *blocks[:, here], system.energy_of(family, 0.0, x)[here]])
+                some = np.zeros((here.sum(), 4))
+                term.force(0.0, x, v, f, term.cells[here], data[here], some)
+                pairs.append([out[here], f, *blocks[:, here], system.energy_of(term, 0.0, x)[here]])
             for one, other in zip(*pairs, strict=True):
                 np.testing.assert_allclose(one, other, rtol=0, atol=SAME * abs(one).max())
         each = np.empty((2, len(of)))
         for values, system in zip(each, (alone, mixed), strict=True):
-            length_force(system.net)(0.0, x, system.net.cells, system.net.line_data, values)
+            length_force(system.net)(0.0, x, system.net.cells, system.net.line_data.matrix, values)
         np.testing.assert_allclose(*each[:, here], rtol=0, atol=SAME * abs(each).max())
         np.testing.assert_allclose(strains(alone.net, x), strains(mixed.net, x), rtol=SAME)
 
@@ -181,7 +182,7 @@ def test_one_law_by_groups_is_that_law():
     groups = {name: dict(law="linear") for name in ("rim", "anchors", "inner") if name in web.groups}
     by_groups = discretisation.build(web, refweb.Cable(modulus=1e5, area=1e-4, density=1.0, groups=groups))
     plain = discretisation.build(web, refweb.Cable(law="linear", modulus=1e5, area=1e-4, density=1.0))
-    assert by_groups.law == plain.law and by_groups.columns == plain.columns
+    assert by_groups.law == plain.law and by_groups.line_data.dtype == plain.line_data.dtype
     np.testing.assert_array_equal(by_groups.line_data, plain.line_data)
 
 

@@ -11,7 +11,7 @@ import pytest
 from nets import LAWS, skew_net
 
 import refweb
-from refweb.effects.base import CONTACT
+from refweb.effects.base import CONTACT, STRAIN
 from refweb.effects.elasticity import Elasticity
 from refweb.errors import InputError
 from refweb.registry import OBSERVABLES
@@ -76,9 +76,10 @@ def probed(observe, state):
     """(value, place) that the probe of an observable finds in a state."""
     system, found = state.system, observe.probe(state.system)
     force, shown = system.forces(0.0, state.x, state.v)
-    strained = np.column_stack([state.element_tension, state.element_strain])
+    strained = np.zeros((len(system.net.cells), 4))
+    strained[:, system.tension_column], strained[:, STRAIN] = state.element_tension, state.element_strain
     shared = {CONTACT: system.contact_forces.of(shown), **dict(enumerate(shown))}
-    rows, data = np.array(found.rows, dtype=np.int64), shared.get(found.family, found.data)
+    rows, data = np.array(found.rows, dtype=np.int64), shared.get(found.term, found.data)
     where = np.array([-1, PLACE])
     data = np.ascontiguousarray(data, dtype=float)
     value = found.kernel(0.0, state.x, state.v, force, strained, rows, data, where)
@@ -113,7 +114,7 @@ UNKNOWN = (
 def test_weights_make_the_energy_of_a_state_at_rest(name):
     for state in STATES[:-1]:
         system = state.system
-        energies = [0.0 if f.energy is None else system.energy_of(f, 0.0, state.x).sum() for f in system.families]
+        energies = [0.0 if f.energy is None else system.energy_of(f, 0.0, state.x).sum() for f in system.terms]
         (observe,) = tables(name)
         unknown = name in UNKNOWN
         expected = 0.0 if unknown else observe.value(state).value

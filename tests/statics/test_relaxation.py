@@ -75,7 +75,7 @@ def test_other_effects_in_load_steps(case, law):
         assert relaxed.step == newton.step and residual(system, relaxed) <= 1e-9
         np.testing.assert_allclose(relaxed.tension, newton.tension, rtol=0, atol=1e-8 * newton.tension.max())
         np.testing.assert_allclose(relaxed.x, newton.x, rtol=0, atol=1e-8 * np.abs(newton.x).max())
-    touching = [system.energy_of(f, 1.0, relaxed.x).sum() for f in system.families if f.contact]
+    touching = [system.energy_of(f, 1.0, relaxed.x).sum() for f in system.terms if f.contact.with_lines]
     assert (case == "fixed ball") == bool(touching) and all(energy > 0.0 for energy in touching)
 
 

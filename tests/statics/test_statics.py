@@ -338,8 +338,8 @@ def test_certificate_contains_the_solution_of_a_conic_solver(mesh, prestrain):
     (found,) = solve(net_system)
     net, free = net_system.net, net_system.free
     lines, unknowns = len(net.cells), len(free)
-    stiffness = net.line_data[:, 1] / net.natural_length
-    load = sum(net_system.force_of(f, 1.0, np.zeros_like(found.x)) for f in net_system.families if not f.internal)
+    stiffness = net.line_data.ea / net.natural_length
+    load = sum(net_system.force_of(f, 1.0, np.zeros_like(found.x)) for f in net_system.terms if not f.balance.internal)
     vector = net.points[net.cells[:, 1]] - net.points[net.cells[:, 0]]
     row, one = np.arange(lines), np.ones(lines)
     incidence = scipy.sparse.coo_array(
@@ -441,7 +441,7 @@ def test_the_gap_holds_the_rounding_of_positions():
         net_system = joined(points, [[0, 1]], None, [0], cable, Load(node=1, force=(0.0, 0.0, -weight)))
         (found,) = solve(net_system)
         with mpmath.workdps(60):
-            stiffness = mpmath.mpf(net_system.net.line_data[0, 1]) / mpmath.mpf(length)
+            stiffness = mpmath.mpf(net_system.net.line_data.ea[0]) / mpmath.mpf(length)
             off = -mpmath.mpf(float(found.x[1, 2])) - mpmath.mpf(float(weight)) / stiffness
             above = stiffness * off**2 / 2
         assert found.duality_bound.gap >= above, weight
@@ -623,7 +623,7 @@ def test_reactions_balance_loads_and_moments(mesh, prestrain):
     net_system = small_web(mesh, prestrain)
     (found,) = solve(net_system)
     state = State(net_system, 1.0, found.x)
-    load = sum(net_system.force_of(f, 1.0, found.x) for f in net_system.families if not f.internal)
+    load = sum(net_system.force_of(f, 1.0, found.x) for f in net_system.terms if not f.balance.internal)
     left = np.where(net_system.supported, 0.0, found.force)
     size = np.abs(state.reaction).sum() + np.abs(load).sum()
     reach = np.abs(state.position).max()

@@ -401,7 +401,8 @@ def test_wrong_input(monkeypatch):
 
 
 def _follower(system):
-    system.families[0] = replace(system.families[0], symmetric=False)
+    lines = system.terms[0]
+    system.terms[0] = replace(lines, tangent=lines.tangent._replace(symmetric=False))
     return system
 
 

@@ -76,8 +76,8 @@ def test_bending_of_two_lines_is_twice_that_of_one():
             web, nets.Cable(modulus=1e6, area=1e-4, density=1.0), [refweb.Bending(stiffness=stiffness)]
         )
         x = 0.1 * np.random.default_rng(0).standard_normal((4, 3))
-        family = next(family for family in system.families if family.name == "bending")
-        energies.append(system.energy_of(family, 0.0, x).sum())
+        term = next(term for term in system.terms if term.name == "bending")
+        energies.append(system.energy_of(term, 0.0, x).sum())
     np.testing.assert_allclose(energies[1], energies[0], rtol=1e-14)
 
 

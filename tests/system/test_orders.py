@@ -572,12 +572,12 @@ STIFFNESS = 1e3
 
 
 def touching(position, radius, order, subdivide, stiffness=STIFFNESS):
-    """System of the skew web and a fixed ball, and its family of contacts."""
+    """System of the skew web and a fixed ball, and its term of contacts."""
     ball = refweb.Body(name="ball", radius=radius, position=position, fixed=True)
     cable = finer(skew_cable("tension-only"), order, subdivide)
     web, contact = skew_web(), refweb.Contact(stiffness=stiffness)
     net_system = nets.system(web, cable, [ball, contact], supported=held_ends(web, cable))
-    return net_system, next(f for f in net_system.families if f.contact)
+    return net_system, next(f for f in net_system.terms if f.contact.with_lines)
 
 
 def segment_distance(a, b, c):
@@ -594,7 +594,7 @@ def test_contact_of_a_straight_line_is_one_at_any_division(ball, order, subdivid
     A ball that touches a line in its middle touches a node between two elements where their number is even.
     """
     centre, radius = np.array(BALLS[ball][0]), BALLS[ball][1]
-    net_system, family = touching(centre, radius, order, subdivide)
+    net_system, term = touching(centre, radius, order, subdivide)
     net, web = net_system.net, skew_web()
     x = np.zeros((net_system.rows, 3))
     x[: net.nodes] = affine(net.points[: net.nodes])
@@ -602,11 +602,11 @@ def test_contact_of_a_straight_line_is_one_at_any_division(ball, order, subdivid
     near = np.array([segment_distance(*position[line], centre) for line in web.lines])
     depth = np.maximum(radius - near, 0.0)
     assert depth.any()
-    by_line = np.bincount(net.line, net_system.energy_of(family, 0.0, x))
+    by_line = np.bincount(net.line, net_system.energy_of(term, 0.0, x))
     np.testing.assert_allclose(by_line, 0.5 * STIFFNESS * depth**2, rtol=0, atol=1e-12 * STIFFNESS)
-    out = net_system.forces(0.0, x)[1][net_system.families.index(family)][:, 0]
+    out = net_system.forces(0.0, x)[1][net_system.terms.index(term)][:, 0]
     np.testing.assert_allclose(np.bincount(net.line, out), depth, rtol=0, atol=1e-12)
-    force = net_system.force_of(family, 0.0, x)
+    force = net_system.force_of(term, 0.0, x)
     plain, first = touching(centre, radius, 1, 1)
     y = np.vstack([affine(web.points), np.zeros(3)])
     expected = plain.force_of(first, 0.0, y)
@@ -645,7 +645,7 @@ def test_contact_of_a_bent_line_is_at_its_nearest_point(seed, order, subdivide):
     """
     random = np.random.default_rng(seed)
     centre, radius = random.uniform([0.2, 0.2, -0.3], [0.8, 0.8, 0.4]), 0.6
-    net_system, family = touching(centre, radius, order, subdivide)
+    net_system, term = touching(centre, radius, order, subdivide)
     net = net_system.net
     x = np.zeros((net_system.rows, 3))
     x[: net.nodes] = random.uniform(-0.05, 0.05, (net.nodes, 3))
@@ -653,10 +653,10 @@ def test_contact_of_a_bent_line_is_at_its_nearest_point(seed, order, subdivide):
     found = [nearest_by_search(net, position, line, centre) for line in range(len(net.web.lines))]
     depth = np.maximum(radius - np.array([distance for distance, _ in found]), 0.0)
     assert np.count_nonzero(depth) > 3
-    by_line = np.bincount(net.line, net_system.energy_of(family, 0.0, x))
+    by_line = np.bincount(net.line, net_system.energy_of(term, 0.0, x))
     np.testing.assert_allclose(by_line, 0.5 * STIFFNESS * depth**2, rtol=0, atol=1e-11 * STIFFNESS)
     push = sum(STIFFNESS * d * np.array(vector) / distance for d, (distance, vector) in zip(depth, found, strict=True))
-    force = net_system.force_of(family, 0.0, x)
+    force = net_system.force_of(term, 0.0, x)
     np.testing.assert_allclose(force[: net.nodes].sum(axis=0), push, rtol=0, atol=1e-6 * STIFFNESS)
     np.testing.assert_allclose(force[net.nodes], -push, rtol=0, atol=1e-6 * STIFFNESS)
 

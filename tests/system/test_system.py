@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import refweb
+from refweb.effects.base import DAMPED_TENSION
 from refweb.effects.damping import Damping
 from refweb.effects.elasticity import Elasticity
 from refweb.system.system import System
@@ -55,7 +56,7 @@ def test_other_numbers_of_the_lines():
     """Forces of twice the stiffness are twice as large, whatever natural lengths do."""
     system, (x, _) = reeled(nets.skew_net("linear")), displaced()
     stiffer = system.net.line_data.copy()
-    stiffer[:, 1] *= 2.0
+    stiffer.ea *= 2.0
     for t in (0.0, 0.7):
         force = system.force(t, x)
         np.testing.assert_array_equal(system.with_line_data(stiffer).force(t, x), 2.0 * force)
@@ -63,7 +64,7 @@ def test_other_numbers_of_the_lines():
 
 
 def test_lines_by_name():
-    """Their family, and what they show per cell, wherever they stand among the effects."""
+    """Their term, and what they show per cell, wherever they stand among the effects."""
     net, (x, v) = nets.skew_net("linear"), displaced()
     weight = refweb.Gravity(acceleration=(0.0, 0.0, -9.81))
     for effects in ([Elasticity(), Damping(time=0.02), weight], [weight, Elasticity(), Damping(time=0.02)]):
@@ -72,7 +73,7 @@ def test_lines_by_name():
         seen = system.forces(0.0, x, v).per_cell
         place = effects.index(next(effect for effect in effects if isinstance(effect, Elasticity)))
         assert seen[place] is seen.lines and np.shares_memory(seen.tension, seen.lines)
-        np.testing.assert_array_equal(seen.tension, seen.lines[:, 0])
+        np.testing.assert_array_equal(seen.tension, seen.lines[:, DAMPED_TENSION])
     assert System(net, [weight], FREE).lines is None
 
 
@@ -80,24 +81,24 @@ def test_columns_of_two_effects():
     """A column that another effect has added before leaves damping its own."""
     net, (x, v) = nets.skew_net("linear"), displaced()
     other = net.with_column("other", np.arange(9.0))
-    assert other.columns[-1] == "other" and other.line_data[:, other.column("other")].tolist() == list(range(9))
+    assert other.line_data.dtype.names[-1] == "other" and other.line_data.other.tolist() == list(range(9))
     plain, beside = (System(one, [Elasticity(), Damping(time=0.02)], FREE) for one in (net, other))
     np.testing.assert_array_equal(beside.force(0.0, x, v), plain.force(0.0, x, v))
-    assert beside.net.column("damping_time") == plain.net.column("damping_time") + 1
+    assert beside.net.line_data.column("damping_time") == plain.net.line_data.column("damping_time") + 1
     with pytest.raises(ValueError, match="column other"):
         other.with_column("other", 1.0)
 
 
 def test_one_power_of_the_lines():
-    """Two families that would write their power to the same column of what the lines show."""
+    """Two terms that would write their power to the same column of what the lines show."""
 
     class Again(Damping):
         def extend(self, net):
             return net
 
         def on(self, net):
-            (family,) = super().on(net)
-            return [replace(family, name="again")]
+            (term,) = super().on(net)
+            return [replace(term, name="again")]
 
     with pytest.raises(ValueError, match="one column for a power"):
         System(nets.skew_net(), [Elasticity(), Damping(time=0.02), Again(time=0.02)], FREE)
@@ -125,8 +126,10 @@ def test_threads_share_a_system():
 
         return None if kernel is None else call
 
-    parts = ("force", "stiffness", "damping")
-    system.families = [replace(f, **{part: meeting(getattr(f, part)) for part in parts}) for f in system.families]
+    for n, term in enumerate(system.terms):
+        tangent = term.tangent._replace(stiffness=meeting(term.tangent.stiffness))
+        velocity = term.velocity._replace(damping=meeting(term.velocity.damping))
+        system.terms[n] = replace(term, force=meeting(term.force), tangent=tangent, velocity=velocity)
 
     def found(t, place):
         x = np.array([[0.0, 0.0, 0.0], np.subtract(place, [1.0, 0.0, 0.0])])

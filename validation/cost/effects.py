@@ -200,16 +200,16 @@ def of_pairs(scene, times=200):
     from refweb.effects.self_contact.search import near_pairs
 
     system = scene.build()
-    family = next(family for family in system.families if family.crossing is not None)
+    term = next(term for term in system.terms if term.contact.crossing is not None)
     numbers = []
     for x, skin in ((system.laid, 0.0), (system.laid * [1.0, 1.0, 3.0], 0.05)):
-        _, rows, data = near_pairs(skin, x, family.cells, family.data)
+        _, rows, data = near_pairs(skin, x, term.cells, term.data)
         out, force = np.zeros((len(rows), 1)), np.zeros_like(x)
         best = np.inf
         for _ in range(5):
             began = time.process_time()
             for _ in range(times):
-                family.force(0.0, x, force, force, rows, data, out)
+                term.force(0.0, x, force, force, rows, data, out)
             best = min(best, 1e9 * (time.process_time() - began) / (times * len(rows)))
         numbers.append((len(rows), int((out > 0.0).sum()), best))
     (pairs, touching, push), (_, none, apart) = numbers

@@ -31,7 +31,6 @@ import numpy as np
 
 from refweb.dynamics.simulation import Simulation
 from refweb.effects.contact.pair import AWAY, PENALTY, RADIUS
-from refweb.net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from refweb.scene import Scene
 from refweb.solution import Solution
 
@@ -234,7 +233,7 @@ def compiled(folder, name):
         return None
     source, library = pathlib.Path(folder) / f"{name}.c", pathlib.Path(folder) / f"{name}.so"
     source.write_text(LEAN if name == "lean" else SOURCE)
-    names = {"REFERENCE": REFERENCE, "LENGTH": LENGTH, "AXIAL": AXIAL_STIFFNESS}
+    names = {"REFERENCE": 6, "LENGTH": 0, "AXIAL": 1}  # see `refweb.net.line_data.FIELDS`
     names |= {"RADIUS": RADIUS, "PENALTY": PENALTY, "AWAY": AWAY}
     flags = [f"-D{name}={value}" for name, value in names.items()]
     command = [compiler, *FLAGS[name], "-shared", "-fPIC", *flags, "-o", library, source, "-lm"]
@@ -294,7 +293,7 @@ def address(array):
 def c_run(name, loop, system, counts, sizes):
     """CPU time of a C loop over the same steps, and its last displacement."""
     net, long, double = system.net, ctypes.c_long, ctypes.c_double
-    contact = next((f for f in system.families if f.contact), None)
+    contact = next((f for f in system.terms if f.contact.with_lines), None)
     x, v = np.zeros((system.rows, 3)), system.initial_velocity()
     f = system.force(0.0, x)
     inverse = np.where(system.supported, 0.0, 1.0 / net.mass[:, None])
@@ -303,8 +302,8 @@ def c_run(name, loop, system, counts, sizes):
     bodies = contact.data if contact else np.zeros((1, 8))
     if name == "lean":
         x += net.points
-        natural = net.line_data[:, LENGTH].copy()
-        stiffness = net.line_data[:, AXIAL_STIFFNESS] / natural
+        natural = net.line_data.natural_length.copy()
+        stiffness = net.line_data.ea / natural
         own = (
             address(stiffness), address(natural), long(pairs > 0), double(bodies[0, RADIUS]),
             double(bodies[0, PENALTY]),
@@ -313,7 +312,7 @@ def c_run(name, loop, system, counts, sizes):
         out, pressed, impulse = np.zeros((len(net.cells), 2)), np.zeros(max(pairs, 1)), np.zeros(3)
         held, peaks = np.flatnonzero(system.supported), np.zeros(3)
         own = (
-            address(net.line_data), long(net.line_data.shape[1]), address(out), long(pairs), address(touch),
+            address(net.line_data), long(net.line_data.matrix.shape[1]), address(out), long(pairs), address(touch),
             address(bodies), address(pressed), double(net.area[0]), address(peaks), long(len(held)), address(held),
             address(impulse),
         )  # fmt: skip

@@ -4,7 +4,6 @@ import numpy as np
 from scipy.integrate import trapezoid
 
 import refweb
-from refweb.net.net import AXIAL_STIFFNESS
 
 
 def tensions(solution):
@@ -52,12 +51,12 @@ STEP = 1e-6
 def pushes(state):
     """Force of contact on every row, by differences of its energy: what the force should be, whatever it is [N]."""
     system, force = state.system, np.zeros_like(state.x)
-    for family in (family for family in system.families if family.contact and family.energy is not None):
-        for row in np.unique(family.cells):
+    for term in (term for term in system.terms if term.contact.with_lines and term.energy is not None):
+        for row in np.unique(term.cells):
             for axis in range(3):
                 moved = np.zeros_like(state.x)
                 moved[row, axis] = STEP
-                ends = [system.energy_of(family, state.time, state.x + sign * moved).sum() for sign in (1.0, -1.0)]
+                ends = [system.energy_of(term, state.time, state.x + sign * moved).sum() for sign in (1.0, -1.0)]
                 force[row, axis] -= (ends[0] - ends[1]) / (2.0 * STEP)
     return force
 
@@ -80,7 +79,7 @@ def unbalanced(solution):
     # from, and lines of EA/L = k make a force of that
     first = np.linalg.norm(net.points[net.cells[:, 1]] - net.points[net.cells[:, 0]], axis=1)
     given = np.where(first == net.natural_length, 0.0, first)
-    stiffness = net.line_data[:, AXIAL_STIFFNESS] / net.natural_length
+    stiffness = net.line_data.ea / net.natural_length
     rounding = 1e7 * np.finfo(float).eps * (stiffness * (np.abs(state.x).max() + given)).max()
     scale = max(np.linalg.norm(outer, axis=1).max(), np.abs(force).max(), rounding)
     return np.linalg.norm(rest, axis=1).max() / scale if scale > 0 else 0.0

@@ -27,12 +27,12 @@ class FollowedPairs(Followed):
     """
 
     def __init__(self, system):
-        self._families, self._net = [family for family in system.families if family.pairs], system.net
+        self._terms, self._net = [term for term in system.terms if term.contact.pairs], system.net
 
     def soon(self, x, v):
         """Time in which no body comes much nearer to another from displacement x and velocity v [s]."""
         time = np.inf
-        for pair in (pair for family in self._families for pair in family.pairs):
+        for pair in (pair for term in self._terms for pair in term.contact.pairs):
             body_a, body_b = pair
             speed = np.linalg.norm(v[body_a.row] - v[body_b.row]) + sum(
                 body.extent * np.linalg.norm(body.turning(x, v)) for body in pair if body.turn is not None
@@ -43,17 +43,17 @@ class FollowedPairs(Followed):
 
     def inspect(self, course, piece, at):
         """Note in a course the first pair that may have met in a piece of a step."""
-        for family in self._families:
-            self._record(course, piece, at, PAIRS, family)
+        for term in self._terms:
+            self._record(course, piece, at, PAIRS, term)
 
     def _margin(self, bend):
         return bend
 
     def _met(self, looked_at, x, path, margin):
-        family, still = looked_at, np.zeros_like(x)
-        deep = np.zeros((len(family.cells), family.observed))
-        family.force(0.0, x, still, np.zeros_like(x), family.cells, family.data, deep)
-        for pair, (depth, *_) in zip(family.pairs, deep, strict=True):
+        term, still = looked_at, np.zeros_like(x)
+        deep = np.zeros((len(term.cells), term.columns))
+        term.force(0.0, x, still, np.zeros_like(x), term.cells, term.data, deep)
+        for pair, (depth, *_) in zip(term.contact.pairs, deep, strict=True):
             nearer = self._nearer(pair, path) + self._nearer(pair, margin)
             if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):
                 body_a, body_b = pair

@@ -53,7 +53,7 @@ from .vector_spread import spread_of
 
 if TYPE_CHECKING:
     from .neighbour_list import NeighbourList
-    from .records import Families, Model, Running
+    from .records import ForceTerms, Model, Running
 
 SHORTER = 0.25
 """Share of a step in which lines would meet that is tried next."""
@@ -75,8 +75,8 @@ class Ccd(Record):
 
     Attributes
     ----------
-    families, places : ndarray of int
-        The number of the family, none without; its place among those that act nearby.
+    terms, places : ndarray of int
+        The number of the term, none without; its place among those that act nearby.
     meets, watches : table
         Its kernels, see `refweb.effects.base.Crossing`.
     rows, data, due, chosen : table
@@ -89,7 +89,7 @@ class Ccd(Record):
         Way that rows may go until lines are looked at, and that which they have gone since they were [m].
     """
 
-    families: Integers
+    terms: Integers
     places: Integers
     meets: MeetsTable
     watches: WatchTable
@@ -104,10 +104,10 @@ class Ccd(Record):
     @classmethod
     def of(cls, system):
         """Make the record of a system."""
-        numbers = [i for i, family in enumerate(system.families) if family.crossing is not None]
-        crossings, near = [system.families[i].crossing for i in numbers], near_of(system)
+        numbers = [i for i, term in enumerate(system.terms) if term.contact.crossing is not None]
+        crossings, near = [system.terms[i].contact.crossing for i in numbers], near_of(system)
         return cls(
-            families=np.array(numbers, dtype=np.int64),
+            terms=np.array(numbers, dtype=np.int64),
             places=np.array([near.index(i) for i in numbers], dtype=np.int64),
             meets=Functions(MEETS, [crossing.meets for crossing in crossings]),
             watches=Functions(CCD_NEIGHBOURS, [crossing.watch for crossing in crossings]),
@@ -126,12 +126,12 @@ class BodyCcd(Record):
 
     Attributes
     ----------
-    families, places : ndarray of int
+    terms, places : ndarray of int
         As in `Ccd`.
     meets : table
         Kernels of `refweb.effects.contact.line_body_ccd`.
     limits : ndarray
-        Depth that nothing comes to of each family, at least [m].
+        Depth that nothing comes to of each term, at least [m].
     factors : ndarray
         Largest depth over what cells show, infinite where that is not known.
     met : ndarray of int, shape (4,)
@@ -140,7 +140,7 @@ class BodyCcd(Record):
         Way that is open to a drift which is not looked at before [m], 0 where it is; none where nothing is pushed.
     """
 
-    families: Integers
+    terms: Integers
     places: Integers
     meets: MeetsTable
     limits: Vector
@@ -151,16 +151,16 @@ class BodyCcd(Record):
     @classmethod
     def of(cls, system):
         """Those of a system."""
-        numbers = [i for i, family in enumerate(system.families) if family.passing is not None]
-        passing, near, limits = [system.families[i] for i in numbers], near_of(system), np.zeros((0, 2))
+        numbers = [i for i, term in enumerate(system.terms) if term.contact.passing is not None]
+        passing, near, limits = [system.terms[i] for i in numbers], near_of(system), np.zeros((0, 2))
         if numbers:
             from ...effects.contact.line_body_ccd import limits_of
 
-            limits = np.array([limits_of(family, system.net.bodies) for family in passing])
+            limits = np.array([limits_of(term, system.net.bodies) for term in passing])
         return cls(
-            families=np.array(numbers, dtype=np.int64),
+            terms=np.array(numbers, dtype=np.int64),
             places=np.array([near.index(i) for i in numbers], dtype=np.int64),
-            meets=Functions(MEETS, [family.passing for family in passing]),
+            meets=Functions(MEETS, [term.contact.passing for term in passing]),
             limits=np.ascontiguousarray(limits[:, 0]),
             factors=np.ascontiguousarray(limits[:, 1]),
             met=np.ones(4, dtype=np.int64),
@@ -193,7 +193,7 @@ def largest_of(kick, v, f, inverse, share):
 def look_anew(guard: Ccd) -> None:
     """Look at all lines when they come next: rows may be anywhere."""
     guard.left[:] = 0.0
-    for m in range(guard.families.size):
+    for m in range(guard.terms.size):
         guard.due[m][:] = 0.0
 
 
@@ -224,17 +224,17 @@ def open_ahead(kick: float, drift: float, model: Model, running: Running) -> boo
 
 @kernel(forceinline=True)
 def near_cells(path, i, index, model):
-    """(Cells, data) of a family that may touch on a way [m]: those that are looked at, or all."""
-    skin, families = model.nearby.skin[0], model.families
+    """(Cells, data) of a term that may touch on a way [m]: those that are looked at, or all."""
+    skin, terms = model.nearby.skin[0], model.terms
     if path > skin.depth - skin.used:
-        source = len(families.data) - model.nearby.families.size + index  # see `refweb.dynamics.integrators.records`
-        return families.cells[source], families.data[source]
-    return families.cells[i], families.data[i]
+        source = len(terms.data) - model.nearby.terms.size + index  # see `refweb.dynamics.integrators.records`
+        return terms.cells[source], terms.data[source]
+    return terms.cells[i], terms.data[i]
 
 
 @kernel(leaf=True, forceinline=True)
 def deepest_of(depths):
-    """Largest of what a family shows, 0 where that is nothing."""
+    """Largest of what a term shows, 0 where that is nothing."""
     deep = 0.0
     for c in range(depths.shape[0]):
         deep = max(deep, depths[c, 0])
@@ -242,11 +242,11 @@ def deepest_of(depths):
 
 
 @kernel(leaf=True, apart=("walls",))
-def calm(walls: BodyCcd, nearby: NeighbourList, families: Families) -> bool:
+def calm(walls: BodyCcd, nearby: NeighbourList, terms: ForceTerms) -> bool:
     """Tell if a drift behind another needs no check before, for bodies alone that do not turn."""
     skin, left = nearby.skin[0], math.inf
-    for m in range(walls.families.size):
-        deep = deepest_of(families.outs[walls.families[m]])
+    for m in range(walls.terms.size):
+        deep = deepest_of(terms.outs[walls.terms[m]])
         left = min(left, walls.limits[m] - (walls.factors[m] * deep if deep > 0.0 else 0.0))
     walls.left[0] = left if skin.steps > 0 and CALM * skin.last < left else 0.0
     return walls.left[0] > 0.0
@@ -256,8 +256,8 @@ def calm(walls: BodyCcd, nearby: NeighbourList, families: Families) -> bool:
 def look_back_at_bodies(time: float, model: Model, running: Running) -> None:
     """Note lines that may have come to the middle of a body in a drift that was not looked at before, from its end."""
     walls, x, v, f, skin = model.walls, running.x, running.v, running.f, model.nearby.skin[0]
-    for m in range(walls.families.size):
-        cells, data = near_cells(math.inf, walls.families[m], walls.places[m], model)
+    for m in range(walls.terms.size):
+        cells, data = near_cells(math.inf, walls.terms[m], walls.places[m], model)
         if walls.meets[m](skin.last, 0.0, 0.0, 0.0, x, v, f, model.inertia.inverse, cells, data, walls.met):
             note_met(THROUGH, time, walls.met, running.crossings)
 
@@ -279,8 +279,8 @@ def passes(time, kick, drift, stages, model, running):
     if goes_freely(model):
         if open_ahead(kick, drift, model, running):
             return False
-    elif stages + model.guard.families.size + model.inertia.turns.moment.size == 0:
-        if calm(model.walls, model.nearby, model.families):
+    elif stages + model.guard.terms.size + model.inertia.turns.moment.size == 0:
+        if calm(model.walls, model.nearby, model.terms):
             return False
     return comes_through(time, kick, drift, TOLD if stages else KEPT_APART, model, running)
 
@@ -288,7 +288,7 @@ def passes(time, kick, drift, stages, model, running):
 @kernel(forceinline=True)
 def reject_step(time, h, model, running):
     """Tell if a step of several drifts, of size h, must not begin."""
-    if model.guard.families.size + model.walls.families.size == 0:
+    if model.guard.terms.size + model.walls.terms.size == 0:
         return False
     return comes_through(time, 0.5 * h, h, FORESEEN, model, running)
 
@@ -307,7 +307,7 @@ def comes_through(time: float, kick: float, drift: float, then: int, model: Mode
     if not path < math.inf:
         return False
     came = passes_lines(time, path, kick, drift, then, model, running) if touch > 0.0 else False
-    if model.walls.families.size:
+    if model.walls.terms.size:
         came = passes_bodies(time, path, kick, drift, then, model, running) or came
     if came:
         running.clock[0].rejected, left[0] = 1, 0.0
@@ -319,11 +319,11 @@ def passes_lines(
     time: float, path: float, kick: float, drift: float, then: int, model: Model, running: Running
 ) -> bool:
     """Tell if lines that push each other would meet; where the drift is taken, find the free distance behind it."""
-    guard, families, x, v, f, came = model.guard, model.families, running.x, running.v, running.f, False
+    guard, terms, x, v, f, came = model.guard, model.terms, running.x, running.v, running.f, False
     inverse, left = model.inertia.inverse, math.inf
-    for m in range(guard.families.size):
-        i, due = guard.families[m], guard.due[m]
-        margin = guard.touch - deepest_of(families.outs[i]) - path
+    for m in range(guard.terms.size):
+        i, due = guard.terms[m], guard.due[m]
+        margin = guard.touch - deepest_of(terms.outs[i]) - path
         if not margin > 0.0:
             cells, data = near_cells(path - guard.touch, i, guard.places[m], model)
             if guard.meets[m](0.0, path, kick, drift, x, v, f, inverse, cells, data, guard.met):
@@ -347,16 +347,16 @@ def passes_bodies(
     time: float, path: float, kick: float, drift: float, then: int, model: Model, running: Running
 ) -> bool:
     """Tell if lines would come as deep in a body as its middle."""
-    walls, families, x, v, f, came = model.walls, model.families, running.x, running.v, running.f, False
+    walls, terms, x, v, f, came = model.walls, model.terms, running.x, running.v, running.f, False
     inverse, margin = model.inertia.inverse, 0.0
     if model.inertia.turns.moment.size:
         margin = beside_places(kick, drift, x, v, f, inverse, model.inertia.turns)
     walls.met[3] = 1
-    for m in range(walls.families.size):
-        i = walls.families[m]
-        deep = deepest_of(families.outs[i])
+    for m in range(walls.terms.size):
+        i = walls.terms[m]
+        deep = deepest_of(terms.outs[i])
         left = walls.limits[m] - (walls.factors[m] * deep if deep > 0.0 else 0.0) - path - margin
-        if model.guard.families.size:
+        if model.guard.terms.size:
             model.guard.left[0] = 0.0 if model.inertia.turns.moment.size else min(model.guard.left[0], left)
         if left > 0.0:
             continue

@@ -124,7 +124,9 @@ class CentralDifference(Integrator):
         self.prepare()
         rest = np.zeros((self.system.rows, 3))
         x = rest if x is None else x
-        return safe_step.call(0.0, np.inf, len(self._model.reels.lengths) > 0, float(reach), 0.0, x, rest, self._model)
+        return safe_step.call(
+            0.0, np.inf, len(self._model.lengths.elements) > 0, float(reach), 0.0, x, rest, self._model
+        )
 
     def steps_in(self, spans):
         """Number of steps in each of some spans of time [s] that a row or a corner ends, by the bound of the start."""
@@ -161,7 +163,7 @@ class CentralDifference(Integrator):
         system.drive(0.0, x, v)
         signs, sums = self._observed.signs, self._observed.sums
         extremes = Extremes.at_start(np.zeros(len(signs)), np.full(len(signs), -1))
-        work, total = np.zeros(len(system.families) + 1), np.zeros(len(system.families) + 3)
+        work, total = np.zeros(len(system.terms) + 1), np.zeros(len(system.terms) + 3)
         where = np.zeros(2, dtype=np.int64)
         begin.call(x, v, force, where, self._model, self._observed, extremes, work, total)
         first = len(signs) - len(sums)
@@ -173,7 +175,7 @@ class CentralDifference(Integrator):
         extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
         averages = begin_averages(self._observed.windows, extremes)
         extremes.recent[:, 2] = extremes.values
-        per_family = np.delete(total[:-2], np.flatnonzero(system.working > 0))
+        per_term = np.delete(total[:-2], np.flatnonzero(system.working > 0))
         ledger = MomentumBalance.empty()
         open_balance.call(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
         return ExplicitState(
@@ -185,10 +187,10 @@ class CentralDifference(Integrator):
             work=work,
             ledger=ledger,
             averages=averages,
-            energy=per_family.sum(),
-            largest=max(np.abs(per_family).sum(), self._least_energy),
+            energy=per_term.sum(),
+            largest=max(np.abs(per_term).sum(), self._least_energy),
             force=force,
-            power=np.zeros(len(system.families)),
+            power=np.zeros(len(system.terms)),
         )
 
     def save(self, course):
@@ -196,7 +198,7 @@ class CentralDifference(Integrator):
         return course.arrays()
 
     def load(self, arrays):
-        """The `ExplicitState` of a checkpoint; families show what they do there."""
+        """The `ExplicitState` of a checkpoint; terms show what they do there."""
         self.prepare()
         course, self._taken = ExplicitState.of_arrays(arrays), None
         self.system.forces(course.time, course.x, course.v, self._outs)
@@ -235,7 +237,7 @@ class CentralDifference(Integrator):
         for name in SHARED:
             clock[name] = getattr(course, name)
         clock["least_energy"] = self._least_energy
-        changing = len(self._model.reels.lengths)
+        changing = len(self._model.lengths.elements)
         state = (course.x, course.v, course.force, course.before, course.work, course.impulse, course.ledger)
         carried = course.power, np.zeros((2, changing)), course.crossings, *self._contacts
         return Running(clock, *state, course.extremes, course.events, course.averages, *carried)
@@ -247,13 +249,13 @@ class CentralDifference(Integrator):
         names node, line and time.
         """
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        history = History.empty(len(times), len(self.observed[0]), self.system.families)
-        work = len(self.drifts) * sum(len(family.cells) for family in self.system.families)
+        history = History.empty(len(times), len(self.observed[0]), self.system.terms)
+        work = len(self.drifts) * sum(len(term.cells) for term in self.system.terms)
         done, breath = 0, max(BREATH // max(work, 1), 1)
         running = self._running(course)
         records = self._scheme, self._model, self._observed, running, Workspace.of(self._model, running)
         clock = running.clock
-        if len(self._model.guard.families) or len(self._model.walls.families):
+        if len(self._model.guard.terms) or len(self._model.walls.terms):
             look_anew.call(self._model.guard)
         if self._taken != (id(course), course.nsteps):
             forget(self._model, course.nsteps > 0)
@@ -280,7 +282,7 @@ class CentralDifference(Integrator):
             look_at_all(self.system, self._model)
             self._taken = id(course), int(clock[0]["nsteps"])
             nearby = self._model.nearby
-            followed = len(nearby.families) and len(self.drifts) == 1 and not self.system.carried.any()
+            followed = len(nearby.terms) and len(self.drifts) == 1 and not self.system.carried.any()
             course.longest = max(course.longest, float(nearby.skin[0]["longest"]) if followed else math.inf)
             nearby.skin["longest"] = 0.0
             for name in SHARED:
@@ -312,7 +314,7 @@ class CentralDifference(Integrator):
         def after(state, begun, count):
             state, running.clock["begun"] = state.copy(), begun
             copy = replace(running, x=state[0], v=state[1], f=state[2], events=course.events[:0])
-            changing, workspace = self._model.reels.lengths.size > 0, Workspace.of(model, copy)
+            changing, workspace = self._model.lengths.elements.size > 0, Workspace.of(model, copy)
             run_steps.call(count, float(course.step), changing, self._scheme, model, self._observed, copy, workspace)
             return state
 

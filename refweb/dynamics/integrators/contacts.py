@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...effects.base import FELT_COLUMNS
-from ...kernels import Indices, IntegerMatrix, Matrix, Record, kernel
-from ...system.contact_forces import CHOSEN, FAMILY, add_felt, forget
+from ...kernels import Indices, Matrix, Record, kernel
+from ...system.contact_forces import ContactTermArray, add_felt, forget
 from .neighbour_list import near_of
 
 if TYPE_CHECKING:
-    from .records import Families
+    from .records import ForceTerms
 
 
 class Contacts(Record):
-    """Families of contact with bodies, and what these feel.
+    """Terms of contact with bodies, and what these feel.
 
     Attributes
     ----------
-    families : ndarray of int
+    terms : ndarray of `refweb.system.contact_forces.CONTACT_TERM`
         See `refweb.system.contact_forces.ContactForces`.
     felt : ndarray, shape (rows, columns)
         What bodies feel.
@@ -30,7 +30,7 @@ class Contacts(Record):
         Numbers of chosen cells, where all are looked at.
     """
 
-    families: IntegerMatrix
+    terms: ContactTermArray
     felt: Matrix
     first: int
     none: Indices
@@ -39,27 +39,27 @@ class Contacts(Record):
     def of(cls, system):
         """Those of a system; numbers of cells that are near stand as `refweb.dynamics.integrators.records` says."""
         forces, near = system.contact_forces, near_of(system)
-        families = forces.families.copy()
-        for known in families:
-            if known[FAMILY] in near:
-                known[CHOSEN] = len(system.families) + len(near) + near.index(known[FAMILY])
-        return cls(families, np.zeros((forces.rows, FELT_COLUMNS)), forces.first, np.empty((0, 1), dtype=np.int32))
+        terms = forces.terms.copy()
+        for term in terms:
+            if term["number"] in near:
+                term["chosen"] = len(system.terms) + len(near) + near.index(term["number"])
+        return cls(terms, np.zeros((forces.rows, FELT_COLUMNS)), forces.first, np.empty((0, 1), dtype=np.int32))
 
 
 @kernel(leaf=True)
-def feel(contacts, families):
-    """Write what bodies feel where families show what they do, where there is contact with any."""
-    if contacts.families.shape[0]:
-        sum_contacts(contacts, families)
+def feel(contacts, terms):
+    """Write what bodies feel where terms show what they do, where there is contact with any."""
+    if contacts.terms.shape[0]:
+        sum_contacts(contacts, terms)
 
 
 @kernel(leaf=True, apart=("contacts",))
-def sum_contacts(contacts: Contacts, families: Families) -> None:
-    """Write what bodies feel where families show what they do."""
+def sum_contacts(contacts: Contacts, terms: ForceTerms) -> None:
+    """Write what bodies feel where terms show what they do."""
     forget(contacts.felt)
-    for m in range(contacts.families.shape[0]):
-        known = contacts.families[m]
-        i, chosen = known[FAMILY], contacts.none
-        if known[CHOSEN] >= 0:
-            chosen = families.cells[known[CHOSEN]]
-        add_felt(contacts.first, known, families.cells[i], chosen, families.outs[i], contacts.felt)
+    for m in range(contacts.terms.shape[0]):
+        term = contacts.terms[m]
+        i, chosen = term.number, contacts.none
+        if term.chosen >= 0:
+            chosen = terms.cells[term.chosen]
+        add_felt(contacts.first, term, terms.cells[i], chosen, terms.outs[i], contacts.felt)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 from numba import types
 
+from ...effects.natural_lengths import set_lengths
 from ...kernels import (
     MATRIX,
     Arrays,
@@ -45,7 +46,7 @@ from .extremes import (
     update_extreme,
 )
 from .neighbour_list import show_near
-from .step import add_forces, interpolate, interpolate_kicks, note_state, set_lengths
+from .step import add_forces, interpolate, interpolate_kicks, note_state
 
 if TYPE_CHECKING:
     from .monitors import Observed
@@ -76,10 +77,10 @@ class Inside(Record):
         Those of the run, with looks of their own.
     where : ndarray of int, shape (2,)
         Space for the place of a value.
-    total : ndarray, shape (families + 3,)
+    total : ndarray, shape (terms + 3,)
         Space for energies.
     losses : table
-        Space for what families show whose kicks are solved for.
+        Space for what terms show whose kicks are solved for.
     """
 
     before: Cube
@@ -113,10 +114,10 @@ def look_at_books(
     running: Running,
 ) -> bool:
     """Look for extremes of energies at the end of a step."""
-    families = model.families
+    terms = model.terms
     book_energies(
-        t, x, v, model.inertia.mass, model.inertia.turns, families.cells, families.data, families.energies,
-        families.stored, running.work, families.working, total,
+        t, x, v, model.inertia.mass, model.inertia.turns, terms.cells, terms.data, terms.energies,
+        terms.stored, running.work, terms.working, total,
     )  # fmt: skip
     return look_at_sums(t, total, observed, extremes, ending)
 
@@ -130,38 +131,38 @@ def book_within(
     Work there is that until ``now`` less what they still gain, where the motion is ``smooth``; else it stays: in a
     kick, a drift and a kick, energies between have an error of their own where something touches.
     """
-    families, mass, turns, last = model.families, model.inertia.mass, model.inertia.turns, 0.0
-    cells, data = families.cells, families.data
-    energies, stored, working = families.energies, families.stored, families.working
-    if smooth and families.powers.shape[0]:
+    terms, mass, turns, last = model.terms, model.inertia.mass, model.inertia.turns, 0.0
+    cells, data = terms.cells, terms.data
+    energies, stored, working = terms.energies, terms.stored, terms.working
+    if smooth and terms.powers.shape[0]:
         book_energies(
             now, running.x, running.v, mass, turns, cells, data, energies, stored, running.work, working, total
         )  # fmt: skip
         last = own_energy(total, working)
     book_energies(t, x, v, mass, turns, cells, data, energies, stored, running.work, working, total)
-    if smooth and families.powers.shape[0]:
+    if smooth and terms.powers.shape[0]:
         total[-2] -= last - own_energy(total, working)
 
 
 @kernel(apart=("looks",))
 def forces_at(t: float, x: Matrix, v: Matrix, f: Matrix, lines: Matrix, model: Model) -> None:
     """Write all forces at a state and a time to f, and what lines show; natural lengths become those of that time."""
-    families, motions = model.families, model.motions
-    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    terms, motions = model.terms, model.motions
+    forces, cells, data, outs = terms.forces, terms.cells, terms.data, terms.outs
     for i in range(len(motions.kernels)):
         motions.kernels[i](t, x, v, f, motions.cells[i], motions.data[i], motions.outs[i])
-    if model.reels.lengths.size:
-        set_lengths(t, model.reels, data[0])
+    if model.lengths.elements.size:
+        set_lengths(t, model.lengths, data[0])
     f[:] = 0.0
-    add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), families.still, forces, cells, data, outs)
-    for i in families.viscous:
-        forces[i](t, x, v, f, cells[i], data[i], outs[i])
-    for i in model.implicit_contacts.families:
+    add_forces(t, x, v, f, lines, (forces[0], cells[0], data[0]), terms.still, forces, cells, data, outs)
+    for i in terms.viscous:
+        forces[i](t, x, v, f, cells[i], data[i], lines if i == terms.line_damping else outs[i])
+    for i in model.implicit_contacts.terms:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)
-    if model.nearby.families.size:
-        show_near(model.nearby, families)
-    feel(model.contacts, families)
+    if model.nearby.terms.size:
+        show_near(model.nearby, terms)
+    feel(model.contacts, terms)
 
 
 @kernel(apart=("watched", "kicks"))
@@ -204,9 +205,9 @@ def state_within(
 
 @kernel(apart=("looks", "rubbing"))
 def exchange_losses(keeps: bool, inside: Inside, model: Model) -> None:
-    """Keep what families show whose kicks are solved for, which forces at other states write over, or show it again."""
-    for m in range(model.implicit_contacts.families.size):
-        values, kept = model.families.outs[model.implicit_contacts.families[m]], inside.losses[m]
+    """Keep what terms show whose kicks are solved for, which forces at other states write over, or show it again."""
+    for m in range(model.implicit_contacts.terms.size):
+        values, kept = model.terms.outs[model.implicit_contacts.terms[m]], inside.losses[m]
         for c in range(values.shape[0]):
             for k in range(values.shape[1]):
                 if keeps:
@@ -217,23 +218,23 @@ def exchange_losses(keeps: bool, inside: Inside, model: Model) -> None:
 
 @kernel(apart=("looks",))
 def show_again(now: float, inside: Inside, model: Model, observed: Observed, running: Running) -> None:
-    """Write natural lengths, and what families show that probes read, of the end of a step over that of its inside.
+    """Write natural lengths, and what terms show that probes read, of the end of a step over that of its inside.
 
     Losses that kicks are solved for are those of the step, see `exchange_losses`.
     """
-    families = model.families
-    if model.reels.lengths.size:
-        set_lengths(now, model.reels, families.data[0])
-    for i in observed.families:
-        if not among(model.implicit_contacts.families, i):
-            families.forces[i](
-                now, running.x, running.v, inside.state[2], families.cells[i], families.data[i], families.outs[i]
+    terms = model.terms
+    if model.lengths.elements.size:
+        set_lengths(now, model.lengths, terms.data[0])
+    for i in observed.terms:
+        if not among(model.implicit_contacts.terms, i):
+            terms.forces[i](
+                now, running.x, running.v, inside.state[2], terms.cells[i], terms.data[i], terms.outs[i]
             )  # fmt: skip
-    if model.implicit_contacts.families.size:
+    if model.implicit_contacts.terms.size:
         exchange_losses(False, inside, model)
-    if model.nearby.families.size:
-        show_near(model.nearby, families)
-    feel(model.contacts, families)
+    if model.nearby.terms.size:
+        show_near(model.nearby, terms)
+    feel(model.contacts, terms)
 
 
 @kernel(apart=("watched",))
@@ -294,7 +295,7 @@ def look_at_tops(
 def refine_extremes(inside: Inside, total: Vector, model: Model, observed: Observed, running: Running) -> None:
     """Look where parabolas turn back, in the last two steps."""
     extremes, last = running.extremes, -math.inf
-    if model.implicit_contacts.families.size:
+    if model.implicit_contacts.terms.size:
         exchange_losses(True, inside, model)
     before, at, now = extremes.looked[0], extremes.looked[1], extremes.looked[2]
     inverse, ends = model.inertia.inverse, inside.ends
@@ -338,7 +339,7 @@ def look_inside(
     """
     known_extremes, x, v = running.extremes, inside.state[0], inside.state[1]
     extremes = inside.alone if alone else known_extremes
-    if model.implicit_contacts.families.size:
+    if model.implicit_contacts.terms.size:
         exchange_losses(True, inside, model)
     if alone:
         copy_rows(known_extremes.recent, extremes.recent)
@@ -361,7 +362,7 @@ def look_inside(
 @kernel(apart=("driven",))
 def look_behind(model: Model, observed: Observed, running: Running, workspace: Workspace) -> None:
     """Look for extremes behind a corner of motion, where velocities have jumped."""
-    now, lines, where, total = running.clock[0].time, model.families.outs[0], workspace.where, workspace.total
+    now, lines, where, total = running.clock[0].time, model.terms.outs[0], workspace.where, workspace.total
     x, v, f, extremes = running.x, running.v, running.f, running.extremes
     begin_anew(extremes)
     if observed.followed.size + observed.windows.slots.size:

@@ -16,7 +16,7 @@ MOST = 3e7
 
 
 def source_of(system, places):
-    """(family, number of its cell) that leaves most energy open.
+    """(term, number of its cell) that leaves most energy open.
 
     Parameters
     ----------
@@ -25,31 +25,31 @@ def source_of(system, places):
     places : list of (float, ndarray of shape (rows, 3))
         Time [s] and displacement [m] at the ends of steps in turn.
     """
-    families = [f for f in system.families if f.energy is not None and f.book != "work"]
-    cells = sum(len(family.cells) for family in families)
+    terms = [f for f in system.terms if f.energy is not None and f.balance.column != "work"]
+    cells = sum(len(term.cells) for term in terms)
     steps = list(zip(places, places[1:], strict=False))[-max(int(MOST / max(cells, 1)), 1) :]
-    largest, source = -1.0, (system.families[0], 0)
-    for family in families:
-        left = np.zeros(len(family.cells))
+    largest, source = -1.0, (system.terms[0], 0)
+    for term in terms:
+        left = np.zeros(len(term.cells))
         for (t0, x0), (t1, x1) in steps:
             path = SHARE * (x1 - x0)
-            left += system.energy_of(family, t1, x1) - system.energy_of(family, t0, x0)
+            left += system.energy_of(term, t1, x1) - system.energy_of(term, t0, x0)
             for t, x in ((t0, x0), (t1, x1)):
-                rise = system.energy_of(family, t, x + path) - system.energy_of(family, t, x - path)
+                rise = system.energy_of(term, t, x + path) - system.energy_of(term, t, x - path)
                 left -= 0.25 / SHARE * rise
         if len(left) and np.abs(left).max() > largest:
             cell = int(np.abs(left).argmax())
-            largest, source = abs(left[cell]), (family, cell)
+            largest, source = abs(left[cell]), (term, cell)
     return source
 
 
-def name_of(system, family, cell):
-    """Name of the item that a cell of a family belongs to."""
-    if family.pairs:
-        return " and ".join(f'body "{body.name}"' for body in family.pairs[cell])
-    if family.lines or family.elements is not None:
-        lines = system.net.line[np.atleast_1d(cell if family.lines else family.elements[cell])].tolist()
+def name_of(system, term, cell):
+    """Name of the item that a cell of a term belongs to."""
+    if term.contact.pairs:
+        return " and ".join(f'body "{body.name}"' for body in term.contact.pairs[cell])
+    if term.over_lines or term.elements.numbers is not None:
+        lines = system.net.line[np.atleast_1d(cell if term.over_lines else term.elements.numbers[cell])].tolist()
         return f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} and {lines[1]}"
-    if family.cells.shape[1] > 1:
-        return f"line {system.net.line[np.isin(system.net.cells, family.cells[cell]).sum(axis=1).argmax()]}"
-    return system.row_name(family.cells[cell, 0])
+    if term.cells.shape[1] > 1:
+        return f"line {system.net.line[np.isin(system.net.cells, term.cells[cell]).sum(axis=1).argmax()]}"
+    return system.row_name(term.cells[cell, 0])

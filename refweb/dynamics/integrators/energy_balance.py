@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.line_kernels import NATURAL_LENGTH
+from ...effects.natural_lengths import NaturalLengths, set_lengths
 from ...errors import EnergyDriftError
 from ...kernels import (
     ENERGY,
     EnergyTable,
     IndexTable,
+    Indices,
     Integers,
     Matrix,
     MatrixTable,
@@ -24,11 +27,10 @@ from ...kernels import (
     kernel,
     sum_of,
 )
-from ...net.net import AXIAL_STIFFNESS, LENGTH
 from ...net.rotation import RigidRotations, more_kinetic
 
 if TYPE_CHECKING:
-    from .records import Families, Reels
+    from .records import ForceTerms, Model
 
 DRIFT = 1e-2
 """Largest energy drift of a run whose result is returned, over the largest energy of the whole run."""
@@ -44,7 +46,7 @@ def least_energy(net):
     A web at rest whose lines have exactly their natural length moves by its rounding alone, and books nothing else.
     """
     lines = net.line_data
-    return float(0.5 * (lines[:, AXIAL_STIFFNESS] * lines[:, LENGTH]).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
+    return float(0.5 * (lines.ea * lines.natural_length).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
 
 
 def refuse_open(course, limit, remedy):
@@ -69,9 +71,9 @@ def book_energies(
     working: Integers,
     total: Vector,
 ) -> None:
-    """Write the energy of each family, the kinetic energy and the work to ``total``; its last place stays.
+    """Write the energy of each term, the kinetic energy and the work to ``total``; its last place stays.
 
-    ``book`` holds the work of each family and, last, that of all motion; ``working`` says of each family whether that
+    ``book`` holds the work of each term and, last, that of all motion; ``working`` says of each term whether that
     counts as work (1), or as its energy, which is lost (−1), or neither (0).
     """
     count = len(energies)
@@ -95,51 +97,51 @@ def no_energy(t, x, cells, data, out):
 
 
 @kernel(forceinline=True)
-def begin_powers(t, x, v, extra, families, solved, known, power):
-    """Write the power of each family that is booked by it [W]; where it is ``known``, not of those that kicks solve."""
-    for n in range(families.powers.shape[0]):
-        i, column = families.powers[n, 0], families.powers[n, 1]
+def begin_powers(t, x, v, extra, terms, solved, known, power):
+    """Write the power of each term that is booked by it [W]; where it is ``known``, not of those that kicks solve."""
+    for n in range(terms.powers.shape[0]):
+        i, column = terms.powers[n, 0], terms.powers[n, 1]
         if known and among(solved, i):
             continue
-        families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
-        power[i] = sum_of(families.outs[i][:, column])
+        terms.forces[i](t, x, v, extra, terms.cells[i], terms.data[i], terms.outs[i])
+        power[i] = sum_of(terms.outs[i][:, column])
 
 
 @kernel(leaf=True, forceinline=True)
-def act(i, t, x, v, f, families):
-    """Add the force of a family, by its number, to f."""
-    cells, data, out = families.cells[i], families.data[i], families.outs[i]
-    families.forces[i](t, x, v, f, cells, data, out)
+def act(i, t, x, v, f, terms):
+    """Add the force of a term, by its number, to f."""
+    cells, data, out = terms.cells[i], terms.data[i], terms.outs[i]
+    terms.forces[i](t, x, v, f, cells, data, out)
 
 
 @kernel(leaf=True, apart=("powers",))
 def book_powers(
-    t: float, h: float, x: Matrix, v: Matrix, extra: Matrix, power: Vector, work: Vector, families: Families
+    t: float, h: float, x: Matrix, v: Matrix, extra: Matrix, power: Vector, work: Vector, terms: ForceTerms
 ) -> None:
     """Add the work of a step by the trapezoidal rule, from powers at its ends; ``extra`` takes forces nobody needs."""
-    powers = families.powers
+    powers = terms.powers
     for n in range(powers.shape[0]):
         i, column = powers[n, 0], powers[n, 1]
         if powers[n, 2] == 0:  # the power at the full step: the forces above see the velocity at its middle
-            act(i, t, x, v, extra, families)
-        gained = sum_of(families.outs[i][:, column])
+            act(i, t, x, v, extra, terms)
+        gained = sum_of(terms.outs[i][:, column])
         work[i] += 0.5 * h * (power[i] + gained)
         power[i] = gained
 
 
 @kernel(apart=("stages",))
-def book_potential(sign: float, t: float, x: Matrix, families: Families, work: Vector) -> None:
-    """Add the potential at time t of each family that is booked, times a sign, to its work [J].
+def book_potential(sign: float, t: float, x: Matrix, terms: ForceTerms, work: Vector) -> None:
+    """Add the potential at time t of each term that is booked, times a sign, to its work [J].
 
     With + before a drift of a step of higher order and − behind it this is the work of dead loads. Such a potential is
     linear in time between corners of tables. Where time, as a coordinate, goes with the drifts, what the kicks give the
     momentum that belongs to it is lost in these sums when t goes with the kicks: the book closes as the energy of a
     scene without loads does, to the order of the method and without a drift that grows.
     """
-    for n in range(families.powers.shape[0]):
-        i = families.powers[n, 0]
-        families.energies[i](t, x, families.cells[i], families.data[i], families.stored[i])
-        work[i] += sign * sum_of(families.stored[i])
+    for n in range(terms.powers.shape[0]):
+        i = terms.powers[n, 0]
+        terms.energies[i](t, x, terms.cells[i], terms.data[i], terms.stored[i])
+        work[i] += sign * sum_of(terms.stored[i])
 
 
 @kernel(leaf=True)
@@ -174,11 +176,29 @@ def book_motion(driven, mass, x, v, f, before, work):
 
 
 @kernel(leaf=True, apart=("lengths",))
-def book_lengths(t: float, x: Matrix, reels: Reels, was: Vector, length_force: Matrix, work: Vector) -> None:
-    """Add the work by which natural lengths change from ``was``, ½ (∂E/∂L + ∂E/∂L) ΔL."""
-    reels.by_length[0](t, x, reels.nodes, reels.lines, length_force[1])
-    for c in range(reels.lengths.size):
-        work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * (reels.lines[c, LENGTH] - was[c])
+def write_length_force(
+    t: float, x: Matrix, lengths: NaturalLengths, cells: Indices, lines: Matrix, out: Vector
+) -> None:
+    """Write ∂E/∂L of each natural length that changes [N]."""
+    begin = 0
+    for n in range(lengths.runs.shape[0]):
+        first, last = lengths.runs[n, 0], lengths.runs[n, 1]
+        end = begin + last - first
+        lengths.by_length[0](t, x, cells[first:last], lines[first:last], out[begin:end])
+        begin = end
+
+
+@kernel(leaf=True, apart=("lengths",))
+def change_lengths(t: float, x: Matrix, model: Model, was: Vector, length_force: Matrix, work: Vector) -> None:
+    """Set natural lengths at time t, and add the work of that, ½ (∂E/∂L + ∂E/∂L) ΔL."""
+    lengths, cells, lines = model.lengths, model.terms.cells[0], model.terms.data[0]
+    for c in range(was.size):
+        was[c] = lines[lengths.elements[c], NATURAL_LENGTH]
+    set_lengths(t, lengths, lines)
+    write_length_force(t, x, lengths, cells, lines, length_force[1])
+    for c in range(was.size):
+        change = lines[lengths.elements[c], NATURAL_LENGTH] - was[c]
+        work[work.size - 1] += 0.5 * (length_force[0, c] + length_force[1, c]) * change
         length_force[0, c] = length_force[1, c]
 
 

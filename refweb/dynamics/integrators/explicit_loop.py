@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...effects.natural_lengths import set_lengths
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
@@ -25,12 +26,13 @@ from .energy_balance import (
     act,
     begin_powers,
     book_energies,
-    book_lengths,
     book_motion,
     book_potential,
     book_powers,
+    change_lengths,
     drifts_away,
     note_motion,
+    write_length_force,
 )
 from .events import ended_by, note_events
 from .extremes import look_at, note_time, plain_value, turns_back, update_extreme
@@ -45,10 +47,8 @@ from .step import (
     give_reaction,
     move,
     move_supports,
-    note_lengths,
     note_state,
     plain_kick,
-    set_lengths,
     set_reaction,
     turn_supports,
     viscous_kick,
@@ -60,7 +60,7 @@ from .workspace import Workspace
 if TYPE_CHECKING:
     from .extremes import Extremes
     from .monitors import Observed
-    from .records import Model, Reels, Running, Scheme
+    from .records import Model, Running, Scheme
 
 HELD = -2
 """What the loop returns where lines would pass whatever the step."""
@@ -79,27 +79,27 @@ def inner_stages(
     """
     if reject_step(now - h, h, model, running):
         return False
-    families, inverse, fixed = model.families, model.inertia.inverse, model.inertia.fixed
+    terms, inverse, fixed = model.terms, model.inertia.inverse, model.inertia.fixed
     turns = model.inertia.turns
-    x, v, f, first = running.x, running.v, running.f, (families.forces[0], families.cells[0], families.data[0])
-    forces, cells, data, outs = families.forces, families.cells, families.data, families.outs
+    x, v, f, first = running.x, running.v, running.f, (terms.forces[0], terms.cells[0], terms.data[0])
+    forces, cells, data, outs = terms.forces, terms.cells, terms.data, terms.outs
     drifted = kicked = now - h
     for n in range(scheme.drifts.size - 1):
         kick, drift = scheme.kicks[n] * h, scheme.drifts[n] * h
         drifted, kicked = drifted + drift, kicked + kick
         give_impulse(kick, reaction, running.impulse)
         give_impulse(kick, push, running.ledger.pushed)
-        book_potential(1.0, kicked, x, families, running.work)
-        if model.guard.families.size + model.walls.families.size:
+        book_potential(1.0, kicked, x, terms, running.work)
+        if model.guard.terms.size + model.walls.terms.size:
             comes_through(now - h, kick, drift, TOLD, model, running)
         move(kick, drift, inverse.reshape(-1), x.reshape(-1), v.reshape(-1), f.reshape(-1), x, v, turns)
-        book_potential(-1.0, kicked, x, families, running.work)
-        add_forces(drifted, x, v, f, outs[0], first, families.still, forces, cells, data, outs)
+        book_potential(-1.0, kicked, x, terms, running.work)
+        add_forces(drifted, x, v, f, outs[0], first, terms.still, forces, cells, data, outs)
         add_forces_to_bodies(x, f, turns)
         set_reaction(fixed, f.reshape(-1), reaction)
         if model.outside.pushing.size:
-            set_push(drifted, x, v, model.outside, families, extra, push)
-    book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, families, running.work)
+            set_push(drifted, x, v, model.outside, terms, extra, push)
+    book_potential(1.0, now - scheme.kicks[scheme.drifts.size] * h, x, terms, running.work)
     return True
 
 
@@ -107,31 +107,21 @@ def inner_stages(
 def begin_forces(t, changing, extra, reaction, push, model, running):
     """Write powers, force of supports and push from outside at the time t that steps begin at."""
     set_reaction(model.inertia.fixed, running.f.reshape(-1), reaction)
-    if model.families.powers.shape[0] or changing or model.outside.pushing.size:
+    if model.terms.powers.shape[0] or changing or model.outside.pushing.size:
         begin_more(t, changing, extra, push, model, running)
 
 
 @kernel(apart=("booked",))
 def begin_more(t: float, changing: bool, extra: Matrix, push: Vector, model: Model, running: Running) -> None:
     """Write powers, forces of natural lengths and push from outside."""
-    x, v, families, reels, outside = running.x, running.v, model.families, model.reels, model.outside
+    x, v, terms, outside = running.x, running.v, model.terms, model.outside
     if running.clock[0].begun == 0:
-        lossy, again = model.implicit_contacts.families, running.clock[0].nsteps > 0
-        begin_powers(t, x, v, extra, families, lossy, again, running.power)
+        lossy, again = model.implicit_contacts.terms, running.clock[0].nsteps > 0
+        begin_powers(t, x, v, extra, terms, lossy, again, running.power)
     if changing:
-        reels.by_length[0](t, x, reels.nodes, reels.lines, running.length_force[0])
+        write_length_force(t, x, model.lengths, terms.cells[0], terms.data[0], running.length_force[0])
     if outside.pushing.size:
-        set_push(t, x, v, outside, families, extra, push)
-
-
-@kernel(leaf=True, apart=("lengths",))
-def change_lengths(
-    t: float, x: Matrix, reels: Reels, was: Vector, lines: Matrix, length_force: Matrix, work: Vector
-) -> None:
-    """Give what changes its natural lengths at time t, and book the work of that."""
-    note_lengths(reels, was)
-    set_lengths(t, reels, lines)
-    book_lengths(t, x, reels, was, length_force, work)
+        set_push(t, x, v, outside, terms, extra, push)
 
 
 @kernel(leaf=True, apart=())
@@ -141,22 +131,22 @@ def run_steps(
 ) -> int:  # fmt: skip
     """Take ``count`` steps of size h, fewer where an event ends the run or lines would pass, and return how many."""
     where, known, push, before, total = space.where, space.known, space.push, space.before, space.total
-    clock, families, reels, motions, nearby = running.clock[0], model.families, model.reels, model.motions, model.nearby
+    clock, terms, motions, nearby = running.clock[0], model.terms, model.motions, model.nearby
     mass, inverse, fixed, driven = model.inertia.mass, model.inertia.inverse, model.inertia.fixed, model.inertia.driven
     x, v, f, work, impulse, power = running.x, running.v, running.f, running.work, running.impulse, running.power
     extremes, values, recent = running.extremes, running.extremes.values, running.extremes.recent
-    viscous, powers, extra, half = families.viscous, families.powers, space.extra, space.half
+    viscous, powers, extra, half = terms.viscous, terms.powers, space.extra, space.half
     plain, scales, signs, followed = observed.plain, observed.scales, observed.signs, observed.followed
     flat_x, flat_v, flat_f, flat_inverse = x.reshape(-1), v.reshape(-1), f.reshape(-1), inverse.reshape(-1)
-    lines, first, data_of_lines = families.outs[0], families.forces[0], families.data[0]
-    near, events, averaged = nearby.families.size > 0, running.events, observed.windows.slots.size > 0
-    pushing, rubbing = model.outside.pushing.size > 0, model.implicit_contacts.families
+    lines, first, data_of_lines = terms.outs[0], terms.forces[0], terms.data[0]
+    near, events, averaged = nearby.terms.size > 0, running.events, observed.windows.slots.size > 0
+    pushing, rubbing = model.outside.pushing.size > 0, model.implicit_contacts.terms
     stages, looked, reaction = scheme.drifts.size - 1, extremes.looked, space.reaction
     kick, drift, last = scheme.kicks[stages] * h, scheme.drifts[stages] * h, scheme.kicks[stages + 1] * h
     sums, bits = observed.sums, flat_v[: 3 * model.inertia.linear * (near and not stages)].view(np.int64)
     watched, fresh, turns = followed.size + sums.shape[0] > 0, int(clock.nsteps + clock.begun == 0), model.inertia.turns
     looks, begun, planned = watched and fresh > 0 or (watched or averaged) and stages > 0, clock.begun, clock.planned
-    guarded, moves = model.guard.families.size + model.walls.families.size > 0, driven.size + len(motions.kernels) > 0
+    guarded, moves = model.guard.terms.size + model.walls.terms.size > 0, driven.size + len(motions.kernels) > 0
     begin_forces(clock.time + begun * h, changing and begun == 0, extra, reaction, push, model, running)
     for step in range(1, count + 1):
         now = clock.time + (begun + step) * h
@@ -169,33 +159,33 @@ def run_steps(
         note_motion(driven, mass, x, v, f, before)
         move(kick, drift, flat_inverse, flat_x, flat_v, flat_f, x, v, turns)
         if stages:
-            book_potential(-1.0, now - last, x, families, work)
+            book_potential(-1.0, now - last, x, terms, work)
         if moves:
             move_supports(now, h, x, v, f, space.aside, motions.kernels, motions.cells, motions.data, motions.outs)
         if changing:
-            change_lengths(now, x, reels, space.was, data_of_lines, running.length_force, work)
+            change_lengths(now, x, model, space.was, running.length_force, work)
         if near:
             update_neighbours(drift, x, v, bits, before, model)
             look_back_at_drift(now - h, model, running)
-        first(now, x, v, f, families.cells[0], data_of_lines, lines)
-        for i in families.still:
-            act(i, now, x, v, f, families)
+        first(now, x, v, f, terms.cells[0], data_of_lines, lines)
+        for i in terms.still:
+            act(i, now, x, v, f, terms)
         if near:
-            show_near(nearby, families)
+            show_near(nearby, terms)
         add_forces_to_bodies(x, f, turns)
         if rubbing.size:
             contact_kick(begun + step, now, h, x, v, f, inverse, half, extra, running.contacts, running.parts, model)
         elif viscous.size:
-            viscous_kick(now, h, x, v, f, inverse, half, extra, families, turns)
+            viscous_kick(now, h, x, v, f, inverse, half, extra, terms, turns)
         else:
             plain_kick(last, flat_inverse, flat_v, flat_f, x, v, turns)
-        feel(model.contacts, families)
+        feel(model.contacts, terms)
         if powers.shape[0] and not stages:
-            book_powers(now, h, x, v, extra, power, work, families)
+            book_powers(now, h, x, v, extra, power, work, terms)
         book_motion(driven, mass, x, v, f, before, work)
         give_reaction(kick, last, fixed, flat_f, reaction, impulse)
         if pushing:
-            push_on(now, kick, last, x, v, model.outside, families, extra, push, running.ledger.pushed)
+            push_on(now, kick, last, x, v, model.outside, terms, extra, push, running.ledger.pushed)
         if looks:
             look_inside(now, h, step == fresh, stages == 0, space.inside, where, total, model, observed, running)
         turned, ending, known[1] = False, begun + step == planned or math.isnan(looked[0]), -1.0
@@ -236,8 +226,8 @@ def steps_until(end, changing, scheme, model, running):
     if model.nearby.at.shape[0]:
         fastest = min(fastest, spread_of(v[: model.inertia.linear]) + interval * math.sqrt(push))
     reach = 2.0 * interval * fastest
-    reach_all(reach, running.x, model.nearby, model.families)
-    if not model.nearby.at.shape[0] or covered(0.5 * reach, running.x, model.nearby, model.families):
+    reach_all(reach, running.x, model.nearby, model.terms)
+    if not model.nearby.at.shape[0] or covered(0.5 * reach, running.x, model.nearby, model.terms):
         return interval / (scheme.safety * safe_step(time, end, changing, reach, fastest, running.x, f, model))
     bound = step_by_elements(time, end, changing, reach, fastest, model, running)
     return interval / (scheme.safety * bound)
@@ -298,14 +288,14 @@ def advance_rows(
     and its time that of the event. After ``breath`` steps it returns as well, so that an interruption is felt, and goes
     on in that row. It returns `HELD` where a step is cut too far, see `refweb.dynamics.integrators.ccd`.
     """
-    clock, events, reels, left = running.clock[0], running.events, model.reels, breath
+    clock, events, lengths, left = running.clock[0], running.events, model.lengths, breath
     total, stopped = space.total, ended_by(events)
     for n in range(times.size):
-        if reels.lengths.size and not clock.begun:
-            set_lengths(clock.time, reels, model.families.data[0])
+        if lengths.elements.size and not clock.begun:
+            set_lengths(clock.time, lengths, model.terms.data[0])
         while clock.time < times[n] and not stopped:
             end, begun = end_of_steps(model.corners, clock.time, times[n]), clock.begun
-            changing = reels.corners.size > 2 and reels.corners[0] < end and reels.corners[-3] > clock.time
+            changing = lengths.corners.size > 2 and lengths.corners[0] < end and lengths.corners[-3] > clock.time
             if not begun:
                 clock.since = clock.time
                 if not plan(end, changing, scheme, model, running):
@@ -359,20 +349,20 @@ def begin(
     total: Vector,
 ) -> None:
     """Write forces, values of probes with their places, and energies at t = 0."""
-    families = model.families
-    if model.reels.lengths.size:
-        set_lengths(0.0, model.reels, families.data[0])
-    for i in range(len(families.forces)):
-        families.forces[i](0.0, x, v, f, families.cells[i], families.data[i], families.outs[i])
+    terms = model.terms
+    if model.lengths.elements.size:
+        set_lengths(0.0, model.lengths, terms.data[0])
+    for i in range(len(terms.forces)):
+        terms.forces[i](0.0, x, v, f, terms.cells[i], terms.data[i], terms.outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)
-    feel(model.contacts, families)
+    feel(model.contacts, terms)
     for i in range(len(observed.probes)):
         where[0], where[1] = -1, PLACE
         extremes.values[i] = observed.probes[i](
-            0.0, x, v, f, families.outs[0], observed.rows[i], observed.data[i], where
+            0.0, x, v, f, terms.outs[0], observed.rows[i], observed.data[i], where
         )  # fmt: skip
         extremes.places[i] = where[0]
     book_energies(
-        0.0, x, v, model.inertia.mass, model.inertia.turns, families.cells, families.data, families.energies,
-        families.stored, work, families.working, total,
+        0.0, x, v, model.inertia.mass, model.inertia.turns, terms.cells, terms.data, terms.energies,
+        terms.stored, work, terms.working, total,
     )  # fmt: skip

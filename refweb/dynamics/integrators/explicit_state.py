@@ -20,8 +20,8 @@ class ExplicitState(IntegratorState):
     ----------
     force : ndarray, shape (rows, 3)
         Force [N], last seen with the velocity at half a step.
-    power : ndarray, shape (families,)
-        Power of each family that is booked by it at the last step [W].
+    power : ndarray, shape (terms,)
+        Power of each term that is booked by it at the last step [W].
     longest : float
         By how much two rows may have come nearer to each other in a step, at most [m]; infinite where that is not
         known.

@@ -16,7 +16,7 @@ def features(scheme, model, observed, events):
         found; lines that push each other (``guard``), bodies that push lines (``walls``), ``guarded`` (either);
         ``contacts`` of bodies.
     """
-    inertia, families, outside, windows = model.inertia, model.families, model.outside, observed.windows
+    inertia, terms, outside, windows = model.inertia, model.terms, model.outside, observed.windows
     has = {
         "stages": len(scheme.drifts) > 1,
         "kicks": len(scheme.drifts) == 1,
@@ -28,19 +28,19 @@ def features(scheme, model, observed, events):
         "turning": len(inertia.turns.moment),
         "carried": len(inertia.turns.carried),
         "driven": len(inertia.driven) + len(model.motions.kernels),
-        "lengths": len(model.reels.lengths),
-        "powers": len(families.powers),
-        "viscous": len(families.viscous),
-        "rubbing": len(model.implicit_contacts.families),
+        "lengths": len(model.lengths.elements),
+        "powers": len(terms.powers),
+        "viscous": len(terms.viscous),
+        "rubbing": len(model.implicit_contacts.terms),
         "pushing": len(outside.pushing),
         "damped": len(outside.damped),
-        "booked": len(families.powers) + len(model.reels.lengths) + len(outside.pushing),
+        "booked": len(terms.powers) + len(model.lengths.elements) + len(outside.pushing),
         "angular": len(outside.axes),
-        "near": len(model.nearby.families),
+        "near": len(model.nearby.terms),
         "pairs": len(model.nearby.at),
-        "guard": len(model.guard.families),
-        "walls": len(model.walls.families),
-        "guarded": len(model.guard.families) + len(model.walls.families),
-        "contacts": len(model.contacts.families),
+        "guard": len(model.guard.terms),
+        "walls": len(model.walls.terms),
+        "guarded": len(model.guard.terms) + len(model.walls.terms),
+        "contacts": len(model.contacts.terms),
     }
     return {name for name, count in has.items() if count}

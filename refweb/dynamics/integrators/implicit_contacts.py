@@ -34,18 +34,18 @@ CARRIED = 3
 
 
 class ImplicitContacts(Record):
-    """Families whose kicks are solved for.
+    """Terms whose kicks are solved for.
 
     Attributes
     ----------
-    families : ndarray of int
+    terms : ndarray of int
         Their numbers.
     detects, laws : table
         Their kernels, see `refweb.effects.base.ImplicitContactKernels`.
     memories : table
         Forces of the step before, within a row: `refweb.kernels.MEMORY` for each cell and slot.
     depths : ndarray of int
-        The ``outs`` of `refweb.dynamics.integrators.records.Families` that has depths, −1 for those that have none.
+        The ``outs`` of `refweb.dynamics.integrators.records.ForceTerms` that has depths, −1 for those that have none.
     elements : table
         For each cell the row in it.
     parts : int
@@ -56,7 +56,7 @@ class ImplicitContacts(Record):
         Number of each row among the nodes that bodies carry, −1 for others; empty where no node is carried.
     """
 
-    families: Integers
+    terms: Integers
     detects: DetectTable
     laws: LawTable
     memories: MemoryTable
@@ -69,35 +69,40 @@ class ImplicitContacts(Record):
     @classmethod
     def of(cls, system, turns):
         """Those of a system; ``turns`` are its `refweb.net.rotation.RigidRotations`."""
-        families = [i for i, family in enumerate(system.families) if family.rubbing is not None]
-        terms = [system.families[i] for i in families]
+        numbers = [i for i, term in enumerate(system.terms) if term.velocity.implicit is not None]
+        terms = [system.terms[i] for i in numbers]
         depths = [depths_of(system, term) for term in terms]
         carriers = np.full(system.rows if len(turns.carried) else 0, -1)
         carriers[turns.carried[:, 0]] = np.arange(len(turns.carried))
         return cls(
-            families=np.array(families, dtype=np.int64),
-            detects=Functions(DETECT, [term.rubbing.detect for term in terms]),
-            laws=Functions(LAW, [term.rubbing.law for term in terms]),
-            memories=Arrays(MEMORIES, [np.zeros((len(f.cells), f.rubbing.slots), dtype=MEMORY) for f in terms]),
+            terms=np.array(numbers, dtype=np.int64),
+            detects=Functions(DETECT, [term.velocity.implicit.detect for term in terms]),
+            laws=Functions(LAW, [term.velocity.implicit.law for term in terms]),
+            memories=Arrays(
+                MEMORIES, [np.zeros((len(f.cells), f.velocity.implicit.slots), dtype=MEMORY) for f in terms]
+            ),
             depths=np.array([number for number, _ in depths], dtype=np.int64),
             elements=Arrays(INTEGERS, [elements for _, elements in depths]),
-            parts=(1 if len(turns.carried) == 0 else CARRIED) * max((term.rubbing.parts for term in terms), default=0),
+            parts=(1 if len(turns.carried) == 0 else CARRIED)
+            * max((term.velocity.implicit.parts for term in terms), default=0),
             pieces=system.net.subdivide,
             carriers=carriers,
         )
 
 
-def depths_of(system, family):
-    """(``depths``, ``elements``) of the push of the lines of a family on its bodies, see `ImplicitContacts`."""
+def depths_of(system, term):
+    """(``depths``, ``elements``) of the push of the lines of a term on its bodies, see `ImplicitContacts`."""
     near = near_of(system)
-    for i in near if family.contact else ():
-        push = system.families[i]
-        if push.contact:
-            keys, its = (term.elements * system.rows + term.cells[:, system.net.along.size] for term in (family, push))
+    for i in near if term.contact.with_lines else ():
+        push = system.terms[i]
+        if push.contact.with_lines:
+            keys, its = (
+                side.elements.numbers * system.rows + side.cells[:, system.net.along.size] for side in (term, push)
+            )
             order = np.argsort(its)
             matches = order[np.minimum(np.searchsorted(its, keys, sorter=order), len(its) - 1)]
             if (its[matches] == keys).all():
-                return len(system.families) + near.index(i), matches
+                return len(system.terms) + near.index(i), matches
     return -1, np.zeros(0, dtype=np.int64)
 
 
@@ -117,13 +122,13 @@ def lines_in_touch(depths, elements, pieces):
 
 
 @kernel()
-def detect(m, x, families, implicit_contacts, contacts, parts, begin):
-    """Write the contacts of family m from ``begin`` on; the number behind them."""
-    i, elements = implicit_contacts.families[m], implicit_contacts.depths[m]
+def detect(m, x, terms, implicit_contacts, contacts, parts, begin):
+    """Write the contacts of term m from ``begin`` on; the number behind them."""
+    i, elements = implicit_contacts.terms[m], implicit_contacts.depths[m]
     if elements < 0:
-        return implicit_contacts.detects[m](x, families.cells[i], families.data[i], contacts, parts, begin)
-    chosen = lines_in_touch(families.outs[elements], implicit_contacts.elements[m], implicit_contacts.pieces)
-    cells, data = rows_of(chosen, families.cells[i], families.data[i])
+        return implicit_contacts.detects[m](x, terms.cells[i], terms.data[i], contacts, parts, begin)
+    chosen = lines_in_touch(terms.outs[elements], implicit_contacts.elements[m], implicit_contacts.pieces)
+    cells, data = rows_of(chosen, terms.cells[i], terms.data[i])
     end = implicit_contacts.detects[m](x, cells, data, contacts, parts, begin)
     for n in range(begin, min(end, contacts.size)):
         contacts[n].cell = chosen[contacts[n].cell]
@@ -132,16 +137,16 @@ def detect(m, x, families, implicit_contacts, contacts, parts, begin):
 
 @kernel()
 def detect_all(h, x, v, inverse, model, space, parts_space, ends):
-    """Write all contacts, and to ``ends`` the number behind those of each family; (contacts, their parts).
+    """Write all contacts, and to ``ends`` the number behind those of each term; (contacts, their parts).
 
     ``space`` and ``parts_space`` hold arrays for these, and get larger ones where they have no space for all.
     """
     implicit_contacts = model.implicit_contacts
     while True:
         contacts, parts, count = space[0], parts_space[0], 0
-        for m in range(implicit_contacts.families.size):
+        for m in range(implicit_contacts.terms.size):
             begin = count
-            count = detect(m, x, model.families, implicit_contacts, contacts, parts, begin)
+            count = detect(m, x, model.terms, implicit_contacts, contacts, parts, begin)
             ends[m] = count
             for n in range(begin, min(count, contacts.size)):
                 contacts[n].term = m

@@ -42,8 +42,8 @@ class Sum(NamedTuple):
 
     Attributes
     ----------
-    weights : ndarray, shape (families + 3,)
-        Of the energy of each family, kinetic energy, work and step size: the columns of `History.sums`.
+    weights : ndarray, shape (terms + 3,)
+        Of the energy of each term, kinetic energy, work and step size: the columns of `History.sums`.
     sign : float
         1 for the largest value of all steps, −1 for the smallest, 0 for neither.
     """
@@ -66,8 +66,8 @@ class IntegratorState:
         Extreme value of each probe and, behind them, of each sum.
     events : ndarray of `refweb.dynamics.integrators.events.EVENT`, shape (events,)
         What each event has come to.
-    work : ndarray, shape (families + 1,)
-        Work of each family that is booked by its power and, last, of motion [J].
+    work : ndarray, shape (terms + 1,)
+        Work of each term that is booked by its power and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports on the net [N s].
     ledger : refweb.dynamics.integrators.momentum_balance.MomentumBalance
@@ -81,7 +81,7 @@ class IntegratorState:
     energy : float
         Energy at the start [J].
     largest : float
-        Largest energy of the rows, families and motion without regard to sign [J].
+        Largest energy of the rows, terms and motion without regard to sign [J].
     worst : float
         Largest |ΔE − work| of the rows [J].
     share : float
@@ -164,9 +164,9 @@ class History:
     probed: int
 
     @classmethod
-    def empty(cls, rows, probed, families):
-        """Rows of zeros for a number of probes and the families of a system."""
-        names = ["time", *(f"probe {i}" for i in range(probed)), *(family.name for family in families)]
+    def empty(cls, rows, probed, terms):
+        """Rows of zeros for a number of probes and the terms of a system."""
+        names = ["time", *(f"probe {i}" for i in range(probed)), *(term.name for term in terms)]
         names += ["kinetic_energy", "work", "step_size"]
         names += components(VECTORS)
         return cls(tuple(names), np.zeros((rows, len(names))), probed)
@@ -190,12 +190,12 @@ class History:
 
     @property
     def sums(self):
-        """Weights of a `Sum`: energy of each family, kinetic energy [J], work [J], step size [s]."""
+        """Weights of a `Sum`: energy of each term, kinetic energy [J], work [J], step size [s]."""
         return self.values[:, 1 + self.probed : -3 * len(VECTORS)]
 
     @property
     def energies(self):
-        """Energy of each family and, last, kinetic energy [J], shape (rows, families + 1)."""
+        """Energy of each term and, last, kinetic energy [J], shape (rows, terms + 1)."""
         return self.sums[:, :-2]
 
     @property

@@ -23,7 +23,7 @@ class FollowedBodies(FollowedLines):
 
     def __init__(self, system):
         super().__init__(system)
-        self._families = [family for family in system.families if family.passing is not None]
+        self._terms = [term for term in system.terms if term.contact.passing is not None]
         self._places = system.rows - system.net.spins
         turning = [body for body in system.net.bodies if body.turn is not None]
         self._rows = np.array([(body.spin, body.turn) for body in turning], dtype=np.int64).reshape(-1, 2)
@@ -31,8 +31,8 @@ class FollowedBodies(FollowedLines):
 
     def inspect(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
-        for family in self._families:
-            self._record(course, piece, at, THROUGH, (family.passing, family.cells, family.data))
+        for term in self._terms:
+            self._record(course, piece, at, THROUGH, (term.contact.passing, term.cells, term.data))
 
     def _turned(self, path):
         """Largest movement of points of bodies as these turn [m]."""

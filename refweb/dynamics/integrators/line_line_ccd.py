@@ -76,19 +76,19 @@ class FollowedLines(Followed):
     """
 
     def __init__(self, system):
-        self._families = [family for family in system.families if family.crossing is not None]
+        self._terms = [term for term in system.terms if term.contact.crossing is not None]
         self._places = system.net.nodes
         self._still, self._rows_met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
 
     def soon(self, x, v):
         """Time in which no line comes through another from displacement x and velocity v [s]."""
-        return min((f.crossing.soon(x, v, f.cells, f.data) for f in self._families), default=np.inf)
+        return min((f.contact.crossing.soon(x, v, f.cells, f.data) for f in self._terms), default=np.inf)
 
     def inspect(self, course, piece, at):
         """Note in a course what may have met in a piece of a step; ``at`` gives the displacement at a time within."""
-        for family in self._families:
-            crossing, beside = family.crossing, (family.crossing.rows, family.crossing.data)
-            for which, cells in ((APART, (family.cells, family.data)), (BESIDE, beside)):
+        for term in self._terms:
+            crossing, beside = term.contact.crossing, (term.contact.crossing.rows, term.contact.crossing.data)
+            for which, cells in ((APART, (term.cells, term.data)), (BESIDE, beside)):
                 self._record(course, piece, at, which, (crossing.meets, *cells))
 
     def _margin(self, bend):

@@ -41,26 +41,26 @@ class Measurements:
     probes : sequence of refweb.results.probes.Probe
         Scalars of the state.
     sums : sequence of refweb.dynamics.integrators.integrator.Sum
-        Weighted sums of ``families`` energies, kinetic energy, work and step size.
-    families : int
-        Number of families of the system.
+        Weighted sums of ``terms`` energies, kinetic energy, work and step size.
+    terms : int
+        Number of terms of the system.
 
     Attributes
     ----------
     probed : int
         Number of probes.
-    families : list of int
-        Numbers of the families of whose cells probes read what they show, see `refweb.results.probes.Probe`.
+    terms : list of int
+        Numbers of the terms of whose cells probes read what they show, see `refweb.results.probes.Probe`.
     """
 
-    def __init__(self, probes, sums, families):
+    def __init__(self, probes, sums, terms):
         self.probed = len(probes)
         self._probes = [
-            (p.kernel, np.array(p.rows, dtype=np.int64), np.ascontiguousarray(p.data, dtype=float), p.family)
+            (p.kernel, np.array(p.rows, dtype=np.int64), np.ascontiguousarray(p.data, dtype=float), p.term)
             for p in probes
         ]
-        self.families = sorted({probe.family for probe in probes} - {-1})
-        self._weights = np.array([quantity.weights for quantity in sums], dtype=float).reshape(len(sums), families + 3)
+        self.terms = sorted({probe.term for probe in probes} - {-1})
+        self._weights = np.array([quantity.weights for quantity in sums], dtype=float).reshape(len(sums), terms + 3)
         self._signs = np.array([float(quantity.sign) for quantity in (*probes, *sums)])
         self._windows = Windows.of(probes)
         self._signs[self._windows.slots] = 0.0
@@ -69,8 +69,8 @@ class Measurements:
 
     def probe(self, i, sample):
         """Value of a probe at a `refweb.dynamics.integrators.simpson_balance.Sample`."""
-        kernel, rows, data, family = self._probes[i]
-        data = sample.per_cell.get(family, data)
+        kernel, rows, data, term = self._probes[i]
+        data = sample.per_cell.get(term, data)
         return kernel(sample.time, sample.x, sample.v, sample.force, sample.lines, rows, data, self._where)
 
     def _position_of(self, i, sample):

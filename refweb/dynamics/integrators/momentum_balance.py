@@ -45,10 +45,9 @@ from ...kernels import (
     Vector,
     kernel,
 )
-from ...net.net import AXIAL_STIFFNESS
 
 if TYPE_CHECKING:
-    from .records import Families
+    from .records import ForceTerms
 
 CLOSURE = 1e-6
 """Largest momentum that an explicit run may miss, over the largest of the run: 1e4 roundings in each of 1e6 steps, of
@@ -104,11 +103,11 @@ class Outside(Record):
     Attributes
     ----------
     impulses, cells, data : table
-        Kernel of the impulse of each family that has one, and its numbers.
+        Kernel of the impulse of each term that has one, and its numbers.
     damped : ndarray of int
         Those of them that depend on velocity.
     pushing : ndarray of int
-        Families that are integrated along the steps.
+        Terms that are integrated along the steps.
     places : ndarray, shape (linear rows, 3)
         Reference positions [m], about their mean.
     mass : ndarray, shape (linear rows,)
@@ -136,21 +135,21 @@ class Outside(Record):
     def of(cls, system):
         """Make the record of a system."""
         net, linear = system.net, system.rows - system.net.spins
-        outer = [(i, family) for i, family in enumerate(system.families) if not family.internal]
-        known = [family for _, family in outer if family.impulse is not None]
-        damped = [i for i, family in enumerate(known) if family.damping is not None]
-        pushing = [i for i, family in outer if family.impulse is None]
+        outer = [(i, term) for i, term in enumerate(system.terms) if not term.balance.internal]
+        known = [term for _, term in outer if term.balance.impulse is not None]
+        damped = [i for i, term in enumerate(known) if term.velocity.damping is not None]
+        pushing = [i for i, term in outer if term.balance.impulse is None]
         return cls(
-            impulses=Functions(IMPULSE, [family.impulse for family in known]),
-            cells=Arrays(INDICES, [family.cells for family in known]),
-            data=Arrays(MATRIX, [family.data for family in known]),
+            impulses=Functions(IMPULSE, [term.balance.impulse for term in known]),
+            cells=Arrays(INDICES, [term.cells for term in known]),
+            data=Arrays(MATRIX, [term.data for term in known]),
             damped=np.array(damped, dtype=np.int64),
             pushing=np.array(pushing, dtype=np.int64),
             places=net.points[:linear] - net.points[:linear].mean(axis=0),
             mass=net.mass[:linear],
             inverse_reach=_inverse_reach(net),
             axes=kept_axes(system),
-            rounding=float(ROUNDINGS * net.line_data[:, AXIAL_STIFFNESS].sum()),
+            rounding=float(ROUNDINGS * net.line_data.ea.sum()),
         )
 
 
@@ -166,7 +165,7 @@ def _inverse_reach(net):
 
 def kept_axes(system):
     """Unit vectors along which the angular momentum about the centre of mass is kept, shape (axes, 3)."""
-    kept = all(f.moment_free or (f.internal and not f.twists) for f in system.families)
+    kept = all(f.balance.moment_free or (f.balance.internal and not f.balance.twists) for f in system.terms)
     if system.fixed.any() or not kept:
         return np.zeros((0, 3))
     normals = np.array([body.axes[2] for body in system.net.bodies if body.shape.planar]).reshape(-1, 3)
@@ -197,11 +196,11 @@ def add_half_steps(by: float, outside: Outside, inverse: Matrix, f: Matrix, push
 
 
 @kernel(apart=("pushing",))
-def set_push(t: float, x: Matrix, v: Matrix, outside: Outside, families: Families, extra: Matrix, push: Vector) -> None:
+def set_push(t: float, x: Matrix, v: Matrix, outside: Outside, terms: ForceTerms, extra: Matrix, push: Vector) -> None:
     """Write the force of what is integrated along the steps to ``push (3,)``; ``extra`` takes that on every row."""
     extra[:], push[:] = 0.0, 0.0
     for i in outside.pushing:
-        families.forces[i](t, x, v, extra, families.cells[i], families.data[i], families.outs[i])
+        terms.forces[i](t, x, v, extra, terms.cells[i], terms.data[i], terms.outs[i])
     for r in range(outside.mass.size):
         for k in range(3):
             push[k] += extra[r, k]
@@ -215,7 +214,7 @@ def push_on(
     x: Matrix,
     v: Matrix,
     outside: Outside,
-    families: Families,
+    terms: ForceTerms,
     extra: Matrix,
     push: Vector,
     pushed: Vector,
@@ -223,7 +222,7 @@ def push_on(
     """Integrate over two kicks: a time with the push ahead of a drift, and one with that behind it, at time t."""
     for k in range(3):
         pushed[k] += before * push[k]
-    set_push(t, x, v, outside, families, extra, push)
+    set_push(t, x, v, outside, terms, extra, push)
     for k in range(3):
         pushed[k] += behind * push[k]
 

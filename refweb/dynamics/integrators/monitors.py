@@ -21,7 +21,6 @@ from ...kernels import (
     Vector,
 )
 from ...results.probes import PROBE, plain_of
-from ...system.contact_forces import FAMILY
 from .averages import Windows
 
 ProbeTable = Annotated[Functions, PROBE]
@@ -34,7 +33,7 @@ class Observed(Record):
     ----------
     probes, rows, data : table
         Kernel of each probe and its numbers.
-    sums : ndarray, shape (sums, families + 3)
+    sums : ndarray, shape (sums, terms + 3)
         Weights of each sum.
     signs : ndarray, shape (probes + sums,)
         1 for the largest value, −1 for the smallest, 0 for neither, as for probes that have a window.
@@ -42,8 +41,8 @@ class Observed(Record):
         Probes whose sign is not 0.
     windows : refweb.dynamics.integrators.averages.Windows
         Windows of the probes that are averaged.
-    families : ndarray of int
-        Families whose values per cell are the data of probes.
+    terms : ndarray of int
+        Terms whose values per cell are the data of probes.
     plain : ndarray of int, shape (probes, 4)
         What the loop looks at itself, see `refweb.results.probes.plain_of`.
     scales : ndarray, shape (probes,)
@@ -57,18 +56,18 @@ class Observed(Record):
     signs: Vector
     followed: Integers
     windows: Windows
-    families: Integers
+    terms: Integers
     plain: IntegerMatrix
     scales: Vector
 
     @classmethod
     def of(cls, probes, sums, outs, contacts):
-        """Probes and sums of a system whose families write ``outs`` per cell, and bodies feel ``contacts``."""
+        """Probes and sums of a system whose terms write ``outs`` per cell, and bodies feel ``contacts``."""
         shared = {CONTACT: contacts.felt, **dict(enumerate(outs))}
-        numbers = [shared.get(p.family, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
-        families_seen = [probe.family for probe in probes if probe.family >= 0]
-        if any(probe.family == CONTACT for probe in probes):
-            families_seen += contacts.families[:, FAMILY].tolist()
+        numbers = [shared.get(p.term, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
+        terms_seen = [probe.term for probe in probes if probe.term >= 0]
+        if any(probe.term == CONTACT for probe in probes):
+            terms_seen += contacts.terms["number"].tolist()
         windows, signs = Windows.of(probes), np.array([float(item.sign) for item in (*probes, *sums)])
         signs[windows.slots] = 0.0
         plain = [plain_of(probe) for probe in probes]
@@ -80,7 +79,7 @@ class Observed(Record):
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
-            families=np.unique(families_seen).astype(np.int64),
+            terms=np.unique(terms_seen).astype(np.int64),
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
         )

@@ -42,7 +42,7 @@ from ...net.rotation_bounds import fastest_surface
 from .vector_spread import spread_of, spread_since
 
 if TYPE_CHECKING:
-    from .records import Families, Model
+    from .records import ForceTerms, Model
 
 LASTS = 64.0
 """Number of steps that a list is to last at the speed of its first."""
@@ -93,20 +93,21 @@ as what it is [m/s]; largest depth around pairs [m], infinite where none are fou
 NOWHERE = np.zeros((0, 3))
 """Displacements where none are looked at."""
 SWAP = types.void(types.int64, types.int64, types.float64, MATRIX, *map(ArraysType, (INDICES, MATRIX, MATRIX, VECTOR)))
-"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of family i, the m-th that acts nearby, in the
-tables of `refweb.dynamics.integrators.records.Families`, for those within a skin, or for all where it has no bound."""
+"""``(i, m, depth, x, cells, data, outs, stored)``: swaps the cells of term i, the m-th that acts nearby, in the
+tables of `refweb.dynamics.integrators.records.ForceTerms`, for those within a skin, or for all where it has no
+bound."""
 SwapTable = Annotated[Functions, SWAP]
 SkinArray = Annotated[np.ndarray, types.Array(from_dtype(SKIN), 1, "C")]
 
 
 class NeighbourList(Record):
-    """Families whose cells act only near something.
+    """Terms whose cells act only near something.
 
     Attributes
     ----------
     swaps : table
         Kernel of each that swaps its cells, see `swap_of`.
-    families : ndarray of int
+    terms : ndarray of int
         Their numbers.
     skin : ndarray of `SKIN`, shape (1,)
         How long what is chosen will do.
@@ -117,7 +118,7 @@ class NeighbourList(Record):
     """
 
     swaps: SwapTable
-    families: Integers
+    terms: Integers
     skin: SkinArray
     at: Matrix
     cells: IndexTable
@@ -128,26 +129,28 @@ class NeighbourList(Record):
         """Those of a system."""
         near, skin = near_of(system), np.zeros(1, dtype=SKIN)
         skin["depth"], skin["lasts"] = np.inf, MANY
-        swaps = Functions(SWAP, [swap_for(system.families[i]) for i in near])
-        pairs = any(family.finder is not None for family in system.families)
+        swaps = Functions(SWAP, [swap_for(system.terms[i]) for i in near])
+        pairs = any(term.contact.finder is not None for term in system.terms)
         at = np.zeros((system.rows - system.net.spins if pairs else 0, 3))
         skin["widest"] = WIDEST * float(system.net.natural_length.mean()) if pairs else np.inf
-        cells, data = [system.families[i].cells for i in near], [system.families[i].data for i in near]
+        cells, data = [system.terms[i].cells for i in near], [system.terms[i].data for i in near]
         return cls(swaps, np.array(near, dtype=np.int64), skin, at, Arrays(INDICES, cells), Arrays(MATRIX, data))
 
     def without(self):
-        """Make the record without families."""
-        return replace(self, families=self.families[:0])
+        """Make the record without terms."""
+        return replace(self, terms=self.terms[:0])
 
 
 def near_of(system):
-    """Numbers of the families of a system whose cells act only near something."""
-    return [i for i, family in enumerate(system.families) if family.near is not None or family.finder is not None]
+    """Numbers of the terms of a system whose cells act only near something."""
+    return [
+        i for i, term in enumerate(system.terms) if term.contact.near is not None or term.contact.finder is not None
+    ]
 
 
-def swap_for(family):
-    """The kernel that swaps the cells of a family."""
-    return swap_of(family.near) if family.finder is None else swap_pairs_of(family.finder)
+def swap_for(term):
+    """The kernel that swaps the cells of a term."""
+    return swap_of(term.contact.near) if term.contact.finder is None else swap_pairs_of(term.contact.finder)
 
 
 @kernel()
@@ -164,7 +167,7 @@ def rows_of(chosen, cells, data):
 
 @functools.cache
 def swap_of(near):
-    """The kernel that swaps the cells of a family, found by its kernel ``near``, of signature `SWAP`.
+    """The kernel that swaps the cells of a term, found by its kernel ``near``, of signature `SWAP`.
 
     Loops call it by its address: machine code that is called by name is optimized again in each kernel above, and
     lists that are written to are long.
@@ -194,7 +197,7 @@ def swap_of(near):
 
 @functools.cache
 def swap_pairs_of(pairs):
-    """Make the swap of a family whose cells are elements, for the pairs that ``pairs`` finds; see `swap_of`."""
+    """Make the swap of a term whose cells are elements, for the pairs that ``pairs`` finds; see `swap_of`."""
 
     @kernel(SWAP)
     def swap(i, m, depth, x, cells, data, outs, stored):
@@ -214,26 +217,26 @@ def swap_pairs_of(pairs):
 
 
 @kernel(apart=("near",))
-def set_reference(x: Matrix, nearby: NeighbourList, families: Families) -> None:
-    """Swap the cells of all families for those within the skin at displacement x."""
+def set_reference(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
+    """Swap the cells of all terms for those within the skin at displacement x."""
     depth = nearby.skin[0].depth
-    for m in range(nearby.families.size):
-        i = nearby.families[m]
-        nearby.swaps[m](i, m, depth, x, families.cells, families.data, families.outs, families.stored)
+    for m in range(nearby.terms.size):
+        i = nearby.terms[m]
+        nearby.swaps[m](i, m, depth, x, terms.cells, terms.data, terms.outs, terms.stored)
 
 
 @kernel(leaf=True, apart=("near",))
-def show_near(nearby: NeighbourList, families: Families) -> None:
+def show_near(nearby: NeighbourList, terms: ForceTerms) -> None:
     """Write what the chosen cells show where it is looked for, among that of all cells.
 
     What an element shows is the largest value of its pairs, or the smallest where these are below 0.
     """
     if not nearby.skin[0].depth < math.inf:
         return
-    size, count = nearby.families.size, len(families.data)
+    size, count = nearby.terms.size, len(terms.data)
     for m in range(size):
-        all_values, values = families.outs[nearby.families[m]], families.outs[count - size + m]
-        chosen = families.cells[count + m]
+        all_values, values = terms.outs[nearby.terms[m]], terms.outs[count - size + m]
+        chosen = terms.cells[count + m]
         if chosen.shape[1] == 1:
             for n in range(chosen.shape[0]):
                 for k in range(all_values.shape[1]):
@@ -259,24 +262,22 @@ def forget(model, begun):
 
 def look_at_all(system, model):
     """Look at all cells, as whoever comes next does."""
-    skin, families = model.nearby.skin[0], model.families
+    skin, terms = model.nearby.skin[0], model.terms
     if skin["depth"] < np.inf:
         for m, i in enumerate(near_of(system)):
-            swap_for(system.families[i])(
-                i, m, np.inf, NOWHERE, families.cells, families.data, families.outs, families.stored
-            )
+            swap_for(system.terms[i])(i, m, np.inf, NOWHERE, terms.cells, terms.data, terms.outs, terms.stored)
     skin["depth"] = np.inf
 
 
 @kernel(apart=("pairs",))
-def take_pairs(x: Matrix, nearby: NeighbourList, families: Families) -> None:
+def take_pairs(x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> None:
     """Find the pairs within the skin at displacement x, and say how many steps such a list is to last."""
     copy_rows(x[: nearby.at.shape[0]], nearby.at)
-    set_reference(x, nearby, families)
+    set_reference(x, nearby, terms)
     skin, pairs, elements = nearby.skin[0], 0, 0
-    for m in range(nearby.families.size):
-        pairs += families.cells[nearby.families[m]].shape[0]
-        elements += families.cells[len(families.cells) - 2 * nearby.families.size + m].shape[0]
+    for m in range(nearby.terms.size):
+        pairs += terms.cells[nearby.terms[m]].shape[0]
+        elements += terms.cells[len(terms.cells) - 2 * nearby.terms.size + m].shape[0]
     if pairs * skin.lasts > PRICE * elements:
         skin.lasts = max(0.5 * skin.lasts, FEWEST)
     elif 4.0 * pairs * skin.lasts < PRICE * elements:
@@ -284,7 +285,7 @@ def take_pairs(x: Matrix, nearby: NeighbourList, families: Families) -> None:
 
 
 @kernel(leaf=True, forceinline=True)
-def reach_all(reach, x, nearby, families):
+def reach_all(reach, x, nearby, terms):
     """Look at all cells, unless those that are chosen are all that can touch by coming nearer by a reach [m].
 
     Pairs that are found stay, see `covered`.
@@ -295,11 +296,11 @@ def reach_all(reach, x, nearby, families):
         return
     if skin.depth < math.inf and not skin.used + reach <= SHARE * skin.depth:
         skin.depth = math.inf
-        set_reference(x, nearby, families)
+        set_reference(x, nearby, terms)
 
 
 @kernel(leaf=True, apart=("pairs",))
-def covered(path: float, x: Matrix, nearby: NeighbourList, families: Families) -> bool:
+def covered(path: float, x: Matrix, nearby: NeighbourList, terms: ForceTerms) -> bool:
     """Tell if the listed pairs are all that can touch by coming nearer by a distance [m].
 
     They are found anew at displacement x where a list as deep would then be all: its turn comes soon. Where it is not,
@@ -316,9 +317,9 @@ def covered(path: float, x: Matrix, nearby: NeighbourList, families: Families) -
     if not path <= KEPT_UP_TO * depth:
         return False
     skin.depth, skin.used = depth, 0.0
-    take_pairs(x, nearby, families)
-    for m in range(nearby.families.size):  # how deep the pairs are is not known before the next forces
-        families.outs[nearby.families[m]][:, 0] = math.inf
+    take_pairs(x, nearby, terms)
+    for m in range(nearby.terms.size):  # how deep the pairs are is not known before the next forces
+        terms.outs[nearby.terms[m]][:, 0] = math.inf
     return True
 
 
@@ -326,7 +327,7 @@ def covered(path: float, x: Matrix, nearby: NeighbourList, families: Families) -
 def goes_freely(model):
     """Tell if lines push each other, and all rows move as their velocities say: none is moved or carried."""
     inertia = model.inertia
-    return model.guard.families.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
+    return model.guard.terms.size > 0 and inertia.driven.size + inertia.turns.carried.shape[0] == 0
 
 
 @kernel(leaf=True, apart=("near",))
@@ -360,17 +361,17 @@ def update_neighbours(drift: float, x: Matrix, v: Matrix, bits: Integers, before
     skin.used += path
     skin.steps += 1
     if skin.steps > skin.unknown and not (skin.depth < math.inf and skin.used + path <= SHARE * skin.depth):
-        choose(drift, x, v, driven.size > 0, model.nearby, model.families)
+        choose(drift, x, v, driven.size > 0, model.nearby, model.terms)
 
 
 @kernel(apart=("near",))
-def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourList, families: Families) -> None:
+def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourList, terms: ForceTerms) -> None:
     """Choose anew what is near, behind a drift that led to x at velocities v, where motion is ``driven`` or is not."""
     skin = nearby.skin[0]
     path, recent = skin.last, skin.last + skin.before + skin.earlier
     if not nearby.at.shape[0]:
         skin.depth, skin.used = max(LASTS * path, 4.0 * recent, min(skin.wished, LONGEST * path)), 0.0
-        set_reference(x, nearby, families)
+        set_reference(x, nearby, terms)
         return
     if skin.depth < math.inf:
         skin.used = spread_since(x, nearby.at) + recent
@@ -378,4 +379,4 @@ def choose(drift: float, x: Matrix, v: Matrix, driven: bool, nearby: NeighbourLi
             return
     near = path if driven else abs(drift) * spread_of(v[: nearby.at.shape[0]])
     skin.depth, skin.used = max(min(skin.lasts * near, skin.widest), 4.0 * recent), 0.0
-    take_pairs(x, nearby, families)
+    take_pairs(x, nearby, terms)

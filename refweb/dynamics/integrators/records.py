@@ -13,6 +13,7 @@ import numpy as np
 from numba import from_dtype, types
 
 from ... import kernels as k
+from ...effects.natural_lengths import NaturalLengths
 from ...kernels import (
     INDICES,
     MATRIX,
@@ -25,10 +26,8 @@ from ...kernels import (
     ForceTable,
     Functions,
     IndexTable,
-    Indices,
     IntegerMatrix,
     Integers,
-    LinesTable,
     Matrix,
     MatrixTable,
     PartTable,
@@ -160,27 +159,29 @@ class Inertia(Record):
         )
 
 
-class Families(Record):
-    """Force terms; that of the lines is the first family.
+class ForceTerms(Record):
+    """Force terms; that of the lines is the first term.
 
-    Of those that act only near something, lists have the cells that are looked at; all stand behind all families.
+    Of those that act only near something, lists have the cells that are looked at; all stand behind all terms.
 
     Attributes
     ----------
     forces, cells, data, outs : table
-        Kernel of each family, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
+        Kernel of each term, its cells, its numbers, and what it writes per cell. Behind them ``cells`` has, as a
         column, the numbers of cells that are looked at instead of all, none where all are.
     still, viscous : ndarray of int
-        Families behind the first whose forces follow from displacement and time alone, and those of velocity whose
+        Terms behind the first whose forces follow from displacement and time alone, and those of velocity whose
         kicks are iterated.
+    line_damping : int
+        Number of the one of these that acts on the lines, −1 where there is none.
     energies, stored : table
-        Kernel of the energy of each family, and what it writes per cell [J].
-    working : ndarray of int, shape (families,)
-        Whether what is booked of a family is work (1), its energy, which is lost (−1), or nothing (0).
+        Kernel of the energy of each term, and what it writes per cell [J].
+    working : ndarray of int, shape (terms,)
+        Whether what is booked of a term is work (1), its energy, which is lost (−1), or nothing (0).
     powers : ndarray of int, shape (powered, 3)
-        Families booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
+        Terms booked by their power, the column of ``outs`` that has it, and whether they depend on velocity.
     bounds, dampings : table
-        Kernel that bounds the stiffness of each family, and the damping of each viscous one.
+        Kernel that bounds the stiffness of each term, and the damping of each viscous one.
     """
 
     forces: ForceTable
@@ -189,6 +190,7 @@ class Families(Record):
     outs: MatrixTable
     still: Integers
     viscous: Integers
+    line_damping: int
     energies: EnergyTable
     stored: VectorTable
     working: Integers
@@ -199,28 +201,29 @@ class Families(Record):
     @classmethod
     def of(cls, system, outs):
         """Those of a system, which write to ``outs``; natural lengths that change do so in a copy of their own."""
-        families, net = system.families, system.net
-        lines = net.line_data.copy() if system.line_drives else net.line_data
-        numbers = [lines if family.lines else family.data for family in families]
-        fast = [i for i, family in enumerate(families) if family.damping is not None]
-        viscous = [i for i in fast if families[i].rubbing is None]
-        still = [i for i in range(1, len(families)) if i not in fast]
-        powers = [(i, f.power, i in fast) for i, f in enumerate(families) if f.power is not None]
-        near, stored = near_of(system), [np.zeros(len(family.cells)) for family in families]
-        cells = [*(families[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
+        terms, net = system.terms, system.net
+        lines = (net.line_data.copy() if net.factors else net.line_data).matrix
+        numbers = [lines if term.over_lines else term.data for term in terms]
+        fast = [i for i, term in enumerate(terms) if term.velocity.damping is not None]
+        viscous = [i for i in fast if terms[i].velocity.implicit is None]
+        still = [i for i in range(1, len(terms)) if i not in fast]
+        powers = [(i, f.balance.power, i in fast) for i, f in enumerate(terms) if f.balance.power is not None]
+        near, stored = near_of(system), [np.zeros(len(term.cells)) for term in terms]
+        cells = [*(terms[i].cells for i in near), *(np.empty((0, 1), dtype=np.int32) for _ in near)]
         return cls(
-            forces=Functions(k.FORCE, [family.force for family in families]),
-            cells=Arrays(INDICES, [*(family.cells for family in families), *cells]),
+            forces=Functions(k.FORCE, [term.force for term in terms]),
+            cells=Arrays(INDICES, [*(term.cells for term in terms), *cells]),
             data=Arrays(MATRIX, [*numbers, *(numbers[i] for i in near)]),
             outs=Arrays(MATRIX, [*outs, *(outs[i] for i in near)]),
             still=np.array(still, dtype=np.int64),
             viscous=np.array(viscous, dtype=np.int64),
-            energies=Functions(k.ENERGY, [family.energy or no_energy for family in families]),
+            line_damping=next((i for i in viscous if terms[i].over_lines), -1),
+            energies=Functions(k.ENERGY, [term.energy or no_energy for term in terms]),
             stored=Arrays(VECTOR, [*stored, *(stored[i] for i in near)]),
             working=system.working,
             powers=np.array(powers, dtype=np.int64).reshape(len(powers), 3),
-            bounds=Functions(k.BOUND, [family.bound or no_bound for family in families]),
-            dampings=Functions(k.BOUND, [families[i].damping_bound or no_bound for i in viscous]),
+            bounds=Functions(k.BOUND, [term.tangent.bound or no_bound for term in terms]),
+            dampings=Functions(k.BOUND, [terms[i].velocity.bound or no_bound for i in viscous]),
         )
 
 
@@ -244,65 +247,14 @@ class Motions(Record):
         )
 
 
-class Reels(Record):
-    """Natural lengths that change.
-
-    Attributes
-    ----------
-    kernels, cells, data : table
-        What changes them, elements counted among those that change.
-    lengths : ndarray, shape (changing,)
-        Natural lengths that the kernels multiply [m].
-    elements : ndarray of int
-        Numbers of the elements that change.
-    lines : ndarray, shape (changing, columns)
-        Numbers of these elements as last set.
-    nodes : ndarray of int, shape (changing, 2)
-        Their nodes.
-    by_length : table
-        One kernel of ∂E/∂L [N], where any length changes.
-    corners : ndarray
-        Times at which a factor of natural lengths has a corner [s], increasing, then ∞ for the end of a row if there
-        are such factors, then −∞ for its start.
-    """
-
-    kernels: LinesTable
-    cells: IndexTable
-    data: MatrixTable
-    lengths: Vector
-    elements: Integers
-    lines: Matrix
-    nodes: Indices
-    by_length: EnergyTable
-    corners: Vector
-
-    @classmethod
-    def of(cls, system):
-        """Those of a system."""
-        drives, net = system.line_drives, system.net
-        elements = np.unique(np.concatenate([[], *(drive.cells[:, 0] for drive in drives)])).astype(np.int64)
-        corners = sorted({time for drive in drives for time in drive.times})
-        return cls(
-            kernels=Functions(k.LINES, [drive.kernel for drive in drives]),
-            cells=Arrays(INDICES, [np.searchsorted(elements, drive.cells).astype(np.int32) for drive in drives]),
-            data=Arrays(MATRIX, [drive.data for drive in drives]),
-            lengths=net.natural_length[elements],
-            elements=elements,
-            lines=net.line_data[elements],
-            nodes=net.cells[elements],
-            by_length=Functions(k.ENERGY, [system.length_force_kernel] if drives else []),
-            corners=np.array([*corners, *([np.inf] if drives else []), -np.inf]),
-        )
-
-
 class Model(Record):
     """A system as the loop sees it; ``corners`` are the times at which a table has one [s], increasing."""
 
     inertia: Inertia
-    families: Families
+    terms: ForceTerms
     implicit_contacts: ImplicitContacts
     motions: Motions
-    reels: Reels
+    lengths: NaturalLengths
     corners: Vector
     outside: Outside
     nearby: NeighbourList
@@ -312,10 +264,10 @@ class Model(Record):
 
     @classmethod
     def of(cls, system, outs):
-        """Make the record of a `refweb.system.system.System`, whose families write their values to ``outs``."""
+        """Make the record of a `refweb.system.system.System`, whose terms write their values to ``outs``."""
         inertia = Inertia.of(system)
-        forces = inertia, Families.of(system, outs), ImplicitContacts.of(system, inertia.turns)
-        changes = Motions.of(system), Reels.of(system), system.corners, Outside.of(system)
+        forces = inertia, ForceTerms.of(system, outs), ImplicitContacts.of(system, inertia.turns)
+        changes = Motions.of(system), system.lengths, system.corners, Outside.of(system)
         return cls(*forces, *changes, NeighbourList.of(system), Ccd.of(system), BodyCcd.of(system), Contacts.of(system))
 
 
@@ -330,8 +282,8 @@ class Running(Record):
         Displacement [m], velocity [m/s] and force [N].
     before : ndarray, shape (3, rows, 3)
         The same at the row or the corner of a table before.
-    work : ndarray, shape (families + 1,)
-        Work of each family and, last, of motion [J].
+    work : ndarray, shape (terms + 1,)
+        Work of each term and, last, of motion [J].
     impulse : ndarray, shape (3,)
         Impulse of the supports [N s].
     ledger : refweb.dynamics.integrators.momentum_balance.MomentumBalance
@@ -342,8 +294,8 @@ class Running(Record):
         What each event has come to.
     averages : refweb.dynamics.integrators.averages.Averages
         Means over windows.
-    power : ndarray, shape (families,)
-        Power of each family at the last step [W].
+    power : ndarray, shape (terms,)
+        Power of each term at the last step [W].
     length_force : ndarray, shape (2, changing)
         ∂E/∂L of each length that changes [N], at the last step and at this one.
     crossings : ndarray, shape (3, 5)

@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 @kernel(leaf=True, apart=())
 def energies_now(model: Model, running: Running, total: Vector) -> tuple[float, float]:
     """Write all energies to ``total``; their sum but for work, and that without regard to sign [J]."""
-    clock, families = running.clock[0], model.families
+    clock, terms = running.clock[0], model.terms
     book_energies(
-        clock.time, running.x, running.v, model.inertia.mass, model.inertia.turns, families.cells, families.data,
-        families.energies, families.stored, running.work, families.working, total,
+        clock.time, running.x, running.v, model.inertia.mass, model.inertia.turns, terms.cells, terms.data,
+        terms.energies, terms.stored, running.work, terms.working, total,
     )  # fmt: skip
     stored = 0.0
     for i in range(total.size - 2):
-        if i >= families.working.size or families.working[i] <= 0:
+        if i >= terms.working.size or terms.working[i] <= 0:
             stored += abs(total[i])
-    return own_energy(total, families.working), stored
+    return own_energy(total, terms.working), stored
 
 
 @kernel(leaf=True, apart=())
@@ -39,8 +39,8 @@ def write_row(
     Returns the energy, and the sum of all energies without regard to sign [J]. There is room for a place and for
     momenta.
     """
-    clock, families, inertia, v = running.clock[0], model.families, model.inertia, running.v
-    lines, at = families.outs[0], 1
+    clock, terms, inertia, v = running.clock[0], model.terms, model.inertia, running.v
+    lines, at = terms.outs[0], 1
     row[0] = clock.time
     for i in range(len(observed.probes)):
         row[at] = look_at(i, clock.time, running.x, v, running.f, lines, observed, where)

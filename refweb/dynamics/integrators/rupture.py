@@ -228,7 +228,7 @@ def with_breaks(make, system, probes):
     """The `Rupturing` of a system with some probes and what breaks need; ``make`` is of a system, probes and events."""
     weakness, events = system.weakness, []
     if weakness.watched:
-        share = Probe(line, [0, 0, len(weakness.limits)], 1.0 / weakness.limits[:, None], 1.0)
+        share = Probe(line, [system.tension_column, 0, len(weakness.limits)], 1.0 / weakness.limits[:, None], 1.0)
         events = [Event(len(probes), 1.0, True, stop=True)]
         probes = [*probes, share]
     return Rupturing(make, system, probes, (), events)

@@ -35,10 +35,10 @@ class Sample(NamedTuple):
         Displacement [m], velocity [m/s] and force [N] of each row; what supports give is its negative.
     lines : ndarray, shape (cells, columns)
         What the line elements show: tension [N], strain [1].
-    power : ndarray, shape (families + 1,)
-        Power of each family and, last, of motion [W].
+    power : ndarray, shape (terms + 1,)
+        Power of each term and, last, of motion [W].
     per_cell : dict of int to ndarray
-        What families show of their cells that probes read, by number of the family.
+        What terms show of their cells that probes read, by number of the term.
     """
 
     time: float
@@ -55,8 +55,8 @@ class Rates(NamedTuple):
 
     Attributes
     ----------
-    flow : ndarray, shape (families + 7,)
-        Power of each family and of motion [W]; the force of the supports, and of what acts from outside without a
+    flow : ndarray, shape (terms + 7,)
+        Power of each term and of motion [W]; the force of the supports, and of what acts from outside without a
         formula of its impulse [N].
     lengths : ndarray or None
         Natural lengths [m]; none where nothing changes them.
@@ -70,7 +70,7 @@ class Rates(NamedTuple):
 
 
 class Booked(NamedTuple):
-    """Work of each family and, last, of motion [J]; impulse of the supports, and of what `Rates.push` is [N s]."""
+    """Work of each term and, last, of motion [J]; impulse of the supports, and of what `Rates.push` is [N s]."""
 
     work: np.ndarray
     impulse: np.ndarray
@@ -149,26 +149,26 @@ class SimpsonBalance:
     fast : float
         Velocity [m/s] below which nothing is held to be moving.
     observed : sequence of int
-        Numbers of the families of whose cells probes read what they show.
+        Numbers of the terms of whose cells probes read what they show.
     """
 
     def __init__(self, system, hold, fast, observed=()):
         self.system, self._hold, self._least_energy = system, hold, least_energy(system.net)
         self._linear, self._turns = system.rows - system.net.spins, RigidRotations.of(system.net)
         self._still = system.net.mass[: self._linear].sum() * fast
-        families, self._observed = system.families, observed
-        self._lines = system.net.line_data.copy() if system.line_drives else system.net.line_data
-        self._families = (
-            Arrays(INDICES, [f.cells for f in families]),
-            Arrays(MATRIX, [self._lines if f.lines else f.data for f in families]),
-            Functions(ENERGY, [f.energy or no_energy for f in families]),
-            Arrays(VECTOR, [np.zeros(len(f.cells)) for f in families]),
+        terms, self._observed = system.terms, observed
+        self._lines = system.line_data(0.0).matrix.copy()
+        self._terms = (
+            Arrays(INDICES, [f.cells for f in terms]),
+            Arrays(MATRIX, [self._lines if f.over_lines else f.data for f in terms]),
+            Functions(ENERGY, [f.energy or no_energy for f in terms]),
+            Arrays(VECTOR, [np.zeros(len(f.cells)) for f in terms]),
         )
-        self._powered = [(i, f.power) for i, f in enumerate(families) if f.power is not None]
+        self._powered = [(i, f.balance.power) for i, f in enumerate(terms) if f.balance.power is not None]
         self._working = system.working
         self._driven = np.concatenate([[], *(d.cells[:, 0] for d in system.drives)]).astype(np.int64)
         self._outside = Outside.of(system)
-        self._pushing = [families[i] for i in self._outside.pushing]
+        self._pushing = [terms[i] for i in self._outside.pushing]
         self._supported, self._fixed = system.supported, np.flatnonzero(system.fixed)
 
     def sample(self, t, x, v):
@@ -182,7 +182,7 @@ class SimpsonBalance:
         return Sample(t, x, v, force, out.lines.copy(), power, {i: self._show(out, i) for i in self._observed})
 
     def _show(self, out, number):
-        """Values that probes read of families that write ``out``."""
+        """Values that probes read of terms that write ``out``."""
         return self.system.contact_forces.of(out) if number == CONTACT else out[number].copy()
 
     def refuse_endless(self, t, force):
@@ -197,10 +197,10 @@ class SimpsonBalance:
         flow[:-6] = sample.power
         if len(self._fixed):
             flow[-6:-3] = -np.bincount(self._fixed % 3, sample.force.ravel()[self._fixed], 3)
-        for family in self._pushing:
-            rows = system.force_of(family, sample.time, sample.x, sample.v)
+        for term in self._pushing:
+            rows = system.force_of(term, sample.time, sample.x, sample.v)
             flow[-3:] += rows[: self._linear].sum(axis=0)
-        if not system.line_drives:
+        if not system.net.factors:
             return Rates(flow, None, None)
         return Rates(flow, system.natural_length(sample.time), system.length_force(sample.time, sample.x))
 
@@ -244,11 +244,11 @@ class SimpsonBalance:
         return self.system.mass.momentum(np.where(self._supported, 0.0, v))
 
     def energies(self, sample, work, step):
-        """Energy of each family, kinetic energy, work [J] and step size [s], for the work of each family."""
-        t, x, v, system, total = sample.time, sample.x, sample.v, self.system, np.zeros(len(self.system.families) + 3)
-        if system.line_drives:
-            self._lines[:] = system.line_data(t)
-        book_energies(t, x, v, system.net.mass, self._turns, *self._families, work, self._working, total)
+        """Energy of each term, kinetic energy, work [J] and step size [s], for the work of each term."""
+        t, x, v, system, total = sample.time, sample.x, sample.v, self.system, np.zeros(len(self.system.terms) + 3)
+        if system.net.factors:
+            self._lines[:] = system.line_data(t).matrix
+        book_energies(t, x, v, system.net.mass, self._turns, *self._terms, work, self._working, total)
         total[-3] = self.kinetic(x, v)
         total[-1] = step
         return total
@@ -260,8 +260,8 @@ class SimpsonBalance:
     def open(self, course, energies):
         """Note the energy and the momentum at the start of a course."""
         open_balance(course.x, self._momenta(course.v), self._outside, course.ledger)
-        by_family = self._by_family(energies)
-        course.energy, course.largest = by_family.sum(), max(np.abs(by_family).sum(), self._least_energy)
+        by_term = self._by_term(energies)
+        course.energy, course.largest = by_term.sum(), max(np.abs(by_term).sum(), self._least_energy)
 
     def impulses(self, course):
         """Momentum, impulse of the supports and of all else from outside [N s], shape (9,), held against each other."""
@@ -271,13 +271,13 @@ class SimpsonBalance:
 
     def note_largest(self, course, energies):
         """Note the largest energy of a course."""
-        course.largest = max(course.largest, np.abs(self._by_family(energies)).sum())
+        course.largest = max(course.largest, np.abs(self._by_term(energies)).sum())
 
     def close(self, course, energies, before, remedy):
         """Compare the energies at a row with the work; raise `EnergyDriftError` where a large drift does not fall."""
-        by_family, work = self._by_family(energies), energies[-2]
+        by_term, work = self._by_term(energies), energies[-2]
         self.note_largest(course, energies)
-        drift = abs(by_family.sum() - work - course.energy)
+        drift = abs(by_term.sum() - work - course.energy)
         course.worst = max(course.worst, drift)
         share = drift / course.largest
         if not share <= max(DRIFT, CLOSING * course.share):
@@ -289,6 +289,6 @@ class SimpsonBalance:
         if course.nsteps and course.largest > self._least_energy:
             course.share = share
 
-    def _by_family(self, energies):
-        """Energies of the families that are no work, and kinetic energy."""
+    def _by_term(self, energies):
+        """Energies of the terms that are no work, and kinetic energy."""
         return np.delete(energies[:-2], np.flatnonzero(self._working > 0))

@@ -110,15 +110,15 @@ class Splitting(CentralDifference):
     }
 
     def __init__(self, system, *observed, order=6, **steps):
-        for family in system.families:
-            timed = family.power is not None or len(family.times) > 0
-            if family.damping is not None or timed and not family.dead:
-                given = " with damping or friction" if family.name in ("contact", "self_contact") else ""
+        for term in system.terms:
+            timed = term.balance.power is not None or len(term.timing.times) > 0
+            if term.velocity.damping is not None or timed and not term.dead:
+                given = " with damping or friction" if term.name in ("contact", "self_contact") else ""
                 raise InputError(
-                    f'[solve] method = "explicit" takes no [{family.name}]{given}, nothing that depends on velocity, '
+                    f'[solve] method = "explicit" takes no [{term.name}]{given}, nothing that depends on velocity, '
                     'and of time dead loads alone: use "central-difference" or "cvode"'
                 )
-        if system.drives or system.line_drives:
+        if system.drives or system.net.factors:
             raise InputError(
                 '[solve] method = "explicit" takes nothing that is moved or reeled: use "central-difference" or "cvode"'
             )

@@ -20,14 +20,13 @@ from ...kernels import (
     kernel,
     sum_of,
 )
-from ...net.net import LENGTH
 from ...net.rotation import RigidRotations, add_forces_to_bodies, advance_rotation, note_turns, update_attached_nodes
 from .contacts import feel
 from .energy_balance import act
 from .implicit_contacts import detect_all
 
 if TYPE_CHECKING:
-    from .records import Families, Model, Reels, Running
+    from .records import ForceTerms, Model, Running
 
 ROUNDS = 100
 """Largest number of rounds in which velocities at the end of a step are found."""
@@ -79,7 +78,7 @@ def plain_kick(kick, inverse, flat_v, flat_f, x, v, turns):
 
 @kernel(forceinline=True)
 def add_forces(t, x, v, f, lines, first, still, forces, cells, data, outs):
-    """Add the force of the lines, and of all families that follow from displacement and time, to f."""
+    """Add the force of the lines, and of all terms that follow from displacement and time, to f."""
     first[0](t, x, v, f, first[1], first[2], lines)
     for i in still:
         forces[i](t, x, v, f, cells[i], data[i], outs[i])
@@ -120,7 +119,7 @@ def viscous_kick(
     inverse: Matrix,
     half: Matrix,
     extra: Matrix,
-    families: Families,
+    terms: ForceTerms,
     turns: RigidRotations,
 ) -> None:
     """v ← v(half) + ½h (f + f_v(v))/m, iterated for v, and add f_v to f.
@@ -136,8 +135,8 @@ def viscous_kick(
     for _ in range(ROUNDS):
         extra[:] = 0.0
         update_attached_nodes(x, v, turns)
-        for i in families.viscous:
-            act(i, t, x, v, extra, families)
+        for i in terms.viscous:
+            act(i, t, x, v, extra, terms)
         add_forces_to_bodies(x, extra, turns)
         change = fastest = 0.0
         for q in range(flat_v.size):
@@ -177,9 +176,9 @@ def contact_kick(
     the first begins without a memory of another. The power of each loss is written; ``space`` and ``parts_space`` hold
     the contacts.
     """
-    families, implicit, turns = model.families, model.implicit_contacts, model.inertia.turns
-    forces, cells, data, outs, viscous = families.forces, families.cells, families.data, families.outs, families.viscous
-    ends = np.zeros(implicit.families.size, dtype=np.int64)
+    terms, implicit, turns = model.terms, model.implicit_contacts, model.inertia.turns
+    forces, cells, data, outs, viscous = terms.forces, terms.cells, terms.data, terms.outs, terms.viscous
+    ends = np.zeros(implicit.terms.size, dtype=np.int64)
     contacts, parts = detect_all(h, x, v, inverse, model, space, parts_space, ends)
     count, begin = ends[-1], 0
     copy_rows(v, half)
@@ -220,8 +219,8 @@ def contact_kick(
     copy_rows(half, v)
     update_attached_nodes(x, v, turns)
     begin = 0
-    for m in range(implicit.families.size):
-        commit(number, implicit.memories[m], v, contacts, parts, begin, ends[m], outs[implicit.families[m]])
+    for m in range(implicit.terms.size):
+        commit(number, implicit.memories[m], v, contacts, parts, begin, ends[m], outs[implicit.terms[m]])
         begin = ends[m]
 
 
@@ -250,8 +249,8 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
 
     What the kinetic energy of the supports gains is work of their motion; the rows of a history show what is behind.
     """
-    driven, mass, families, motions = model.inertia.driven, model.inertia.mass, model.families, model.motions
-    x, v, f, forces, cells, data = running.x, running.v, running.f, families.forces, families.cells, families.data
+    driven, mass, terms, motions = model.inertia.driven, model.inertia.mass, model.terms, model.motions
+    x, v, f, forces, cells, data = running.x, running.v, running.f, terms.forces, terms.cells, terms.data
     was, turned = np.empty((driven.size, 3)), False
     for d in range(driven.size):
         for k in range(3):
@@ -263,33 +262,15 @@ def turn_supports(t: float, model: Model, running: Running) -> bool:
             now = v[driven[d], k]
             running.work[running.work.size - 1] += 0.5 * mass[driven[d]] * (now + was[d, k]) * (now - was[d, k])
             turned = turned or now != was[d, k]
-    if turned and families.viscous.size + model.implicit_contacts.families.size:
+    if turned and terms.viscous.size + model.implicit_contacts.terms.size:
         f[:] = 0.0
         for i in range(len(forces)):
-            forces[i](t, x, v, f, cells[i], data[i], families.outs[i])
+            forces[i](t, x, v, f, cells[i], data[i], terms.outs[i])
         add_forces_to_bodies(x, f, model.inertia.turns)
-        feel(model.contacts, families)
-        for i in model.implicit_contacts.families:
-            running.power[i] = sum_of(families.outs[i][:, 0])
+        feel(model.contacts, terms)
+        for i in model.implicit_contacts.terms:
+            running.power[i] = sum_of(terms.outs[i][:, 0])
     return turned
-
-
-@kernel(leaf=True)
-def note_lengths(reels, was):
-    """Write natural lengths that change."""
-    for c in range(was.size):
-        was[c] = reels.lines[c, LENGTH]
-
-
-@kernel(apart=("lengths",))
-def set_lengths(t: float, reels: Reels, lines: Matrix) -> None:
-    """Give the elements that change their natural lengths at time t, in the numbers of all ``lines``."""
-    for c in range(reels.lengths.size):
-        reels.lines[c, LENGTH] = reels.lengths[c]
-    for i in range(len(reels.kernels)):
-        reels.kernels[i](t, reels.lines, reels.cells[i], reels.data[i])
-    for c in range(reels.elements.size):
-        lines[reels.elements[c], LENGTH] = reels.lines[c, LENGTH]
 
 
 @kernel(leaf=True, apart=("looks",))

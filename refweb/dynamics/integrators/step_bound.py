@@ -5,25 +5,25 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from ...effects.natural_lengths import set_lengths
 from ...kernels import BOUND, Matrix, kernel
 from ...net.rotation_bounds import carry_rates, pull_rates
-from .step import set_lengths
 
 if TYPE_CHECKING:
-    from .records import Families, Inertia, Model, Running
+    from .records import ForceTerms, Inertia, Model, Running
 
 
 @kernel(leaf=True, apart=())
-def step_bound(reach: float, speed: float, x: Matrix, f: Matrix, inertia: Inertia, families: Families) -> float:
+def step_bound(reach: float, speed: float, x: Matrix, f: Matrix, inertia: Inertia, terms: ForceTerms) -> float:
     """Largest stable step [s], 2/ω (√(1 + ζ²) − ζ); infinite where nothing vibrates.
 
     It is that of all that can act before a row has moved by ``reach`` [m], at ``speed`` [m/s] at most, while forces f
     act at x.
     """
-    mass, viscous, rates, losses = inertia.mass, families.viscous, inertia.rates[0], inertia.rates[1]
+    mass, viscous, rates, losses = inertia.mass, terms.viscous, inertia.rates[0], inertia.rates[1]
     inertia.rates[:] = 0.0
-    for i in range(len(families.bounds)):
-        families.bounds[i](reach, speed, x, mass, rates, families.cells[i], families.data[i])
+    for i in range(len(terms.bounds)):
+        terms.bounds[i](reach, speed, x, mass, rates, terms.cells[i], terms.data[i])
     carries = inertia.turns.carried.shape[0] > 0
     if carries:
         carry_rates(rates, inertia.turns)
@@ -35,8 +35,8 @@ def step_bound(reach: float, speed: float, x: Matrix, f: Matrix, inertia: Inerti
         return 2.0 / math.sqrt(rate) if rate > 0.0 else math.inf
     step = math.inf
     for n in range(viscous.size):
-        cells, data = families.cells[viscous[n]], families.data[viscous[n]]
-        families.dampings[n](reach, speed, x, mass, losses, cells, data)
+        cells, data = terms.cells[viscous[n]], terms.data[viscous[n]]
+        terms.dampings[n](reach, speed, x, mass, losses, cells, data)
     if carries:
         carry_rates(losses, inertia.turns)
     for r in inertia.moving:
@@ -56,11 +56,11 @@ def safe_step(
     time, and stiffness, which goes with its inverse, is largest at an end.
     """
     bound = math.inf
-    for corner in model.reels.corners:
+    for corner in model.lengths.corners:
         if changing and (start < corner < end or corner == math.inf) or corner == -math.inf:
             if changing:
-                set_lengths(min(max(corner, start), end), model.reels, model.families.data[0])
-            bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.families))
+                set_lengths(min(max(corner, start), end), model.lengths, model.terms.data[0])
+            bound = min(bound, step_bound(reach, speed, x, f, model.inertia, model.terms))
     return bound
 
 
@@ -69,17 +69,17 @@ def step_by_elements(
     start: float, end: float, changing: bool, reach: float, speed: float, model: Model, running: Running
 ) -> float:
     """Bound the step as `safe_step` does, by the elements themselves where the pairs are not all that can touch."""
-    nearby, families = model.nearby, model.families
-    first = 2 * len(families.data) - len(families.cells)  # see `refweb.dynamics.integrators.records.Families`
-    for m in range(nearby.families.size):
-        i = nearby.families[m]
-        nearby.cells[m], nearby.data[m] = families.cells[i], families.data[i]
-        families.cells[i], families.data[i] = families.cells[first + m], families.data[first + m]
+    nearby, terms = model.nearby, model.terms
+    first = 2 * len(terms.data) - len(terms.cells)  # see `refweb.dynamics.integrators.records.ForceTerms`
+    for m in range(nearby.terms.size):
+        i = nearby.terms[m]
+        nearby.cells[m], nearby.data[m] = terms.cells[i], terms.data[i]
+        terms.cells[i], terms.data[i] = terms.cells[first + m], terms.data[first + m]
     bound = safe_step(start, end, changing, reach, speed, running.x, running.f, model)
-    for m in range(nearby.families.size):
-        i = nearby.families[m]
-        families.cells[i], families.data[i] = nearby.cells[m], nearby.data[m]
-        nearby.cells[m], nearby.data[m] = families.cells[first + m], families.data[first + m]
+    for m in range(nearby.terms.size):
+        i = nearby.terms[m]
+        terms.cells[i], terms.data[i] = nearby.cells[m], nearby.data[m]
+        nearby.cells[m], nearby.data[m] = terms.cells[first + m], terms.data[first + m]
     return bound
 
 

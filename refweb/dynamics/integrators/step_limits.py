@@ -36,17 +36,17 @@ class StepLimits:
 
     def __init__(self, system, rotations=None):
         self.lines = None
-        if any(family.crossing is not None for family in system.families):
+        if any(term.contact.crossing is not None for term in system.terms):
             from .line_line_ccd import FollowedLines
 
             self.lines = FollowedLines(system)
         self.followed: list = [] if self.lines is None else [self.lines]
-        if any(family.passing is not None for family in system.families):
+        if any(term.contact.passing is not None for term in system.terms):
             from .line_body_ccd import FollowedBodies
 
             self.followed.append(FollowedBodies(system))
         self.pairs = None
-        if any(family.pairs for family in system.families):
+        if any(term.contact.pairs for term in system.terms):
             from .body_body_ccd import FollowedPairs
 
             self.pairs = FollowedPairs(system)

@@ -112,9 +112,9 @@ class StepObserver(Integrator):
         self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
         self.tolerances = {"m": self.atol_position, "m/s": self.atol_velocity}
         self.stats = dict(nfev=0, njev=0, nlu=0)
-        self._measurements, self._events = Measurements(probes, sums, len(system.families)), event_rows(events)
+        self._measurements, self._events = Measurements(probes, sums, len(system.terms)), event_rows(events)
         still = max(fast, self.atol_velocity / rtol)
-        self._book = SimpsonBalance(system, self.hold, still, self._measurements.families)
+        self._book = SimpsonBalance(system, self.hold, still, self._measurements.terms)
         self._limits = StepLimits(system, self.rotations)
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
@@ -210,7 +210,7 @@ class StepObserver(Integrator):
         v = system.initial_velocity() if v is None else v.copy()
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        sample, work = self._book.sample(0.0, x, v), np.zeros(len(system.families) + 1)
+        sample, work = self._book.sample(0.0, x, v), np.zeros(len(system.terms) + 1)
         energies = self._book.energies(sample, work, 0.0)
         extremes, averages, values = self._measurements.at_start(sample, energies)
         events = self._events.copy()
@@ -251,7 +251,7 @@ class StepObserver(Integrator):
     def advance(self, course: ObservedState, times):
         """Take a course to each of some times, see `refweb.dynamics.integrators.integrator.Integrator.advance`."""
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        history = History.empty(len(times), self._measurements.probed, self.system.families)
+        history = History.empty(len(times), self._measurements.probed, self.system.terms)
         for n, end in enumerate(times):
             before = course.time
             while course.time < end and not course.stopped:

@@ -55,7 +55,7 @@ class Sundials(StepObserver):
 
     def __init__(self, system, *observed, **tolerances):
         super().__init__(system, *observed, **tolerances)
-        refuse_found(system.families, f'method = "{self.method}"')
+        refuse_found(system.terms, f'method = "{self.method}"')
         self._product, self._exact, self._true = None, False, False
 
     def tolerance(self):

@@ -15,6 +15,6 @@ def scales(system):
     mass = np.maximum(np.bincount(net.cells.ravel(), minlength=system.rows), 1)
     light = np.where(net.mass > 0.0, net.mass, np.inf) / mass
     lightest = light[net.cells].min(axis=1)
-    rate = np.sqrt(net.line_data[:, 1] / length / np.where(np.isfinite(lightest), lightest, np.inf)).max(initial=0.0)
+    rate = np.sqrt(net.line_data.ea / length / np.where(np.isfinite(lightest), lightest, np.inf)).max(initial=0.0)
     near = 1e-3 * length.min()
     return near, near * rate if rate > 0.0 else near

@@ -23,7 +23,7 @@ class Workspace(Record):
         Velocities and forces that nobody needs, velocities at half a step [m/s], and momenta [N s].
     was : ndarray, shape (changing,)
         Natural lengths ahead of a step [m].
-    total : ndarray, shape (families + 3,)
+    total : ndarray, shape (terms + 3,)
         Energies [J], and the size of a step [s].
     inside : refweb.dynamics.integrators.dense_output.Inside
         Space for looks inside of a step.
@@ -46,7 +46,7 @@ class Workspace(Record):
     def of(cls, model, running):
         """Space for the steps of a run."""
         rows, sums, vectors = len(running.x), len(running.work) + 2, (np.zeros((len(running.x), 3)) for _ in range(4))
-        losses = [np.empty_like(model.families.outs[i]) for i in model.implicit_contacts.families.tolist()]
+        losses = [np.empty_like(model.terms.outs[i]) for i in model.implicit_contacts.terms.tolist()]
         return cls(
             where=np.zeros(2, dtype=np.int64),
             reaction=np.zeros(3),
@@ -57,7 +57,7 @@ class Workspace(Record):
             extra=next(vectors),
             half=next(vectors),
             momenta=next(vectors),
-            was=np.empty(len(model.reels.lengths)),
+            was=np.empty(len(model.lengths.elements)),
             total=np.zeros(sums),
-            inside=Inside.of(rows, model.families.outs[0], running.extremes, sums, losses),
+            inside=Inside.of(rows, model.terms.outs[0], running.extremes, sums, losses),
         )

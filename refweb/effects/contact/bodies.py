@@ -1,4 +1,4 @@
-"""Pairs of bodies that may touch each other, as families of cells.
+"""Pairs of bodies that may touch each other, as terms of cells.
 
 A cell is two bodies: the rows of both, and two rows of rotation of each; where a body has fewer, its own row stands in
 their place and is not read. A skeleton that is one point with all of the thickness, a sphere's, says all there is to
@@ -13,12 +13,14 @@ import numpy as np
 
 from ...errors import InputError
 from ...net.skeleton import COLUMNS, THICKNESS
-from ..base import CONTACT_COLUMNS, OWN, Family
+from ..base import OWN, Balance, ContactForce, ForceTerm, Tangent, Timing, VelocityForce
 from .body_body_detection import PARTS, SIDE, SIDES
 from .pair import lever
 
 PER_PART, MORE = 3, 1024
 """Contacts that a part of a skeleton has at most on a convex body; room for more where one is not convex."""
+FELT_BY_BOTH = 1, 0
+"""`ContactForce.felt` of two bodies."""
 
 
 def pairs_of(net):
@@ -40,8 +42,8 @@ def skeleton_of(body):
     return parts
 
 
-def families(net, law_of):
-    """The families of all pairs of bodies of a net, of one kind each.
+def force_terms(net, law_of):
+    """The terms of all pairs of bodies of a net, of one kind each.
 
     Parameters
     ----------
@@ -60,56 +62,51 @@ def families(net, law_of):
         pressed.setdefault(depths, []).append((a, b, law))
         if law[2] > 0.0 or law[3] > 0.0:
             losing.setdefault(depths, []).append((a, b, law))
-    families = [_penalty(net, depths, group) for depths, group in pressed.items()]
-    return families + [_friction(net, depths, group) for depths, group in losing.items()]
+    terms = [_penalty(net, depths, group) for depths, group in pressed.items()]
+    return terms + [_friction(net, depths, group) for depths, group in losing.items()]
 
 
 def _penalty(net, depths, group):
     from .body_body_penalty import kernels, near
 
     force, energy, stiffness, bound = kernels(*depths)
-    return Family(
+    turns = any(body.turn is not None for a, b, _ in group for body in (a, b))
+    return ForceTerm(
         **_shared(net, group),
         force=force,
         energy=energy,
-        stiffness=stiffness,
-        bound=bound,
-        near=near,
-        pairs=tuple((a, b) for a, b, _ in group),
-        book="body_contact_energy",
-        symmetric=not any(body.turn is not None for a, b, _ in group for body in (a, b)),  # moments, and quaternions
+        tangent=Tangent(stiffness, bound, symmetric=not turns),  # moments, and quaternions
+        contact=ContactForce(FELT_BY_BOTH, tuple((a, b) for a, b, _ in group), near),
+        balance=Balance("body_contact_energy", internal=True),
     )
 
 
 def _friction(net, depths, group):
     from .body_body_friction import kernels
 
-    force, stiffness, damping, rubbing = kernels(*depths)
+    force, stiffness, damping, implicit = kernels(*depths)
     shared = _shared(net, group)
     parts = shared["data"][:, [SIDES + PARTS, SIDES + SIDE + PARTS]].sum(axis=1)
-    return Family(
+    return ForceTerm(
         **shared,
         force=force,
-        energy=None,
-        stiffness=stiffness,
-        book="dissipated_energy",
-        power=OWN,
-        damping=damping,
-        rubbing=rubbing(int(parts.max())),
-        symmetric=False,
-        at_rest=False,
+        tangent=Tangent(stiffness, symmetric=False),
+        velocity=VelocityForce(damping, implicit=implicit(int(parts.max()))),
+        contact=ContactForce(FELT_BY_BOTH),
+        balance=Balance("dissipated_energy", OWN, internal=True),
+        timing=Timing(at_rest=False),
     )
 
 
 def _shared(net, group) -> dict:
-    """Common arguments of the `Family` of some pairs."""
+    """Common arguments of the `ForceTerm` of some pairs."""
     cells, data = zip(*(_pair(net, *pair) for pair in group), strict=True)
     rows = np.zeros((len(data), max(len(row) for row in data)))
     for row, values in zip(rows, data, strict=True):
         row[: len(values)] = values
     rows[:, 0] = rows[:, 0].max()
     cells = np.array(cells, dtype=np.int32)
-    return dict(name="contact", internal=True, felt=(1, 0), cells=cells, data=rows, observed=CONTACT_COLUMNS)
+    return dict(name="contact", cells=cells, data=rows)
 
 
 def _pair(net, first, second, law):

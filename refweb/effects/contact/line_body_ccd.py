@@ -32,12 +32,12 @@ PARTS = 256
 """Largest number of parts of an element whose depth is looked at one by one."""
 
 
-def limits_of(family, bodies):
+def limits_of(term, bodies):
     """(Least depth that nothing is to come to [m], depth of an element over that which is shown of it, at most).
 
-    The second is infinite where that is not known. They are those of a family and the bodies that its cells touch.
+    The second is infinite where that is not known. They are those of a term and the bodies that its cells touch.
     """
-    own_bodies = [body for body in bodies if body.row in family.cells[:, 2]]
+    own_bodies = [body for body in bodies if body.row in term.cells[:, 2]]
     observed = [
         1.0 if b.shape.once else SHOWN if getattr(b.shape.depth(), "convex", True) else math.inf for b in own_bodies
     ]

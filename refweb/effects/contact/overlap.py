@@ -36,7 +36,6 @@ import numpy as np
 
 from ...errors import InputError, PenetrationError, SolverError
 from ...findings import Finding
-from ...net.net import AXIAL_STIFFNESS
 from ...net.rigid_body import RigidBody
 from ..base import pairs_of
 
@@ -329,7 +328,7 @@ def first_stiffness(system, body, exponent, load_steps=()):
     net, deep = system.net, AIM * allowed(body)
     if not math.isfinite(deep):
         raise InputError(f'stiffness is missing for body "{body.name}", whose size is infinite: give stiffness = ...')
-    lines = net.line_data[:, AXIAL_STIFFNESS] / (net.natural_length * exponent * deep ** (exponent - 1.0))
+    lines = net.line_data.ea / (net.natural_length * exponent * deep ** (exponent - 1.0))
     push = max(_push(system, body, t) for t in (*load_steps, *_times(system)))
     asked = push / deep**exponent
     if net.quasi_static:

@@ -42,7 +42,7 @@ class BodyPassage:
 
     def __init__(self, system):
         self._system, self._met = system, np.full(5, np.inf)
-        self._followed = any(family.passing is not None for family in system.families)
+        self._followed = any(term.contact.passing is not None for term in system.terms)
 
     def record(self, met):
         """Note the first that has met, a row of `refweb.dynamics.integrators.integrator.IntegratorState.crossings`."""

@@ -3,7 +3,7 @@
 The kernels of spheres alone are in `refweb.effects.contact.sphere`; other shapes, which touch a line wherever it lies
 on them, and other exponents are in `refweb.effects.contact.penalty`, damping and friction in
 `refweb.effects.contact.friction`, and how explicit steps solve for them in `refweb.effects.contact_solver`. Bodies
-whose kernels are the same make one family.
+whose kernels are the same make one term.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest, quote
 from ...tables import Table, boolean, field, real, table
-from ..base import CONTACT_COLUMNS, OWN, Family
+from ..base import OWN, Balance, CellElements, ContactForce, ForceTerm, Tangent, Timing, VelocityForce
 from .line_body_ccd import passing
 from .nearest_point import in_sphere, near
 from .pair import AWAY, pair_data
@@ -158,7 +158,7 @@ class Contact(Table):
         return replace(net, bodies=tuple(replace(body, turns=turns(body)) for body in net.bodies))
 
     def on(self, net):
-        """The families of all pairs of a line and a body, of one kind each; ``out`` has the depth of the deepest
+        """The terms of all pairs of a line and a body, of one kind each; ``out`` has the depth of the deepest
         contact [m], or the power of what is lost [W], and the force on the body [N]."""
         names = [body.name for body in net.bodies]
         if not names:
@@ -177,13 +177,13 @@ class Contact(Table):
             pressed.setdefault((depth, 2 if spins == 2 and not ball else 0), []).append(body)
             if self._of(body, "damping") > 0.0 or self._of(body, "friction") > 0.0:
                 losing.setdefault((body.shape.depth(), spins), []).append(body)
-        families = [self._penalty(net, element, depth, spins, bodies) for (depth, spins), bodies in pressed.items()]
+        terms = [self._penalty(net, element, depth, spins, bodies) for (depth, spins), bodies in pressed.items()]
         lost = [self._friction(net, element, depth, spins, bodies) for (depth, spins), bodies in losing.items()]
         if self.between_bodies:
-            from .bodies import families as between
+            from .bodies import force_terms as between
 
-            return families + lost + between(net, self.law_between)
-        return families + lost
+            return terms + lost + between(net, self.law_between)
+        return terms + lost
 
     def law_between(self, first, second):
         """(stiffness, exponent, damping, friction, slip velocity) of two bodies."""
@@ -196,7 +196,7 @@ class Contact(Table):
         return tuple(map(max, *laws))
 
     def _pairs(self, net, bodies, spins=0) -> dict:
-        """Common arguments of a `Family` of every element with each of some bodies, with ``spins`` rows of their
+        """Common arguments of a `ForceTerm` of every element with each of some bodies, with ``spins`` rows of their
         rotations.
         """
         along = net.cells[:, net.along]
@@ -206,23 +206,19 @@ class Contact(Table):
         data = [pair_data(body, along, net.points, law, spins == 2) for body, law in zip(bodies, laws, strict=True)]
         nodes = along.shape[1]
 
-        def disable_cells(numbers):
+        def disable(numbers):
             numbers[:, AWAY : AWAY + 3 * nodes] += np.tile(OUT_OF_REACH, nodes)
 
         return dict(
             name="contact",
-            contact=True,
-            felt=(nodes,),
-            observed=CONTACT_COLUMNS,
-            internal=True,
+            contact=ContactForce((nodes,)),
             cells=np.ascontiguousarray(np.vstack(cells), dtype=np.int32),
             data=np.ascontiguousarray(np.vstack(data)),
-            elements=np.tile(np.arange(len(along)), len(bodies)),
-            disable_cells=disable_cells,
+            elements=CellElements(np.tile(np.arange(len(along)), len(bodies)), disable),
         )
 
     def _penalty(self, net, element, depth, spins, bodies):
-        """The family of bodies of one depth, or without one of spheres alone; with ``spins`` of 2 they turn."""
+        """The term of bodies of one depth, or without one of spheres alone; with ``spins`` of 2 they turn."""
         pairs = self._pairs(net, bodies, spins)
         if depth is None:
             from .sphere import kernels
@@ -234,37 +230,31 @@ class Contact(Table):
             from .penalty import kernels
 
             (force, energy, stiffness, bound), within = kernels(depth, *element, spins), in_reach(depth, spins)
-        return Family(
+        if net.order == 1:  # explicit steps take no other elements
+            passes = None if net.quasi_static else passing(depth, *element[1:], spins)
+            pairs["contact"] = pairs["contact"]._replace(near=near(*element, within), passing=passes)
+        return ForceTerm(
             **pairs,
-            passing=passing(depth, *element[1:], spins) if net.order == 1 and not net.quasi_static else None,
             force=force,
             energy=energy,
-            stiffness=stiffness,
-            bound=bound,
-            near=near(*element, within) if net.order == 1 else None,  # explicit steps take no other elements
-            book="contact_energy",
-            symmetric=spins == 0,  # moments, and quaternions
+            tangent=Tangent(stiffness, bound, symmetric=spins == 0),  # moments, and quaternions
+            balance=Balance("contact_energy", internal=True),
         )
 
     def _friction(self, net, element, depth, spins, bodies):
         from .friction import kernels
 
         force, stiffness, bound, damping = kernels(depth, *element, spins)
-        pairs, rubbing = self._pairs(net, bodies, spins), None
+        implicit = None
         if net.order == 1:  # explicit steps take no other elements
             from . import line_body_friction
 
-            rubbing = line_body_friction.kernels(depth, net.subdivide, element[2], spins)
-        return Family(
-            **pairs,
+            implicit = line_body_friction.kernels(depth, net.subdivide, element[2], spins)
+        return ForceTerm(
+            **self._pairs(net, bodies, spins),
             force=force,
-            energy=None,
-            stiffness=stiffness,
-            bound=bound,
-            book="dissipated_energy",
-            power=OWN,
-            damping=damping,
-            rubbing=rubbing,
-            symmetric=False,
-            at_rest=False,
+            tangent=Tangent(stiffness, bound, symmetric=False),
+            velocity=VelocityForce(damping, implicit=implicit),
+            balance=Balance("dissipated_energy", OWN, internal=True),
+            timing=Timing(at_rest=False),
         )

@@ -25,7 +25,7 @@ MOST = 3
 def silent_of(system):
     """The `Silent` of a system whose bodies may meet and do not touch each other, None where they cannot."""
     bodies = [body for body in system.net.bodies if not body.shape.planar]
-    if len(bodies) < 2 or all(body.fixed for body in bodies) or any(family.pairs for family in system.families):
+    if len(bodies) < 2 or all(body.fixed for body in bodies) or any(term.contact.pairs for term in system.terms):
         return None
     return Silent(system.net, bodies)
 

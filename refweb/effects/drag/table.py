@@ -12,9 +12,8 @@ import numpy as np
 from ...accepted import accepts, by_name
 from ...errors import InputError
 from ...messages import nearest
-from ...net.net import REFERENCE
 from ...tables import Several, Table, field, real, table, vector
-from ..base import Family, without
+from ..base import Balance, CellElements, ForceTerm, Tangent, Timing, VelocityForce, without
 from .force import kernels
 from .implicit_drag import implicit_drag
 
@@ -108,19 +107,19 @@ class Drag(Table):
     bodies: dict = field(_bodies, default_factory=dict)
 
     def on(self, net):
-        """The families of the nodes of elements and of free bodies; ``out`` is the power [W]."""
+        """The terms of the nodes of elements and of free bodies; ``out`` is the power [W]."""
         free = [body for body in net.bodies if not body.fixed]
         names = [body.name for body in free]
         for name in self.bodies:
             if name not in names:
                 raise InputError(f'bodies."{name}" is not a free body, {nearest(name, names)}')
-        families = [self._family(net, *self._ends(net))]
+        terms = [self._term(net, *self._ends(net))]
         if free:
             numbers = np.zeros((len(free), 11))
             numbers[:, 0], numbers[:, 2:5] = [self._of(body) for body in free], self.wind
             numbers[:, 8] = numbers[:, 9] = 1.0
-            families.append(self._family(net, np.array([[body.row] for body in free], dtype=np.int32), numbers))
-        return families
+            terms.append(self._term(net, np.array([[body.row] for body in free], dtype=np.int32), numbers))
+        return terms
 
     def _ends(self, net):
         """Cells and numbers of all nodes of elements, those of a node together, and the element of each."""
@@ -135,7 +134,7 @@ class Drag(Table):
             order = [a, *(b for b in range(count) if b != a)]
             slopes = (power[1:] * position ** (power[1:] - 1)) @ functions[1:]
             both = np.outer(shares[a] * pressed, [self.normal, math.pi * self.tangential])
-            rest = np.tile([*self.wind], (elements, 1)), net.line_data[:, REFERENCE : REFERENCE + 3]
+            rest = np.tile([*self.wind], (elements, 1)), net.line_data.reference
             tail = np.zeros((elements, 1)), net.natural_length[:, None], np.tile(slopes[order], (elements, 1))
             cells.append(net.cells[:, order])
             numbers.append(np.hstack([both, *rest, *tail]))
@@ -155,23 +154,17 @@ class Drag(Table):
         coefficient = SPHERE if settings.coefficient is None else settings.coefficient
         return 0.5 * self.density * coefficient * (settings.area or math.pi * body.shape.grown().radius ** 2)
 
-    def _family(self, net, cells, data, elements=None):
+    def _term(self, net, cells, data, elements=None):
         blows = any(self.wind)
         force, stiffness, damping, bound = kernels(cells.shape[1])
-        return Family(
+        return ForceTerm(
             name="drag",
             cells=cells,
             data=data,
             force=force,
-            book="work" if blows else "dissipated_energy",
-            stiffness=stiffness if cells.shape[1] > 1 else None,
-            bound=bound if cells.shape[1] > 1 else None,
-            observed=1,
-            power=0,
-            damping=damping,
-            rubbing=implicit_drag(cells.shape[1]),
-            symmetric=False,
-            at_rest=blows,
-            elements=elements,
-            disable_cells=without(slice(2)),
+            balance=Balance("work" if blows else "dissipated_energy", power=0),
+            tangent=Tangent(*((stiffness, bound) if cells.shape[1] > 1 else (None, None)), symmetric=False),
+            velocity=VelocityForce(damping, implicit=implicit_drag(cells.shape[1])),
+            timing=Timing(at_rest=blows),
+            elements=CellElements(elements, without(slice(2))),
         )

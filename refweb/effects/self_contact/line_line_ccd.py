@@ -18,7 +18,6 @@ import math
 import numpy as np
 
 from ...kernels import CCD_NEIGHBOURS, MEETS, TIME_TO_CONTACT, kernel
-from ...net.net import REFERENCE
 from ..vectors import dot
 from .pair import SCALE, SHAPE, TOUCH, WIDTH, nearest, place_of
 from .search import near_pairs
@@ -180,7 +179,7 @@ def neighbours(net, beside, touch):
     """
     cells, count = net.cells, len(net.cells)
     positions = np.stack([net.points[cells[:, 0]]] * 2, axis=1)
-    positions[:, 1] += net.line_data[:, REFERENCE : REFERENCE + 3]
+    positions[:, 1] += net.line_data.reference
     ends = np.arange(2 * count)  # element, and which of its nodes
     order = ends[np.argsort(cells.ravel(), kind="stable")]
     begin = np.searchsorted(cells.ravel()[order], np.arange(net.nodes + 1))

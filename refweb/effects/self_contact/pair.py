@@ -1,6 +1,6 @@
 """Numbers of elements, and of pairs of elements, as the kernels of lines against lines read them.
 
-Cells of a family are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
+Cells of a term are pairs, of the nodes of one element and of another, or elements of which any two may touch: then
 `refweb.effects.self_contact.search` makes pairs of them.
 """
 

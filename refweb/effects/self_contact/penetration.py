@@ -20,7 +20,6 @@ import numpy as np
 
 from ...errors import PenetrationError, SolverError
 from ...findings import Finding
-from ...net.net import AXIAL_STIFFNESS, LENGTH
 
 AIM = 0.8
 """Overlap that a stiffness is named for, over the radius."""
@@ -35,8 +34,8 @@ HELD = 16.0 / 15.0 * (4.0 - (2.0 - AIM) ** 2) ** POWER / (8.0 * math.sqrt(12.0))
 
 
 def pressed(system):
-    """Number of the family of lines against lines of a system, None where there is none."""
-    numbers = (i for i, family in enumerate(system.families) if family.crossing is not None)
+    """Number of the term of lines against lines of a system, None where there is none."""
+    numbers = (i for i, term in enumerate(system.terms) if term.contact.crossing is not None)
     return next(numbers, None)
 
 
@@ -58,7 +57,7 @@ def would_pass(system, v, nodes):
     carries comes with the mass of the body.
     """
     fixed, pairs = system.fixed.all(axis=1), np.reshape(nodes, (2, 2))
-    crossing = system.families[pressed(system)].crossing
+    crossing = system.terms[pressed(system)].contact.crossing
     given = f"{lines_of(system.net, nodes)} would pass through each other"
     heavy = []
     for pair in pairs:
@@ -88,8 +87,8 @@ def first_stiffness(system):
     system : refweb.system.system.System
         With any stiffness of lines.
     """
-    net, touch = system.net, system.families[pressed(system)].crossing.touch
-    lines = float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+    net, touch = system.net, system.terms[pressed(system)].contact.crossing.touch
+    lines = float((net.line_data.ea / net.line_data.natural_length).max())
     if net.quasi_static:
         return lines
     v = system.initial_velocity()[: system.rows - net.spins]
@@ -104,7 +103,7 @@ class Passage:
     Parameters
     ----------
     system : refweb.system.system.System
-        With a family of lines against lines.
+        With a term of lines against lines.
     unfollowed : str, optional
         What does not follow them, and why; None where they are followed.
     chosen : bool
@@ -113,8 +112,9 @@ class Passage:
 
     def __init__(self, system, unfollowed=None, chosen=False):
         self._system, self._unfollowed, self._chosen = system, unfollowed, chosen
-        family = system.families[pressed(system)]
-        self.touch, self._stiffness, self._elements = family.crossing.touch, family.crossing.stiffness, family.elements
+        term = system.terms[pressed(system)]
+        crossing, self._elements = term.contact.crossing, term.elements.numbers
+        self.touch, self._stiffness = crossing.touch, crossing.stiffness
         self._deepest, self._crossings = 0.0, np.full((2, 5), np.inf)
 
     def record(self, overlap, crossings):

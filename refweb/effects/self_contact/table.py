@@ -1,4 +1,4 @@
-"""Contact of lines with lines: what a scene says of it, and its families."""
+"""Contact of lines with lines: what a scene says of it, and its terms."""
 
 from __future__ import annotations
 
@@ -9,10 +9,19 @@ import numpy as np
 
 from ... import memory
 from ...errors import InputError
-from ...net.net import AXIAL_STIFFNESS, LENGTH, REFERENCE
 from ...tables import Table, boolean, real, table
-from ..base import Crossing, Family, without
-from ..length_factor import shortest_of
+from ..base import (
+    Balance,
+    CellElements,
+    ContactForce,
+    Crossing,
+    ForceTerm,
+    Tangent,
+    Timing,
+    VelocityForce,
+    without,
+)
+from ..natural_lengths import shortest_of
 from .pair import APART, DAMPING, ENDS, RUBBING, SCALE, TOUCH
 from .pair import LENGTH as OWN_LENGTH
 from .search import distances, near, near_pairs, paired
@@ -90,7 +99,7 @@ class SelfContact(Table):
     rolling: bool = boolean(default=True)
 
     def on(self, net):
-        """The family of the push, and those of damping and friction.
+        """The term of the push, and those of damping and friction.
 
         ``out`` is how deep a pair or an element overlaps [m], or the power of what is lost [W].
         """
@@ -105,61 +114,48 @@ class SelfContact(Table):
         cells, data = self._elements(net, near_along(net, 2.0 * self.radius))
         self._refuse_overlap(net, *near_pairs(0.0, np.zeros_like(net.points), cells, data))
         chosen = listed(cells, data) if len(cells) ** 2 < 4 * LISTED + 4 * len(cells) else None
-        common = dict(internal=True, disable_cells=without(SCALE), finder=None, near=near)
         if chosen is not None and len(chosen) <= LISTED:
             rows, numbers = paired(chosen, cells, data)
-            common |= dict(cells=rows, data=numbers, elements=chosen)
-            all_listed = True
+            common: dict = dict(cells=rows, data=numbers, elements=CellElements(chosen, without(SCALE)))
+            search = ContactForce(near=near)
         else:
             if net.quasi_static:
                 raise InputError(
                     f"radius = {self.radius:g}: {len(cells)} elements make more than {LISTED} pairs, which statics "
                     'does not take: use [solve] kind = "dynamic" and a [damping], or a smaller web'
                 )
-            common |= dict(cells=cells, data=data, elements=np.arange(len(cells)), near=None, finder=near_pairs)
-            all_listed = False
+            common = dict(cells=cells, data=data, elements=CellElements(np.arange(len(cells)), without(SCALE)))
+            search = ContactForce(finder=near_pairs)
         beside = line_line_ccd.neighbours(net, data[:, APART:], 2.0 * self.radius)
         kernels = line_line_ccd.meets, line_line_ccd.watch, line_line_ccd.soon
         follows = Crossing(*kernels, 2.0 * self.radius, self.stiffness_on(net), *beside)
-        push = Family(
-            crossing=follows,
+        push = ForceTerm(
             name="self_contact",
             force=line_line_penalty.force,
             energy=line_line_penalty.energy,
-            bound=line_line_penalty.bound,
-            stiffness=line_line_penalty.stiffness if all_listed else None,
-            book="self_contact_energy",
-            observed=1,
+            tangent=Tangent(line_line_penalty.stiffness if search.finder is None else None, line_line_penalty.bound),
+            balance=Balance("self_contact_energy", internal=True),
+            contact=search._replace(crossing=follows),
             **common,
         )
-        families = [push]
+        terms = [push]
         if self.damping > 0.0:
             from . import line_line_damping
 
-            families.append(
-                self._lossy(line_line_damping, all_listed, damping_bound=line_line_damping.damping_bound, **common)
-            )
+            velocity = VelocityForce(line_line_damping.damping, line_line_damping.damping_bound)
+            terms.append(_lossy(line_line_damping, velocity, search, **common))
         if self.friction > 0.0:
             from . import line_line_friction
 
-            friction_terms = dict(rubbing=line_line_friction.KICKS, twists=not self.rolling)
-            families.append(self._lossy(line_line_friction, all_listed, **friction_terms, **common))
-        return families if len(families) > 1 else push
-
-    @staticmethod
-    def _lossy(kernels, all_listed, **arguments):
-        """The family of damping or of friction, by the module of its kernels."""
-        return Family(
-            name="self_contact", force=kernels.force, bound=kernels.bound,
-            stiffness=kernels.stiffness if all_listed else None, book="dissipated_energy", observed=1, power=0,
-            damping=kernels.damping, symmetric=False, at_rest=False, **arguments,
-        )  # fmt: skip
+            velocity = VelocityForce(line_line_friction.damping, implicit=line_line_friction.KICKS)
+            terms.append(_lossy(line_line_friction, velocity, search, twists=not self.rolling, **common))
+        return terms if len(terms) > 1 else push
 
     def stiffness_on(self, net):
         """Its stiffness [N/m], chosen where it is left out."""
         if self.stiffness is not None:
             return self.stiffness
-        return float((net.line_data[:, AXIAL_STIFFNESS] / net.line_data[:, LENGTH]).max())
+        return float((net.line_data.ea / net.line_data.natural_length).max())
 
     def _elements(self, net, beside):
         """Nodes and numbers of all elements with those beside them, see `refweb.effects.self_contact.pair`."""
@@ -169,7 +165,7 @@ class SelfContact(Table):
         data[:, SCALE] = self.stiffness_on(net) / (math.sqrt(12.0) * touch**3)
         data[:, OWN_LENGTH] = net.natural_length
         data[:, ENDS : ENDS + 3] = net.points[net.cells[:, 0]]
-        data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data[:, REFERENCE : REFERENCE + 3]
+        data[:, ENDS + 3 : ENDS + 6] = net.points[net.cells[:, 0]] + net.line_data.reference
         data[:, RUBBING : RUBBING + 3] = self.friction, self.slip_velocity, self.rolling
         data[:, APART:] = beside
         return np.ascontiguousarray(net.cells, dtype=np.int32), data
@@ -214,6 +210,20 @@ class SelfContact(Table):
     def with_stiffness(self, stiffness):
         """The table with a stiffness."""
         return replace(self, stiffness=stiffness)
+
+
+def _lossy(kernels, velocity, search, twists=False, **common):
+    """The term of damping or of friction, by the module of its kernels."""
+    return ForceTerm(
+        name="self_contact",
+        force=kernels.force,
+        tangent=Tangent(kernels.stiffness if search.finder is None else None, kernels.bound, symmetric=False),
+        velocity=velocity,
+        contact=search,
+        balance=Balance("dissipated_energy", power=0, internal=True, twists=twists),
+        timing=Timing(at_rest=False),
+        **common,
+    )
 
 
 def listed(cells, data):

@@ -9,12 +9,12 @@ from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
 
 def weights(system, column):
-    """Weights of (energy of each family, kinetic energy, work, step size) that make a column of the whole net."""
-    total, books = column == "total_energy", [f.book for f in system.families]
+    """Weights of (energy of each term, kinetic energy, work, step size) that make a column of the whole net."""
+    total, books = column == "total_energy", [f.balance.column for f in system.terms]
     stored = [book not in ("work", "dissipated_energy") for book in books]
     weights_found = [
-        (total and family_weight) or (book != "work" and book == column)
-        for family_weight, book in zip(stored, books, strict=True)
+        (total and term_weight) or (book != "work" and book == column)
+        for term_weight, book in zip(stored, books, strict=True)
     ]
     weights_found += [total or column == "kinetic_energy", column == "work", column == "step_size"]
     return np.array(weights_found, dtype=float)
@@ -42,7 +42,7 @@ class Booked(Observable):
 
     def on(self, system):
         """Refuse a column that no effect writes to."""
-        if self.needs and self.observe.quantity not in [f.book for f in system.families]:
+        if self.needs and self.observe.quantity not in [f.balance.column for f in system.terms]:
             raise InputError(f'quantity = "{self.observe.quantity}" needs {self.needs} in the scene')
 
     def of(self, state):
@@ -50,7 +50,7 @@ class Booked(Observable):
         return Value(state.energies[self.observe.quantity], None)
 
     def weights(self, system):
-        """Weights of (energy of each family, kinetic energy, work, step size)."""
+        """Weights of (energy of each term, kinetic energy, work, step size)."""
         return weights(system, self.observe.quantity)
 
 
@@ -146,10 +146,10 @@ class Work(Booked):
 
     def on(self, system):
         """Refuse a scene without such effects, and in statics work that depends on the path."""
-        moved = system.drives or system.line_drives
+        moved = system.drives or system.net.factors
         if not moved:
             super().on(system)
-        loads = [f for f in system.families if f.book == "work"]
+        loads = [f for f in system.terms if f.balance.column == "work"]
         if system.net.quasi_static and (moved or any(f.energy is None for f in loads)):
             tables = "[[motion]], [[pressure]], [[thrust]] and [[reel]]"
             raise InputError(f'quantity = "work" is not known in statics with {tables}: it depends on the path')

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...net.net import AXIAL_STIFFNESS
+from ...effects.base import STRAIN
 from ...net.tension_laws import TENSION_ONLY
 from .observable import ANY, NOT_NEGATIVE, Observable, Value
 
@@ -17,7 +17,6 @@ class Line(Observable):
     """
 
     keys, at = ("line",), "line"
-    column = 0
 
     def values(self, state):
         """Value of each line in a state, shape (lines,)."""
@@ -54,8 +53,8 @@ class Line(Observable):
         elements, scale = self.elements(system.net), self.scale(system.net)[:, None]
         first, last = int(elements[0]), int(elements[-1])
         if len(elements) == last + 1 - first:
-            return Probe(line, [self.column, first, last + 1], scale)
-        return Probe(line_of, [self.column, *elements.tolist()], scale)
+            return Probe(line, [self.column(system), first, last + 1], scale)
+        return Probe(line_of, [self.column(system), *elements.tolist()], scale)
 
     def position(self, system, at):
         """The line of an element."""
@@ -64,8 +63,12 @@ class Line(Observable):
     def bounds(self, system):
         """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
         pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
-        alone = sum(family.lines for family in system.families) == 1
-        return NOT_NEGATIVE if self.column == 0 and pulls and alone else ANY
+        alone = sum(term.over_lines for term in system.terms) == 1
+        return NOT_NEGATIVE if self.column(system) != STRAIN and pulls and alone else ANY
+
+    def column(self, system):
+        """Column of tension of what the lines observe."""
+        return system.tension_column
 
     def scale(self, net):
         """1, shape (cells,)."""
@@ -115,7 +118,9 @@ class Stress(Line):
 class Strain(Line):
     """Engineering strain."""
 
-    column = 1
+    def column(self, system):
+        """Column of strain."""
+        return STRAIN
 
     def values(self, state):
         """Strain [1], shape (lines,)."""
@@ -123,7 +128,7 @@ class Strain(Line):
 
     def bound(self, tension, net):
         """Error bound of tension over EA [1], shape (cells,)."""
-        return tension / net.line_data[:, AXIAL_STIFFNESS]
+        return tension / net.line_data.ea
 
     def error(self, state, equilibrium):
         """None where duality leaves it open whether the line is slack: then its strain is not unique."""

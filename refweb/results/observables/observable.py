@@ -8,7 +8,6 @@ import numpy as np
 
 from ...errors import InputError
 from ...messages import nearest
-from ...net.net import LENGTH
 
 ANY, NOT_NEGATIVE = (-np.inf, np.inf), (0.0, np.inf)
 """Least and largest value that are possible."""
@@ -119,7 +118,7 @@ class Observable:
         changes, value = [], self.of(state).value
         for share in (SHARE, -SHARE):  # of a line that is neither slack nor taut, the side where it is taut
             numbers = net.line_data.copy()
-            numbers[fixed, LENGTH] *= 1.0 + share
+            numbers.natural_length[fixed] *= 1.0 + share
             moved = type(state)(system.with_line_data(numbers), state.time, state.x)
             changes.append(abs(self.of(moved).value - value))
         return max(changes) / SHARE * ROUNDING

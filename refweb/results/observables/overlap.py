@@ -52,7 +52,7 @@ def probe_of(system, body):
 def _deepest_of(rows):
     from ..probes import Probe, contact_depth
 
-    return Probe(contact_depth, rows, np.zeros((0, 0)), family=CONTACT)
+    return Probe(contact_depth, rows, np.zeros((0, 0)), term=CONTACT)
 
 
 def probes_between(system):

@@ -37,4 +37,4 @@ class Reaction(Nodal):
         if self.observe.body is None:
             return Probe(reaction, numbers, np.where(system.supported[rows], 1.0, 0.0))
         row = system.contact_forces.row(self.body(system.net))
-        return Probe(contact_force, [numbers[0], row], np.zeros((0, 0)), family=CONTACT)
+        return Probe(contact_force, [numbers[0], row], np.zeros((0, 0)), term=CONTACT)

@@ -73,7 +73,8 @@ def exact(system, v, end):
         system.drive(t, x, w)
         return np.concatenate([y[n:], mass.solve(system.force(t, x, w).ravel()[free])])
 
-    corners = sorted({t for part in (*system.families, *system.drives) for t in part.times if 0.0 < t < end})
+    parts = *(term.timing for term in system.terms), *system.drives
+    corners = sorted({t for part in parts for t in part.times if 0.0 < t < end})
     y, before = np.concatenate([np.zeros(n), v.ravel()[free]]), 0.0
     for after in (*corners, end):
         y = solve_ivp(rate, (before, after), y, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]

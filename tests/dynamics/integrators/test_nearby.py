@@ -39,7 +39,7 @@ def case(*effects, subdivide=1, **contact):
 def solver_of(scene, everything):
     system = scene.build()
     if everything:
-        system.families = [replace(family, near=None, passing=None) for family in system.families]
+        system.terms = [replace(term, contact=term.contact._replace(near=None, passing=None)) for term in system.terms]
     solver = Simulation(scene, scene.build(), refweb.Solution(scene)).integrator
     return CentralDifference(system, *solver.observed)
 
@@ -95,11 +95,11 @@ def test_what_is_near_is_what_is_near():
     scene, rng = case(BALL, BOX, subdivide=3), np.random.default_rng(7)
     system = scene.build()
     net, counts = system.net, []
-    for family in (one for one in system.families if one.near is not None):
-        body = next(body for body in net.bodies if body.row == family.cells[0, -1])
+    for term in (one for one in system.terms if one.contact.near is not None):
+        body = next(body for body in net.bodies if body.row == term.cells[0, -1])
         for skin in (0.0, 0.05, 0.3):
-            x, chosen = rng.normal(0.0, 0.02, (system.rows, 3)), np.empty(len(family.cells), dtype=np.int64)
-            count = family.near(skin, x, family.cells, family.data, chosen)
+            x, chosen = rng.normal(0.0, 0.02, (system.rows, 3)), np.empty(len(term.cells), dtype=np.int64)
+            count = term.contact.near(skin, x, term.cells, term.data, chosen)
             may = np.isin(net.line, net.line[distances(net, body, x) < skin])
             must = np.isin(net.line, net.line[-depths(net, body, x) < skin])
             np.testing.assert_array_equal(np.isin(net.line, net.line[chosen[:count]]).sum(), count)  # whole lines
@@ -115,16 +115,16 @@ def test_far_from_a_body_few_lines_are_looked_at():
     solver = solver_of(case(BALL), False)
     course, model = solver.start(), solver._model
     solver.advance(course, [2e-3])
-    skin, lists = model.nearby.skin, model.families
+    skin, lists = model.nearby.skin, model.terms
     everything = len(lists.cells[1])
     assert everything == 2 * 8 * 7 and skin["depth"] == np.inf  # whoever comes next looks at all
-    family = solver.system.families[1]
-    swap, arrays = neighbour_list.swap_of(family.near), (lists.cells, lists.data, lists.outs, lists.stored)
+    term = solver.system.terms[1]
+    swap, arrays = neighbour_list.swap_of(term.contact.near), (lists.cells, lists.data, lists.outs, lists.stored)
     swap(1, 0, 0.05, course.x, *arrays)
     chosen = lists.cells[-1][:, 0]
     assert 0 < len(chosen) < 0.5 * everything
-    np.testing.assert_array_equal(lists.cells[1], family.cells[chosen])
-    np.testing.assert_array_equal(lists.data[1], family.data[chosen])
+    np.testing.assert_array_equal(lists.cells[1], term.cells[chosen])
+    np.testing.assert_array_equal(lists.data[1], term.data[chosen])
     lists.outs[1][:], skin["depth"] = 1.0, 0.05
     neighbour_list.show_near(model.nearby, lists)
     np.testing.assert_array_equal(np.flatnonzero(lists.outs[-1][:, 0]), chosen)

@@ -37,7 +37,7 @@ def exact(system, end):
         return np.concatenate([y[n:], system.force(t, x, v).ravel()[free] / mass])
 
     y = np.concatenate([np.zeros(n), system.initial_velocity().ravel()[free]])
-    stops = sorted({0.0, end, *(t for family in system.families for t in family.times)})
+    stops = sorted({0.0, end, *(t for term in system.terms for t in term.timing.times)})
     for begin, stop in itertools.pairwise(stops):
         y = solve_ivp(rate, (begin, stop), y, "DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
     x = np.zeros((system.rows, 3))

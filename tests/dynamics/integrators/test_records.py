@@ -38,7 +38,7 @@ def test_what_a_run_has_used_is_free_behind_it(name, changes):
         integrator.advance(course, [end])
     model, running = integrator._model, integrator._running(course)
     used = [course.x, course.v, course.force, course.before, course.work, course.extremes.values, *integrator._outs]
-    used += [model.inertia.inverse, model.inertia.rates, model.families.still, running.clock]
+    used += [model.inertia.inverse, model.inertia.rates, model.terms.still, running.clock]
     alive = [weakref.ref(array) for array in used]
     del simulation, integrator, course, model, running, used
     gc.collect()

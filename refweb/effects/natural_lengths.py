@@ -1,0 +1,118 @@
+"""Natural lengths at a time: those of the net, times factors that follow tables over time.
+
+Reels and heat give the net factors, and nothing else changes natural lengths. `set_lengths` is all that computes them;
+it writes them to the numbers of the lines that its caller holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..kernels import (
+    ENERGY,
+    INDICES,
+    VECTOR,
+    Arrays,
+    EnergyTable,
+    Functions,
+    IndexTable,
+    IntegerMatrix,
+    Integers,
+    Matrix,
+    Record,
+    Vector,
+    VectorTable,
+    kernel,
+)
+from .base import column
+from .elasticity import length_force
+from .line_kernels import NATURAL_LENGTH
+from .time_tables import flattened, interpolate
+
+
+class NaturalLengths(Record):
+    """Natural lengths that change.
+
+    Attributes
+    ----------
+    elements : ndarray of int, shape (changing,)
+        Numbers of the elements that change, increasing.
+    built : ndarray, shape (changing,)
+        Natural lengths that the factors multiply [m].
+    runs : ndarray of int, shape (runs, 2)
+        First and last + 1 of the elements that follow each other.
+    cells, tables : table
+        Elements of each factor, as a column, and its table over time.
+    by_length : table
+        One kernel of ∂E/∂L [N], where any length changes.
+    corners : ndarray
+        Times at which a factor has a corner [s], increasing, then ∞ for the end of a row if there are factors, then −∞
+        for its start.
+    """
+
+    elements: Integers
+    built: Vector
+    runs: IntegerMatrix
+    cells: IndexTable
+    tables: VectorTable
+    by_length: EnergyTable
+    corners: Vector
+
+    @classmethod
+    def of(cls, net):
+        """Make the record of a net."""
+        factors = net.factors
+        elements = np.unique(np.concatenate([[], *(part for part, _ in factors)])).astype(np.int64)
+        begins = np.flatnonzero(np.diff(elements, prepend=-2) > 1)
+        ends = np.append(begins[1:], len(elements))[: len(begins)] - 1
+        corners = sorted({t for _, table in factors for t, _ in table})
+        return cls(
+            elements=elements,
+            built=net.natural_length[elements],
+            runs=np.ascontiguousarray(np.column_stack([elements[begins], elements[ends] + 1])),
+            cells=Arrays(INDICES, [column(part) for part, _ in factors]),
+            tables=Arrays(VECTOR, [np.array(flattened(table)) for _, table in factors]),
+            by_length=Functions(ENERGY, [length_force(net)] if factors else []),
+            corners=np.array([*corners, *([np.inf] if factors else []), -np.inf]),
+        )
+
+
+@kernel(apart=("lengths",))
+def set_lengths(t: float, lengths: NaturalLengths, lines: Matrix) -> None:
+    """Write natural lengths at time t to the numbers of all ``lines``."""
+    for c in range(lengths.elements.size):
+        lines[lengths.elements[c], NATURAL_LENGTH] = lengths.built[c]
+    for i in range(len(lengths.tables)):
+        factor, cells = interpolate(t, lengths.tables[i], 0, 2, 1)[0], lengths.cells[i]
+        for c in range(cells.shape[0]):
+            lines[cells[c, 0], NATURAL_LENGTH] *= factor
+
+
+def with_factor(net, lines, table):
+    """The net with a factor on the natural lengths of some lines.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        What it acts on.
+    lines : ndarray of int, shape (k,)
+        Lines of the web; all elements of a line share the factor.
+    table : sequence of (t, factor)
+        Linear in between, end values held.
+    """
+    return replace(net, factors=(*net.factors, (np.flatnonzero(np.isin(net.line, lines)), table)))
+
+
+def shortest_of(net):
+    """Natural length of each element at its shortest in a run [m], shape (cells,).
+
+    Between corners a length is a product of positive linear functions of time, which is least at an end.
+    """
+    lengths, numbers, shortest = NaturalLengths.of(net), net.line_data.copy(), net.natural_length.copy()
+    shortest[lengths.elements] = np.inf
+    for t in {0.0, net.end, *lengths.corners[(lengths.corners > 0.0) & (lengths.corners < net.end)]}:
+        set_lengths(t, lengths, numbers.matrix)
+        np.minimum(shortest, numbers.natural_length, out=shortest)
+    return shortest
