@@ -20,7 +20,6 @@ import numpy as np
 
 from ..effects.base import DAMPED_TENSION, TENSION, BreakLimits, Constraint, ForceTerm, PrescribedMotion
 from ..effects.elasticity import length_force
-from ..effects.natural_lengths import NaturalLengths, set_lengths
 from ..findings import Finding
 from ..net.rigid_body import row_names, with_rotations
 from ..net.tension_laws import TENSION_ONLY
@@ -207,7 +206,9 @@ class System:
 
     @cached_property
     def lengths(self):
-        """The `NaturalLengths` that change with time."""
+        """The `refweb.effects.natural_lengths.NaturalLengths` that change with time."""
+        from ..effects.natural_lengths import NaturalLengths
+
         return NaturalLengths.of(self.net)
 
     def line_data(self, t):
@@ -216,6 +217,8 @@ class System:
             return self.net.line_data
         known = self._at_time
         if known is None or known[0] != t:
+            from ..effects.natural_lengths import set_lengths
+
             numbers = self.net.line_data.copy()
             set_lengths(t, self.lengths, numbers.matrix)
             self._at_time = known = t, numbers
