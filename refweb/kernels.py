@@ -82,6 +82,7 @@ force adds to that on the row), which are equal but for rotations."""
 CONTACT = np.dtype(
     [
         ("cell", np.int64),
+        ("owner", np.int64),
         ("tag", np.int64),
         ("term", np.int64),
         ("first", np.int64),
@@ -103,8 +104,10 @@ CONTACT = np.dtype(
 )
 """A contact: three directions along which a force acts on some rows.
 
-Its ``cell`` among those of the force ``term``, and a ``tag`` that tells it from others of the cell; its parts, a
-``count`` from the ``first`` on, see `PART`; a ``basis`` that stays from step to step, by rows the directions.
+Its ``cell`` among those of the force ``term``, where it shows its power; the ``owner`` that remembers it, a cell
+of the term or, of pairs of elements that are found anew, the first element, with a ``tag`` that tells it from others
+there; its parts, a ``count`` from the ``first`` on, see `PART`; a ``basis`` that stays from step to step, by rows the
+directions.
 
 Numbers of its law: the push N₀ [N], damping d [s/m], friction μ and slip velocity v_s [m/s]; of drag the ``tangent`` of
 the line, c_n and c_t [kg/m], and the ``wind`` [m/s]. Contacts that share a row may be one ``group``, of so many from

@@ -135,6 +135,17 @@ class Cache:
         store.write(self.file(signature), dumps(((name, kind, code), *rest)))
 
 
+def without_literals(signature):
+    """The signature for any whole number where a caller names one.
+
+    By itself numba compiles a kernel again for each whole number that a caller names. That pays where the caller is
+    optimized with it, as ``forceinline`` asks for: loops over the nodes of an element become straight code.
+    """
+    arguments, result = sigutils.normalize_signature(signature)
+    arguments = tuple(map(types.unliteral, arguments))
+    return arguments if result is None else result(*arguments)
+
+
 def dispatcher(function, given, cache) -> Any:
     """A dispatcher of numba with a `Cache`, of which one thread and one process compiles at a time."""
     if PLAIN:
@@ -143,6 +154,8 @@ def dispatcher(function, given, cache) -> Any:
     made._cache, compile_one = cache, made.compile
 
     def compile_alone(signature):
+        if not given.get("forceinline"):
+            signature = without_literals(signature)
         known = made.overloads.get(tuple(sigutils.normalize_signature(signature)[0]))
         if known is not None:
             return known.entry_point

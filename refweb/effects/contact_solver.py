@@ -309,14 +309,14 @@ def gauss_seidel(h, number, f, inverse, contacts, parts, count, laws):
 
 @kernel(forceinline=True)
 def slot_of(memory, contact):
-    """Slot of a contact in the memory of its cell: that of its tag, a free one, or that of the oldest step."""
+    """Slot of a contact in the memory of its owner: that of its tag, a free one, or that of the oldest step."""
     slots, oldest = memory.shape[1], contact.tag % memory.shape[1]
     for s in range(slots):
         slot = (contact.tag + s) % slots
-        step = memory[contact.cell, slot].step
-        if step == 0 or memory[contact.cell, slot].tag == contact.tag:
+        step = memory[contact.owner, slot].step
+        if step == 0 or memory[contact.owner, slot].tag == contact.tag:
             return slot
-        if step < memory[contact.cell, oldest].step:
+        if step < memory[contact.owner, oldest].step:
             oldest = slot
     return oldest
 
@@ -336,7 +336,7 @@ def warm_start(number, memory, f, contacts, parts, begin, end):
         contact = contacts[n]
         if contact.group == 0:
             continue
-        past = memory[contact.cell, slot_of(memory, contact)]
+        past = memory[contact.owner, slot_of(memory, contact)]
         if past.tag != contact.tag or past.step != number - 1 or number == 1:
             continue
         a, b, c = direction(contact, 0), direction(contact, 1), direction(contact, 2)
@@ -354,7 +354,7 @@ def commit(number, memory, v, contacts, parts, begin, end, out):
         if contact.group == 0:
             continue
         p, q, s = contact.force[0], contact.force[1], contact.force[2]
-        past = memory[contact.cell, slot_of(memory, contact)]
+        past = memory[contact.owner, slot_of(memory, contact)]
         past.tag, past.step = contact.tag, number
         for k in range(3):
             past.force[k] = p * contact.basis[0, k] + q * contact.basis[1, k] + s * contact.basis[2, k]

@@ -39,7 +39,7 @@ def kernels(law, gradients, weights):
     points, nodes = len(gradients), len(gradients[0])
     flat = tuple(value for row in gradients for value in row)
 
-    @kernel()
+    @kernel(forceinline=True)
     def pull_at(x, cells, data, c, q):
         """(dx/dξ, w T/|dx/dξ|, T, ε) at quadrature point q of element c."""
         p0, p1, p2, inverse, e = strain(x, cells, data, c, q, nodes, flat)

@@ -37,7 +37,7 @@ def line_at(data, c):
     return Line(data[c, 0], data[c, 1], data[c, 2], data[c, 3], data[c, 4], data[c, 5])
 
 
-@kernel()
+@kernel(forceinline=True)
 def gradient(v, cells, c, q, nodes, gradients):
     """dv/dξ at quadrature point q of cell c."""
     v0 = v1 = v2 = 0.0
@@ -49,7 +49,7 @@ def gradient(v, cells, c, q, nodes, gradients):
     return v0, v1, v2
 
 
-@kernel()
+@kernel(forceinline=True)
 def direction(x, cells, data, c, nodes, along, slopes):
     """(dx/dξ over its length |d|, 1/|d|), or zeros, of the cell c of so many ``nodes``.
 
@@ -66,13 +66,13 @@ def direction(x, cells, data, c, nodes, along, slopes):
     return (d0 * inverse, d1 * inverse, d2 * inverse), inverse
 
 
-@kernel()
+@kernel(forceinline=True)
 def law_of(law, data, c):
     """Number of the law of cell c, where ``law`` is that of all cells or `MIXED`."""
     return np.int64(data[c, LAW]) if law == MIXED else law
 
 
-@kernel()
+@kernel(forceinline=True)
 def strain(x, cells, data, c, q, nodes, gradients):
     """(dx/dξ, 1/|dx/dξ| or 0, ε) at quadrature point q of cell c."""
     u0, u1, u2 = gradient(x, cells, c, q, nodes, gradients)
@@ -84,7 +84,7 @@ def strain(x, cells, data, c, q, nodes, gradients):
     return p0, p1, p2, inverse, square / (natural * (length + natural))
 
 
-@kernel()
+@kernel(forceinline=True)
 def pull_together(f, cells, c, q, nodes, gradients, scale, p0, p1, p2):
     """Add to the forces on the nodes of cell c those of a tension at quadrature point q: −``scale`` dN/dξ dx/dξ."""
     for a in range(nodes):

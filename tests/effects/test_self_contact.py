@@ -419,6 +419,38 @@ def test_pairs_that_are_found_give_the_same_run(monkeypatch):
         np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
 
 
+def test_more_pairs_than_elements_are_remembered(monkeypatch):
+    """Twelve lines slide over twelve others, which make 144 pairs of 24 elements, as CVODE says they do.
+
+    CVODE has all pairs in its list, of which each remembers one force: an element remembers eight.
+    """
+    spots = 0.05 * np.arange(12)
+    below = [((-0.1, y, 0.0), (0.65, y, 0.0)) for y in spots]
+    above = [((x, -0.1, 0.0021), (x, 0.65, 0.0021)) for x in spots]
+    ends = [end for line in (*below, *above) for end in line]
+    runs = []
+    for limit, method, keys in (
+        (0, "central-difference", {"safety": 0.1}),
+        (0, "central-difference", {"safety": 0.05}),
+        (20_000, "cvode", {"rtol": 1e-9}),
+    ):
+        monkeypatch.setattr(table, "LISTED", limit)
+        scene = refweb.Scene(
+            web=refweb.Inline(points=ends, lines=[(2 * n, 2 * n + 1) for n in range(24)], supports=[]),
+            cable=refweb.Cable(law="tension-only", modulus=7e7, area=1e-6, density=1000.0),
+            effects=[refweb.SelfContact(radius=1e-3, stiffness=1e3, friction=0.3)],
+            solve=refweb.Dynamic(duration=0.01, method=method),
+        )
+        system = scene.build()
+        solver = INTEGRATORS[method].integrator_of(scene.solve, system, (), (), (), **keys)
+        course = solver.start(None, np.where(np.arange(system.rows)[:, None] >= 24, [0.5, 0.2, -0.05], 0.0))
+        solver.advance(course, np.linspace(0.0, 0.01, 11)[1:])
+        runs.append(course.x)
+    errors = [np.abs(x - runs[-1]).max() for x in runs[:-1]]
+    assert np.abs(runs[-1][:24]).max() > 3e-4  # what rests is pushed and dragged along
+    assert errors[0] < 5e-8 and 3.0 < errors[0] / errors[1] < 9.0  # order 2, with kinks where lines begin to touch
+
+
 def test_free_strings_keep_energy_and_momenta():
     """Drift of energy falls with the square of the step; momentum is kept to rounding of some 1e3 steps."""
     drifts = []

@@ -207,7 +207,10 @@ def state_within(
 def exchange_losses(keeps: bool, inside: Inside, model: Model) -> None:
     """Keep what terms show whose kicks are solved for, which forces at other states write over, or show it again."""
     for m in range(model.implicit_contacts.terms.size):
-        values, kept = model.terms.outs[model.implicit_contacts.terms[m]], inside.losses[m]
+        values = model.terms.outs[model.implicit_contacts.terms[m]]
+        if inside.losses[m].shape[0] != values.shape[0]:  # pairs that are listed are as many as they happen to be
+            inside.losses[m] = np.empty(values.shape)
+        kept = inside.losses[m]
         for c in range(values.shape[0]):
             for k in range(values.shape[1]):
                 if keeps:

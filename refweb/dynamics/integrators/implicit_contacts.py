@@ -43,7 +43,7 @@ class ImplicitContacts(Record):
     detects, laws : table
         Their kernels, see `refweb.effects.base.ImplicitContactKernels`.
     memories : table
-        Forces of the step before, within a row: `refweb.kernels.MEMORY` for each cell and slot.
+        Forces of the step before, within a row: `refweb.kernels.MEMORY` for each cell, or element, and slot.
     depths : ndarray of int
         The ``outs`` of `refweb.dynamics.integrators.records.ForceTerms` that has depths, −1 for those that have none.
     elements : table
@@ -79,7 +79,11 @@ class ImplicitContacts(Record):
             detects=Functions(DETECT, [term.velocity.implicit.detect for term in terms]),
             laws=Functions(LAW, [term.velocity.implicit.law for term in terms]),
             memories=Arrays(
-                MEMORIES, [np.zeros((len(f.cells), f.velocity.implicit.slots), dtype=MEMORY) for f in terms]
+                MEMORIES,
+                [
+                    np.zeros((max(len(f.cells), len(system.net.cells)), f.velocity.implicit.slots), dtype=MEMORY)
+                    for f in terms
+                ],
             ),
             depths=np.array([number for number, _ in depths], dtype=np.int64),
             elements=Arrays(INTEGERS, [elements for _, elements in depths]),
@@ -131,7 +135,7 @@ def detect(m, x, terms, implicit_contacts, contacts, parts, begin):
     cells, data = rows_of(chosen, terms.cells[i], terms.data[i])
     end = implicit_contacts.detects[m](x, cells, data, contacts, parts, begin)
     for n in range(begin, min(end, contacts.size)):
-        contacts[n].cell = chosen[contacts[n].cell]
+        contacts[n].cell = contacts[n].owner = chosen[contacts[n].cell]
     return end
 
 

@@ -68,7 +68,7 @@ def set_contact(contact, parts, points, m, x, cells, data, c):
     y, z = place_of(points, m, 0), place_of(points, m, 1)
     steep, g = facing(vector_at(points, m, NORMAL))
     set_basis(contact, g if steep > 0.0 else (1.0, 0.0, 0.0))  # where nothing pushes any will do
-    contact.cell, contact.tag, contact.group = c, int(points[m, SLOT]), 1
+    contact.cell, contact.owner, contact.tag, contact.group = c, c, int(points[m, SLOT]), 1
     contact.normal_force, contact.damping = push(law, points, m, SHARE) * steep, law.damping * steep
     contact.friction, contact.slip_velocity, contact.wind[:] = law.friction, law.slip_velocity, 0.0
     for i in range(3):

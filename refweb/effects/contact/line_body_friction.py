@@ -46,7 +46,7 @@ def set_contact(contact, parts, touch, cells, spins, functions):
     steep, g = facing(times_transposed(pair.axes, touch.spot.gradient))
     y = times_transposed(pair.axes, touch.spot.y)
     set_basis(contact, g if steep > 0.0 else (1.0, 0.0, 0.0))  # where nothing pushes any will do
-    contact.cell, contact.group = c, 1
+    contact.cell, contact.owner, contact.group = c, c, 1
     contact.tag = 0 if touch.inner or pair.once else 1 if touch.xi < 0.5 else 2
     at = contact.first
     contact.normal_force, contact.damping = rubbed_by(touch) * steep, pair.damping * steep

@@ -104,7 +104,7 @@ def implicit_drag(nodes):
     def detect(x, cells, data, contacts, parts, begin):
         for c in range(cells.shape[0] if begin + cells.shape[0] <= contacts.size else 0):
             contact, (t, _) = contacts[begin + c], direction(x, cells, data, c, nodes, ALONG, SLOPES)
-            contact.cell, contact.group = c, int(data[c, GROUP])
+            contact.cell, contact.owner, contact.group = c, c, int(data[c, GROUP])
             contact.drag[0], contact.drag[1] = data[c, NORMAL], data[c, TANGENTIAL]
             for k in range(3):
                 contact.tangent[k] = t[k]

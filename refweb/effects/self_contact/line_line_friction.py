@@ -224,7 +224,8 @@ def set_contact(contact, parts, cell, c, normal, cells, data, rows, shares):
 
     Its basis has the directions along û and ŵ, or along the components of threads, and a normal without force.
     """
-    contact.cell, contact.tag, contact.count, contact.group = cell, int(data[c, NAMES + 1]), 4, 1
+    contact.cell, contact.owner, contact.tag = cell, int(data[c, NAMES]), int(data[c, NAMES + 1])
+    contact.count, contact.group = 4, 1
     contact.normal_force, contact.damping, contact.wind[:] = normal, 0.0, 0.0
     contact.friction, contact.slip_velocity = data[c, FRICTION], data[c, SLIP]
     for m in range(4):
