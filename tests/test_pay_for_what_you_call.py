@@ -97,8 +97,6 @@ def roots(given, method):
         yield from contact_roots(contact, shapes, static)
     if method in ("cvode", "ida"):
         yield from ("system.sparsity", "system.contact_forces")
-        yield from ["dynamics.integrators.line_body_ccd"] if contact is not None else []
-        yield from ["dynamics.integrators.line_line_ccd"] if "self_contact" in given else []
     if not static and given["solve"].get("start") != "equilibrium":
         return
     yield from ("statics.remarks", "system.sparsity", "system.unsupported_parts")

@@ -193,7 +193,7 @@ def test_top_of_a_parabola():
     """Exact on a parabola, however far apart the points are; none where it opens upwards."""
     p, times = np.polynomial.Polynomial([1.0, 2.0, -3.0]), [0.0, EDGE, 0.7]
     top = top_of(times, [p(t) for t in times])
-    np.testing.assert_allclose([top.time, top.height], [1.0 / 3.0, 4.0 / 3.0], rtol=1e-9)
+    np.testing.assert_allclose(top, [1.0 / 3.0, 4.0 / 3.0], rtol=1e-9)
     assert top_of(times, [-p(t) for t in times]) is None
 
 

@@ -13,11 +13,10 @@ import solids
 from scipy.optimize import minimize
 
 import refweb
-from refweb.dynamics.integrators.body_body_ccd import FollowedPairs
 from refweb.dynamics.integrators.central_difference import CentralDifference
 from refweb.dynamics.integrators.crossings import PAIRS as MET
 from refweb.dynamics.integrators.crossings import none_met
-from refweb.dynamics.integrators.line_line_ccd import Place
+from refweb.dynamics.integrators.passages import Passages, Position
 from refweb.net import discretisation
 from refweb.net.rotation import quaternion_rate
 from refweb.system.system import System
@@ -366,11 +365,14 @@ def test_bodies_that_come_to_a_middle_are_seen():
     What is said to come there does, but for the way of the smallest piece, 1/1024 of some 2 m.
     """
     built, rng, seen = system("sphere", "sphere", stiffness=1e3)[0], np.random.default_rng(5), [0, 0]
-    followed, (one, other) = FollowedPairs(built), built.net.bodies
+    one, other = built.net.bodies
 
     def met(at):
-        course = SimpleNamespace(time=0.0, x=at(0.0), crossings=none_met())
-        followed.inspect(course, SimpleNamespace(middle=Place(0.5, at(0.5)), end=Place(1.0, at(1.0))), at)
+        course, (start, middle, end) = (
+            SimpleNamespace(crossings=none_met()),
+            (Position(t, at(t)) for t in (0.0, 0.5, 1.0)),
+        )
+        Passages(built, at).inspect(course, SimpleNamespace(start=start, middle=middle, end=end))
         return np.isfinite(course.crossings[MET, 0])
 
     def there_and_back(t):

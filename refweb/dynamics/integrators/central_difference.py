@@ -20,18 +20,17 @@ import numpy as np
 from ...compiled.kernel import prepare
 from ...errors import EnergyDriftError, InputError, IntegrationError, SolverError
 from ...kernels import CONTACT, CONTACTS, PART, PARTS, Arrays
-from .averages import begin_averages
 from .ccd import look_anew
 from .dense_output import LOOKS
-from .energy_balance import DRIFT, least_energy, refuse_open
-from .events import event_rows, starts_above
+from .energy_balance import DRIFT, least_energy, own_energies, refuse_open
+from .events import event_rows
 from .explicit_loop import BREATH, HELD, advance_rows, begin, run_steps
 from .explicit_state import ExplicitState
 from .extremes import Extremes
 from .features import features
 from .integrator import MAX_STEPS_PER_ROW, History, Integrator, Variant
 from .momentum_balance import CLOSURE, MomentumBalance, open_balance, refuse_open_momentum
-from .monitors import Observed
+from .monitors import Observed, begin_monitors
 from .neighbour_list import forget, look_at_all
 from .records import CLOCK, Model, Running, Scheme
 from .step_bound import safe_step
@@ -99,7 +98,7 @@ class CentralDifference(Integrator):
             )
         self._outs = outs = tuple(system.per_cell())
         self._model = Model.of(system, outs)
-        self._observed = Observed.of(probes, sums, outs, self._model.contacts)
+        self._observed = Observed.of(probes, sums, len(outs), outs, self._model.contacts)
         self._contacts = Arrays(CONTACTS, [np.empty(0, dtype=CONTACT)]), Arrays(PARTS, [np.empty(0, dtype=PART)])
         self._events, self._least_energy, self._taken, self._prepared = (
             event_rows(events),
@@ -161,36 +160,25 @@ class CentralDifference(Integrator):
         v = system.initial_velocity() if v is None else np.array(v, dtype=float, order="C")
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        signs, sums = self._observed.signs, self._observed.sums
-        extremes = Extremes.at_start(np.zeros(len(signs)), np.full(len(signs), -1))
+        extremes = Extremes.at_start(np.zeros(len(self._observed.signs)))
         work, total = np.zeros(len(system.terms) + 1), np.zeros(len(system.terms) + 3)
         where = np.zeros(2, dtype=np.int64)
         begin.call(x, v, force, where, self._model, self._observed, extremes, work, total)
-        first = len(signs) - len(sums)
-        extremes.values[first:] = sums @ total
-        events = self._events.copy()
-        for event in events:
-            starts_above(event, extremes.values[event["slot"]])
-        stepping = first + np.flatnonzero(sums[:, -1])
-        extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
-        averages = begin_averages(self._observed.windows, extremes)
-        extremes.recent[:, 2] = extremes.values
-        per_term = np.delete(total[:-2], np.flatnonzero(system.working > 0))
+        monitors = begin_monitors(self._observed, extremes, total, self._events)
+        energy, stored = own_energies(total, system.working)
         ledger = MomentumBalance.empty()
         open_balance.call(x, system.net.mass[:, None] * np.where(system.supported, 0.0, v), self._model.outside, ledger)
         return ExplicitState(
             time=0.0,
             x=x,
             v=v,
-            extremes=extremes,
-            events=events,
             work=work,
             ledger=ledger,
-            averages=averages,
-            energy=per_term.sum(),
-            largest=max(np.abs(per_term).sum(), self._least_energy),
+            energy=energy,
+            largest=max(stored, self._least_energy),
             force=force,
             power=np.zeros(len(system.terms)),
+            **monitors,
         )
 
     def save(self, course):

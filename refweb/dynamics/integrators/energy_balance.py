@@ -49,6 +49,12 @@ def least_energy(net):
     return float(0.5 * (lines.ea * lines.natural_length).sum() * (8.0 * np.finfo(float).eps) ** 2 / DRIFT)
 
 
+def own_energies(total, working):
+    """Sum of the energies in ``total`` that are no potential of work [J], and the same without regard to sign."""
+    per_term = np.delete(total[:-2], np.flatnonzero(working > 0))
+    return per_term.sum(), np.abs(per_term).sum()
+
+
 def refuse_open(course, limit, remedy):
     """Refuse a whole run whose energy drift exceeds a limit; `EnergyDriftError`."""
     if not course.drift <= limit:

@@ -1,4 +1,8 @@
-"""Events: moments at which the value of a probe, or of a sum, passes a level."""
+"""Events: moments at which the value of a probe, or of a sum, passes a level.
+
+A compiled step is looked at once, at its end: a moment is known to its size. What is known anywhere within a step is
+searched by bisection, to rounding.
+"""
 
 from __future__ import annotations
 
@@ -118,3 +122,40 @@ def ended_by(events):
         if events[e].stop and events[e].time < math.inf:
             return True
     return False
+
+
+def search(events, piece, value):
+    """Note the events that happen in a piece of a step, and the time of the first that ends the run.
+
+    Those behind the end of the run are taken back.
+
+    Parameters
+    ----------
+    events : ndarray of `EVENT`
+        What each has come to.
+    piece : refweb.dynamics.integrators.simpson_balance.Piece
+        Where they are looked for: in its middle and at its end.
+    value : callable
+        ``value(piece, slot, sample)`` of a probe or a sum.
+
+    Returns
+    -------
+    float
+        That time [s], infinite where none does.
+    """
+    stop, before = np.inf, piece.start.time
+    for sample in (piece.middle, piece.end):
+        for event in events:
+            side, low, high = event["side"], before, sample.time
+            if event["time"] < np.inf or not crosses(event, value(piece, event["slot"], sample)):
+                continue
+            while low < (middle := 0.5 * (low + high)) < high:
+                above = value(piece, event["slot"], piece.at(middle)) > event["level"]
+                low, high = (middle, high) if above == (side > 0.0) else (low, middle)
+            event["time"] = high
+            if event["stop"]:
+                stop = min(stop, high)
+        before = sample.time
+    times = events["time"]
+    times[(times > stop) & (times < np.inf)] = np.inf
+    return stop

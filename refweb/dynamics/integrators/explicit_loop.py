@@ -17,7 +17,6 @@ from ...effects.natural_lengths import set_lengths
 from ...kernels import Integers, Matrix, Vector, copy_rows, kernel
 from ...net.rotation import add_forces_to_bodies
 from ...net.rotation_bounds import fastest_point, hardest_push
-from ...results.probes import PLACE
 from .averages import average
 from .ccd import LEAST, SHORTER, TOLD, comes_through, look_back_at_drift, passes, reject_step
 from .contacts import feel
@@ -35,7 +34,7 @@ from .energy_balance import (
     write_length_force,
 )
 from .events import ended_by, note_events
-from .extremes import look_at, note_time, plain_value, turns_back, update_extreme
+from .extremes import look_at, look_with_places, note_time, plain_value, turns_back, update_extreme
 from .integrator import MAX_STEPS_PER_ROW, SAME
 from .momentum_balance import add_half_steps, push_on, set_push
 from .neighbour_list import covered, reach_all, show_near, update_neighbours
@@ -356,12 +355,7 @@ def begin(
         terms.forces[i](0.0, x, v, f, terms.cells[i], terms.data[i], terms.outs[i])
     add_forces_to_bodies(x, f, model.inertia.turns)
     feel(model.contacts, terms)
-    for i in range(len(observed.probes)):
-        where[0], where[1] = -1, PLACE
-        extremes.values[i] = observed.probes[i](
-            0.0, x, v, f, terms.outs[0], observed.rows[i], observed.data[i], where
-        )  # fmt: skip
-        extremes.places[i] = where[0]
+    look_with_places(0.0, x, v, f, terms.outs[0], where, observed, extremes.values, extremes.places)
     book_energies(
         0.0, x, v, model.inertia.mass, model.inertia.turns, terms.cells, terms.data, terms.energies,
         terms.stored, work, terms.working, total,

@@ -57,8 +57,9 @@ class Extremes(Record):
     looked: Vector
 
     @classmethod
-    def at_start(cls, values, places):
+    def at_start(cls, values, places=None):
         """Those of the values at t = 0."""
+        places = np.full(len(values), -1) if places is None else places
         recent = np.full((len(values), 3), np.nan)
         recent[:, 2] = values
         return cls(values, np.zeros(len(values)), places, np.zeros(len(values)), recent, np.array([np.nan, np.nan, 0]))
@@ -86,10 +87,10 @@ def turns_back(i, value, sign, extreme, recent, ending):
 
 
 @kernel()
-def parabola(extremes, i):
-    """Slope at the middle of the last three looks, and half of the second derivative, of the parabola through them."""
-    before, at, now = extremes.looked[0], extremes.looked[1], extremes.looked[2]
-    low, high, value = extremes.recent[i, 0], extremes.recent[i, 1], extremes.recent[i, 2]
+def parabola(looked, recent):
+    """Slope at the second of three times, and half of the second derivative, of the parabola through values there."""
+    before, at, now = looked[0], looked[1], looked[2]
+    low, high, value = recent[0], recent[1], recent[2]
     rise, fall = (high - low) / (at - before), (value - high) / (now - at)
     curve = (fall - rise) / (now - before)
     return rise + curve * (at - before), curve
@@ -98,7 +99,7 @@ def parabola(extremes, i):
 @kernel()
 def time_of_top(extremes, i, sign):
     """Time between the last three looks at which their parabola has a top above the extreme; not a number if none."""
-    slope, curve = parabola(extremes, i)
+    slope, curve = parabola(extremes.looked, extremes.recent[i])
     top, when = extremes.recent[i, 1] - 0.25 * slope * slope / curve, extremes.looked[1] - 0.5 * slope / curve
     above = sign * curve < 0.0 and sign * top > sign * extremes.values[i]
     return when if above and extremes.looked[0] < when < extremes.looked[2] else math.nan
@@ -109,7 +110,7 @@ def correction(extremes, i, sign, t, value, smooth):
     """Excess of a value between the last three inspections or, ``smooth``, its difference from their parabola."""
     recent = extremes.recent[i]
     if smooth:
-        (slope, curve), late = parabola(extremes, i), t - extremes.looked[1]
+        (slope, curve), late = parabola(extremes.looked, recent), t - extremes.looked[1]
         return abs(value - recent[1] - late * (slope + late * curve))
     return sign * value - max(sign * recent[0], sign * recent[1], sign * recent[2])
 
@@ -137,6 +138,25 @@ def look_at(i, t, x, v, f, lines, observed, where):
     """Value of a probe, by its number."""
     rows, data = observed.rows[i], observed.data[i]
     return observed.probes[i](t, x, v, f, lines, rows, data, where)
+
+
+@kernel(apart=())
+def look_with_places(
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    where: Integers,
+    observed: Observed,
+    values: Vector,
+    places: Integers,
+) -> None:
+    """Write values of all probes, and the row or element that each stands at, −1 for none."""
+    for i in range(len(observed.probes)):
+        where[0], where[1] = -1, PLACE
+        values[i] = look_at(i, t, x, v, f, lines, observed, where)
+        places[i], where[1] = where[0], 0
 
 
 @kernel(leaf=True, apart=("watched",))

@@ -33,8 +33,7 @@ import numpy as np
 
 from ...errors import InputError, SolverError
 from .integrator import Variant
-from .observed_state import ObservedState
-from .step_observer import Stopped
+from .step_observer import ObservedState, Stopped
 from .sundials import Sundials, Symmetric
 from .tolerances import scales
 

@@ -1,36 +1,46 @@
-"""Measurements of a run: its probes and sums, their values at a sample, and their extremes over all samples."""
+"""Monitors on dense output: extremes, means and events of any method, by the kernels of the compiled loop.
+
+Where peaks and means are looked for differs, and no more. A step of the loop has a motion of its order: a peak is
+looked at once, at the top of the parabola through the last three looks, and an integral has as many parts as there are
+looks. Dense output is as accurate at any time within as at its ends. So peaks are searched by several parabolas, and
+steps whose means leave too much open are halved.
+"""
 
 from __future__ import annotations
 
 import bisect
-from typing import NamedTuple
 
 import numpy as np
 
-from ...results.probes import PLACE
-from .averages import HALVINGS, PARTS, PAYS, SETTLED, Windows, begin_averages, open_share, slide, write_means
-from .extremes import EDGE, Extremes, note_time, turns_back
+from ...effects.base import CONTACT
+from .averages import HALVINGS, PARTS, PAYS, SETTLED, average, look_for_means, open_share
+from .extremes import (
+    EDGE,
+    Extremes,
+    begin_anew,
+    inspect,
+    look_at,
+    look_at_sums,
+    look_with_places,
+    parabola,
+    update_extreme,
+)
+from .monitors import Observed, begin_monitors
+from .rows import write_probes
 
 ROUNDS = 6
 """Largest number of looks at one peak."""
 
 
-class Top(NamedTuple):
-    """The highest point of a parabola."""
-
-    time: float
-    height: float
-
-
 def top_of(times, heights):
-    """The `Top` of the parabola through three points, None where it has none; a step of one rounding has no middle."""
-    (before, at, now), (low, high, value) = times, heights
-    if not before < at < now:
+    """(Time, height) of the top of the parabola through three points, None where it has none.
+
+    A step of one rounding has no middle.
+    """
+    if not times[0] < times[1] < times[2]:
         return None
-    rise, fall = (high - low) / (at - before), (value - high) / (now - at)
-    curve = (fall - rise) / (now - before)
-    slope = rise + curve * (at - before)
-    return Top(at - 0.5 * slope / curve, high - 0.25 * slope * slope / curve) if curve < 0.0 else None
+    slope, curve = parabola(tuple(times), tuple(heights))
+    return (times[1] - 0.5 * slope / curve, heights[1] - 0.25 * slope * slope / curve) if curve < 0.0 else None
 
 
 class Measurements:
@@ -38,99 +48,73 @@ class Measurements:
 
     Parameters
     ----------
-    probes : sequence of refweb.results.probes.Probe
-        Scalars of the state.
-    sums : sequence of refweb.dynamics.integrators.integrator.Sum
-        Weighted sums of ``terms`` energies, kinetic energy, work and step size.
-    terms : int
-        Number of terms of the system.
-
-    Attributes
-    ----------
-    probed : int
-        Number of probes.
-    terms : list of int
-        Numbers of the terms of whose cells probes read what they show, see `refweb.results.probes.Probe`.
+    probes, sums : sequence
+        See `refweb.dynamics.integrators.integrator`.
+    book : refweb.dynamics.integrators.simpson_balance.SimpsonBalance
+        Of the energies that sums weigh.
     """
 
-    def __init__(self, probes, sums, terms):
-        self.probed = len(probes)
-        self._probes = [
-            (p.kernel, np.array(p.rows, dtype=np.int64), np.ascontiguousarray(p.data, dtype=float), p.term)
-            for p in probes
-        ]
-        self.terms = sorted({probe.term for probe in probes} - {-1})
-        self._weights = np.array([quantity.weights for quantity in sums], dtype=float).reshape(len(sums), terms + 3)
-        self._signs = np.array([float(quantity.sign) for quantity in (*probes, *sums)])
-        self._windows = Windows.of(probes)
-        self._signs[self._windows.slots] = 0.0
-        self._followed = np.flatnonzero(self._signs[: self.probed])
+    def __init__(self, probes, sums, book):
+        self.observed, self._book = Observed.of(probes, sums, len(book.system.terms)), book
+        self._of_terms = [(i, probe.term) for i, probe in enumerate(probes) if probe.term != -1]
         self._where = np.zeros(2, dtype=np.int64)
 
-    def probe(self, i, sample):
-        """Value of a probe at a `refweb.dynamics.integrators.simpson_balance.Sample`."""
-        kernel, rows, data, term = self._probes[i]
-        data = sample.per_cell.get(term, data)
-        return kernel(sample.time, sample.x, sample.v, sample.force, sample.lines, rows, data, self._where)
+    def _state(self, sample):
+        """Arguments of a look at a sample, whose values per cell probes read from now on."""
+        for i, term in self._of_terms:
+            self.observed.data[i] = sample.felt if term == CONTACT else sample.per_cell[term]
+        return sample.time, sample.x, sample.v, sample.force, sample.per_cell.lines
 
-    def _position_of(self, i, sample):
-        """Row or element that the value of a probe stands at."""
-        self._where[1] = PLACE
-        self.probe(i, sample)
-        self._where[1] = 0
-        return self._where[0]
+    def value(self, piece, slot, sample):
+        """Value of a probe or, behind them, of a sum, at a sample of a piece."""
+        first = len(self.observed.probes)
+        if slot >= first:
+            return self.observed.sums[slot - first] @ self._book.energies_within(piece, sample)
+        return look_at(int(slot), *self._state(sample), self.observed, self._where)
 
-    def probes(self, sample):
-        """Value of each probe at a sample."""
-        return [self.probe(i, sample) for i in range(self.probed)]
+    def start(self, sample, energies, events):
+        """Monitors at t = 0, see `refweb.dynamics.integrators.monitors.begin_monitors`."""
+        extremes = Extremes.at_start(np.zeros(len(self.observed.signs)))
+        look_with_places(*self._state(sample), self._where, self.observed, extremes.values, extremes.places)
+        return begin_monitors(self.observed, extremes, energies, events)
 
-    def value(self, slot, sample, energies):
-        """Value of a probe or, behind them, of a sum; ``energies(sample)`` is what sums weigh."""
-        return self.probe(slot, sample) if slot < self.probed else self._weights[slot - self.probed] @ energies(sample)
+    def write(self, row, sample, course):
+        """Write time, probes and means to a row of a history."""
+        write_probes(row, *self._state(sample), self._where, self.observed, course.averages, course.extremes)
 
-    def at_start(self, sample, energies):
-        """The `Extremes` at t = 0, where no step has been taken, the `Averages` and the values there."""
-        places = [self._position_of(i, sample) for i in range(self.probed)]
-        values = np.array([*self.probes(sample), *(self._weights @ energies)])
-        extremes = Extremes.at_start(values.copy(), np.array([*places, *[-1] * len(self._weights)], dtype=np.int64))
-        averages = begin_averages(self._windows, extremes)
-        stepping = self.probed + np.flatnonzero(self._weights[:, -1])
-        extremes.values[stepping] = extremes.recent[stepping, 2] = -np.inf * self._signs[stepping]
-        return extremes, averages, values
+    def inspect(self, course, piece):
+        """Follow extremes and means through a piece of a step: ahead of a jump at its end, and behind that."""
+        extremes, end = course.extremes, piece.end
+        if piece.jump is not None:
+            end = piece.at(end.time - EDGE * (end.time - piece.start.time))
+        self._inspect(extremes, piece, piece.middle)
+        if self._inspect(extremes, piece, end):
+            self._search_tops(extremes, piece)
+        if len(self.observed.windows.slots):
+            self._average(course, piece, end)
+        if piece.jump is not None:
+            self._inspect(extremes, piece, piece.end)
+            begin_anew(extremes)
 
-    def inspect(self, extremes, sample, energies):
-        """Take the values at a sample over into the extremes; numbers of what may turn back.
+    def _inspect(self, extremes, piece, sample):
+        """Take the values at a sample over into the extremes; tell if any may turn back."""
+        turned = inspect(*self._state(sample), self._where, self.observed, extremes, True)
+        if not len(self.observed.sums):
+            return turned
+        return (
+            look_at_sums(sample.time, self._book.energies_within(piece, sample), self.observed, extremes, True)
+            or turned
+        )
 
-        ``energies(sample)`` is what sums weigh.
-        """
-        note_time(extremes.looked, sample.time)
-        values: dict = {i: self.probe(i, sample) for i in self._followed}
-        if len(self._weights):
-            values |= enumerate(self._weights @ energies(sample), self.probed)
-        turned = []
-        for i, value in values.items():
-            if turns_back(i, value, self._signs[i], extremes.values[i], extremes.recent, True):
-                turned.append(i)
-            self._take_over(extremes, i, value, sample)
-        return turned
-
-    def follow(self, extremes, middle, end, sample_at, energies):
-        """Look at a piece of a step: at its middle, its end and, by ``sample_at(time)``, where values turn back."""
-        self.inspect(extremes, middle, energies)
-        for i in self.inspect(extremes, end, energies):
-            self._search_top(extremes, i, lambda t: (s := sample_at(t), self.value(i, s, energies)))  # noqa: B023
-
-    def average(self, course, piece, end, sample_at):
+    def _average(self, course, piece, end):
         """Slide windows through a piece of a step that ends with the sample ``end``, ahead of a jump."""
-        averages, slots = course.averages, self._windows.slots
-        if not len(slots):
-            return
-        todo = [(piece.begin, end.time, end, HALVINGS, np.inf)]
+        averages, todo = course.averages, [(piece.start.time, end.time, end, HALVINGS, np.inf)]
+        rest = self._where, self.observed, averages
         while todo:
             begin, until, last, halvings, before = todo.pop()
-            inside = [sample_at(begin + (until - begin) * part / PARTS) for part in range(1, PARTS)]
+            inside = [piece.at(begin + (until - begin) * part / PARTS) for part in range(1, PARTS)]
             for part, sample in enumerate((*inside, last), 1):
-                averages.within[:, part] = [self.probe(i, sample) for i in slots]
+                look_for_means(part, *self._state(sample), *rest)
             left = np.array([open_share(w) for w in averages.within])
             pays = (left > SETTLED * np.abs(averages.within).max(axis=1)) & (left < PAYS * before)
             if halvings and pays.any():
@@ -140,46 +124,46 @@ class Measurements:
                     (begin, middle.time, middle, halvings - 1, left),
                 ]
                 continue
+            _, *state = self._state(last)
             now = piece.end.time if last is end else until
-            for n in range(len(slots)):
-                slide(n, now, True, self._windows, averages, course.extremes)
-            averages.looked[0] = now
-        if piece.jump:
-            averages.within[:, 0] = [self.probe(i, piece.end) for i in slots]
+            average(now, *state, self._where, True, self.observed, averages, course.extremes)
+        if piece.jump is not None:
+            look_for_means(0, *self._state(piece.end), *rest)
 
-    def write_means(self, row, course):
-        """Write means to a row of a history, in the places of their probes."""
-        if len(self._windows.slots):
-            write_means(row, self._windows, course.averages, course.extremes)
+    def _search_tops(self, extremes, piece):
+        """Look for peaks of all that may turn back, see `refweb.dynamics.integrators.extremes.turns_back`."""
+        with np.errstate(invalid="ignore"):  # no step has a size ahead of the first
+            first, middle, last = self.observed.signs * extremes.recent.T
+            curve, highest = 2.0 * middle - first - last, np.maximum(middle, last)
+            above = highest + curve > self.observed.signs * extremes.values
+        for i in np.flatnonzero((last - middle < 0.75 * curve) & above).tolist():
+            self._search_top(extremes, i, piece)
 
-    def _take_over(self, extremes, i, value, sample, correction=0.0):
-        """Note a value that is more extreme than all before."""
-        if self._signs[i] * value > self._signs[i] * extremes.values[i]:
-            extremes.values[i], extremes.times[i], extremes.corrections[i] = value, sample.time, correction
-            if i < self.probed:
-                extremes.places[i] = self._position_of(i, sample)
-
-    def _search_top(self, extremes, i, look_at):
+    def _search_top(self, extremes, i, piece):
         """Look for a peak between the last three looks, by parabolas through the highest value and its neighbours."""
-        sign, times, heights = self._signs[i], extremes.looked.tolist(), (self._signs[i] * extremes.recent[i]).tolist()
+        sign, times = self.observed.signs[i], extremes.looked.tolist()
+        heights = (sign * extremes.recent[i]).tolist()
         shortest, best = EDGE * (times[2] - times[0]), None
         for _ in range(ROUNDS):
             highest = int(np.argmax(heights))
             n = min(max(highest, 1), len(times) - 2)
             top = top_of(times[n - 1 : n + 2], heights[n - 1 : n + 2])
-            if top is None or not times[0] - 0.25 / EDGE * shortest < top.time < times[-1] + 0.25 / EDGE * shortest:
+            if top is None or not times[0] - 0.25 / EDGE * shortest < top[0] < times[-1] + 0.25 / EDGE * shortest:
                 break
-            t = min(max(top.time, times[0] + shortest), times[-1] - shortest)
+            t = min(max(top[0], times[0] + shortest), times[-1] - shortest)
             if min(abs(t - time) for time in times) < 0.5 * shortest:
                 break
-            sample, value = look_at(t)
-            at = bisect.bisect(times, t)
+            sample = piece.at(t)
+            value, at = float(self.value(piece, i, sample)), bisect.bisect(times, t)
             times.insert(at, t)
             heights.insert(at, sign * value)
+            off = abs(top[1] - sign * value)
             if sign * value > max(heights[:at] + heights[at + 1 :]):
-                best = sample, value, abs(top.height - sign * value)
-            if abs(top.height - sign * value) <= 1e-14 * abs(value):
+                best = sample, value, off
+            if off <= 1e-14 * abs(value):
                 break
-        if best is not None:
+        if best is not None and sign * best[1] > sign * extremes.values[i]:
             sample, value, off = best
-            self._take_over(extremes, i, value, sample, off)
+            if i < len(self.observed.probes):
+                update_extreme(i, value, *self._state(sample), self.observed, self._where, extremes)
+            extremes.values[i], extremes.times[i], extremes.corrections[i] = value, sample.time, off

@@ -1,8 +1,8 @@
-"""Monitors of the compiled loop: probes and sums, as a record."""
+"""Monitors of a run: probes and sums as a record, and their extremes, means and events where no step has been taken."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -21,7 +21,8 @@ from ...kernels import (
     Vector,
 )
 from ...results.probes import PROBE, plain_of
-from .averages import Windows
+from .averages import Windows, begin_averages
+from .events import starts_above
 
 ProbeTable = Annotated[Functions, PROBE]
 
@@ -61,12 +62,12 @@ class Observed(Record):
     scales: Vector
 
     @classmethod
-    def of(cls, probes, sums, outs, contacts):
-        """Probes and sums of a system whose terms write ``outs`` per cell, and bodies feel ``contacts``."""
-        shared = {CONTACT: contacts.felt, **dict(enumerate(outs))}
+    def of(cls, probes, sums, terms, outs=(), contacts=None):
+        """Probes and sums of a system of some ``terms``, where these write ``outs`` and bodies feel ``contacts``."""
+        shared = dict(enumerate(outs)) | ({CONTACT: contacts.felt} if contacts else {})
         numbers = [shared.get(p.term, np.ascontiguousarray(p.data, dtype=float)) for p in probes]
         terms_seen = [probe.term for probe in probes if probe.term >= 0]
-        if any(probe.term == CONTACT for probe in probes):
+        if contacts and any(probe.term == CONTACT for probe in probes):
             terms_seen += contacts.terms["number"].tolist()
         windows, signs = Windows.of(probes), np.array([float(item.sign) for item in (*probes, *sums)])
         signs[windows.slots] = 0.0
@@ -75,7 +76,7 @@ class Observed(Record):
             probes=Functions(PROBE, [probe.kernel for probe in probes]),
             rows=Arrays(INTEGERS, [np.array(probe.rows, dtype=np.int64) for probe in probes]),
             data=Arrays(MATRIX, numbers),
-            sums=np.array([item.weights for item in sums], dtype=float).reshape(len(sums), len(outs) + 3),
+            sums=np.array([item.weights for item in sums], dtype=float).reshape(len(sums), terms + 3),
             signs=signs,
             followed=np.flatnonzero(signs[: len(probes)]),
             windows=windows,
@@ -83,3 +84,16 @@ class Observed(Record):
             plain=np.array([numbers for numbers, _ in plain], dtype=np.int64).reshape(len(probes), 4),
             scales=np.array([scale for _, scale in plain], dtype=float),
         )
+
+
+def begin_monitors(observed, extremes, energies, events) -> dict[str, Any]:
+    """Make a dict of the ``extremes``, ``events`` and ``averages`` at t = 0 of extremes that hold values of probes."""
+    signs, first, events = observed.signs, len(observed.probes), events.copy()
+    extremes.values[first:] = observed.sums @ energies
+    for event in events:
+        starts_above(event, extremes.values[event["slot"]])
+    stepping = first + np.flatnonzero(observed.sums[:, -1])
+    extremes.values[stepping] = -np.inf * signs[stepping]  # no step has been taken
+    averages = begin_averages(observed.windows, extremes)
+    extremes.recent[:, 2] = extremes.values
+    return dict(extremes=extremes, events=events, averages=averages)

@@ -11,6 +11,8 @@ from .extremes import look_at
 from .momentum_balance import note_momentum
 
 if TYPE_CHECKING:
+    from .averages import Averages
+    from .extremes import Extremes
     from .monitors import Observed
     from .records import Model, Running
 
@@ -31,6 +33,27 @@ def energies_now(model: Model, running: Running, total: Vector) -> tuple[float, 
 
 
 @kernel(leaf=True, apart=())
+def write_probes(
+    row: Vector,
+    t: float,
+    x: Matrix,
+    v: Matrix,
+    f: Matrix,
+    lines: Matrix,
+    where: Integers,
+    observed: Observed,
+    averages: Averages,
+    extremes: Extremes,
+) -> None:
+    """Write time and probes, means where these have a window."""
+    row[0] = t
+    for i in range(len(observed.probes)):
+        row[1 + i] = look_at(i, t, x, v, f, lines, observed, where)
+    if observed.windows.slots.size:
+        write_means(row, observed.windows, averages, extremes)
+
+
+@kernel(leaf=True, apart=())
 def write_row(
     row: Vector, model: Model, observed: Observed, running: Running, total: Vector, where: Integers, p: Matrix
 ) -> tuple[float, float]:
@@ -40,13 +63,10 @@ def write_row(
     momenta.
     """
     clock, terms, inertia, v = running.clock[0], model.terms, model.inertia, running.v
-    lines, at = terms.outs[0], 1
-    row[0] = clock.time
-    for i in range(len(observed.probes)):
-        row[at] = look_at(i, clock.time, running.x, v, running.f, lines, observed, where)
-        at += 1
-    if observed.windows.slots.size:
-        write_means(row, observed.windows, running.averages, running.extremes)
+    at, extremes = 1 + len(observed.probes), running.extremes
+    write_probes(
+        row, clock.time, running.x, v, running.f, terms.outs[0], where, observed, running.averages, extremes
+    )  # fmt: skip
     energy, stored = energies_now(model, running, total)
     total[-1] = clock.step
     for i in range(total.size):

@@ -8,10 +8,7 @@ import numpy as np
 
 from ...kernels import kernel
 from .integrator import SAME
-
-TRAVEL = 0.2
-"""Largest share of a body's thickness that anything may move in a step, so that nothing passes through; where bodies
-are further away, half of that distance."""
+from .passages import TRAVEL, Passages
 
 
 class StepLimits:
@@ -23,34 +20,17 @@ class StepLimits:
         Its tables of time, and its bodies.
     rotations : refweb.dynamics.integrators.rotations.Rotations, optional
         Bodies that turn.
+    position : callable, optional
+        As in `refweb.dynamics.integrators.passages.Passages`.
 
     Attributes
     ----------
-    lines : refweb.dynamics.integrators.line_line_ccd.FollowedLines, optional
-        Lines that touch lines, where any do.
-    pairs : refweb.dynamics.integrators.body_body_ccd.FollowedPairs, optional
-        Bodies that touch bodies, where any do.
-    followed : list of refweb.dynamics.integrators.line_line_ccd.Followed
-        These, and lines that touch bodies.
+    passages : refweb.dynamics.integrators.passages.Passages
+        Lines and bodies that push each other.
     """
 
-    def __init__(self, system, rotations=None):
-        self.lines = None
-        if any(term.contact.crossing is not None for term in system.terms):
-            from .line_line_ccd import FollowedLines
-
-            self.lines = FollowedLines(system)
-        self.followed: list = [] if self.lines is None else [self.lines]
-        if any(term.contact.passing is not None for term in system.terms):
-            from .line_body_ccd import FollowedBodies
-
-            self.followed.append(FollowedBodies(system))
-        self.pairs = None
-        if any(term.contact.pairs for term in system.terms):
-            from .body_body_ccd import FollowedPairs
-
-            self.pairs = FollowedPairs(system)
-            self.followed.append(self.pairs)
+    def __init__(self, system, rotations=None, position=None):
+        self.passages = Passages(system, position)
         self._rotations = rotations
         self._net, self._moving = system.net, system.rows - system.net.spins
         self._corners = system.corners
@@ -76,9 +56,7 @@ class StepLimits:
                 speed = max(speed, self._rotations.speed(x, v))
             speed, path = 2.0 * speed, max(TRAVEL * self._thickness, 0.5 * gap)
             stop = min(stop, t + path / speed) if speed > 0.0 else stop
-        for followed in (self.lines, self.pairs):
-            if followed is not None:
-                stop = min(stop, t + followed.soon(x, v))
+        stop = min(stop, t + self.passages.soon(x, v))
         return t + SAME * end if stop - t < SAME * end else stop
 
 

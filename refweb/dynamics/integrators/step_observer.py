@@ -8,20 +8,18 @@ supports' forces by Simpson's rule. A flag of success is not believed: the book 
 from __future__ import annotations
 
 import contextlib
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...errors import InputError, IntegrationError
 from ...system.mass import refuse_massless
 from .energy_balance import DRIFT, refuse_open
-from .event_search import search
-from .events import event_rows, starts_above
-from .extremes import EDGE, begin_anew
-from .integrator import MAX_STEPS_PER_ROW, History, Integrator
+from .events import event_rows, search
+from .integrator import MAX_STEPS_PER_ROW, History, Integrator, IntegratorState
 from .measurements import Measurements
 from .momentum_balance import allowed, refuse_open_momentum
-from .observed_state import ObservedState
-from .simpson_balance import SimpsonBalance
+from .simpson_balance import Sample, SimpsonBalance, refuse_endless
 from .step_limits import StepLimits
 from .tolerances import scales
 
@@ -38,6 +36,28 @@ up to 2."""
 
 class Stopped(Exception):
     """A method finds no further step; what it says is the reason."""
+
+
+@dataclass(eq=False, kw_only=True)
+class ObservedState(IntegratorState):
+    """State of a run at the time that has been looked at; the method's last step may end later.
+
+    Attributes
+    ----------
+    reached : float
+        End of the method's last step [s].
+    short : int
+        Number of steps in turn that are too short to come to the next row.
+    sample : refweb.dynamics.integrators.simpson_balance.Sample
+        The system at ``time``.
+    least_energy : float
+        Energy that a drift is held against at least [J].
+    """
+
+    reached: float = 0.0
+    short: int = 0
+    sample: Sample | None = field(default=None, metadata={"saved": False})
+    least_energy: float = field(default=0.0, metadata={"saved": False})
 
 
 class StepObserver(Integrator):
@@ -112,10 +132,11 @@ class StepObserver(Integrator):
         self.atol_velocity = rtol * fast if atol_velocity is None else atol_velocity
         self.tolerances = {"m": self.atol_position, "m/s": self.atol_velocity}
         self.stats = dict(nfev=0, njev=0, nlu=0)
-        self._measurements, self._events = Measurements(probes, sums, len(system.terms)), event_rows(events)
-        still = max(fast, self.atol_velocity / rtol)
-        self._book = SimpsonBalance(system, self.hold, still, self._measurements.terms)
-        self._limits = StepLimits(system, self.rotations)
+        self._events = event_rows(events)
+        self._book = SimpsonBalance(system, self.hold, max(fast, self.atol_velocity / rtol))
+        self._measurements = Measurements(probes, sums, self._book)
+        self._limits = StepLimits(system, self.rotations, lambda t: self.state(t, *self.interpolated(t))[0])
+        self._monitors = self._measurements, self._limits.passages
         self._wrong = None  # time and force of the first evaluation of this step that is not finite
 
     # What a method brings
@@ -210,13 +231,10 @@ class StepObserver(Integrator):
         v = system.initial_velocity() if v is None else v.copy()
         v[system.supported] = 0.0
         system.drive(0.0, x, v)
-        sample, work = self._book.sample(0.0, x, v), np.zeros(len(system.terms) + 1)
+        sample, work = Sample(system, 0.0, x, v), np.zeros(len(system.terms) + 1)
         energies = self._book.energies(sample, work, 0.0)
-        extremes, averages, values = self._measurements.at_start(sample, energies)
-        events = self._events.copy()
-        course = self.course_type(time=0.0, x=x, v=v, extremes=extremes, events=events, work=work, averages=averages)
-        for event in events:
-            starts_above(event, values[event["slot"]])
+        monitors = self._measurements.start(sample, energies, self._events)
+        course = self.course_type(time=0.0, x=x, v=v, work=work, **monitors)
         self._book.open(course, energies)
         self._enter(course)
         return course
@@ -251,7 +269,7 @@ class StepObserver(Integrator):
     def advance(self, course: ObservedState, times):
         """Take a course to each of some times, see `refweb.dynamics.integrators.integrator.Integrator.advance`."""
         times = np.atleast_1d(np.asarray(times, dtype=float))
-        history = History.empty(len(times), self._measurements.probed, self.system.terms)
+        history = History.empty(len(times), len(self._measurements.observed.probes), self.system.terms)
         for n, end in enumerate(times):
             before = course.time
             while course.time < end and not course.stopped:
@@ -274,7 +292,7 @@ class StepObserver(Integrator):
         """Begin at the state of a course."""
         system, x, v = self.system, course.x, course.v
         self._reference = np.where(system.supported, x, 0.0)  # motion is written over it
-        course.rates = self._book.rates(self._book.sample(course.time, x, v))
+        course.sample, course.least_energy = Sample(system, course.time, x, v), self._book.least_energy
         with self._report(course):
             self.begin(course.time, x.ravel()[system.free], v.ravel()[system.free])
 
@@ -306,61 +324,37 @@ class StepObserver(Integrator):
         """The system at a time within the last step."""
         x, v = self.state(t, *self.interpolated(t))
         self.hold(x, v)
-        return self._book.sample(t, x, v)
-
-    def _piece(self, course, end):
-        """The piece of a step from where a course is."""
-        middle = self._sample_at(0.5 * (course.time + end))
-        return self._book.piece(course, middle, self._sample_at(end))
+        return Sample(self.system, t, x, v)
 
     def _cover(self, course, end, halvings=HALVINGS):
         """Look at a course in the middle between its time and ``end``, and at the end; leave it there."""
-        piece = self._piece(course, end)
+        piece = self._book.piece(course, end, self._sample_at)
         if halvings and self._book.uneven(course, piece):
             self._cover(course, piece.middle.time, halvings - 1)
             if not course.stopped:
                 self._cover(course, end, halvings - 1)
             return
         if len(course.events):
-            stop = search(course.events, piece, lambda slot, sample: self._value(piece, slot, sample), self._sample_at)
+            stop = search(course.events, piece, self._measurements.value)
             if stop < end:
-                piece = self._piece(course, stop)
-        self._inspect_step(course, piece)
-        for followed in self._limits.followed:
-            followed.inspect(course, piece, lambda t: self.state(t, *self.interpolated(t))[0])
-        course.work, course.impulse, course.ledger.pushed[:] = piece.booked(piece.end.time)
-        course.time, course.x, course.v = float(piece.end.time), piece.end.x, piece.end.v
-        course.rates = piece.behind
+                piece = self._book.piece(course, stop, self._sample_at)
+        for monitor in self._monitors:
+            monitor.inspect(course, piece)
+        course.work, course.impulse, course.ledger.pushed[:] = np.split(piece.booked(piece.end.time), (-6, -3))
+        course.sample = end = piece.end
+        course.time, course.x, course.v = float(end.time), end.x, end.v
         if self._limits.at_corner(course.time):  # what is stored there may be gone again at the row
-            self._book.note_largest(course, self._book.energies(piece.end, course.work, course.step))
-        if piece.jump and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
+            self._book.note_largest(course, self._book.energies(end, course.work, course.step))
+        if piece.jump is not None and self.system.net.consistent_minus_lumped is not None:  # what is free jumps as well
             self._enter(course)
-
-    def _inspect_step(self, course, piece):
-        """Look for extremes and means in a piece, and behind a jump at its end."""
-
-        def energies(sample):
-            return self._book.energies_within(piece, sample)
-
-        extremes, end = course.extremes, piece.end
-        if piece.jump:
-            end = self._sample_at(end.time - EDGE * (end.time - piece.begin))
-        self._measurements.follow(extremes, piece.middle, end, self._sample_at, energies)
-        self._measurements.average(course, piece, end, self._sample_at)
-        if piece.jump:
-            self._measurements.inspect(extremes, piece.end, energies)
-            begin_anew(extremes)
-
-    def _value(self, piece, slot, sample):
-        """Value of a probe or a sum within a piece."""
-        return self._measurements.value(slot, sample, lambda sample: self._book.energies_within(piece, sample))
 
     def _fill(self, row, course, before):
         """Write a row, and check the book of energies."""
-        sample = self._book.sample(course.time, course.x, course.v)
-        energies, probes = self._book.energies(sample, course.work, course.step), self._measurements.probes(sample)
-        row[:] = [course.time, *probes, *energies, *self._book.impulses(course)]
-        self._measurements.write_means(row, course)
+        sample = Sample(self.system, course.time, course.x, course.v)
+        energies = self._book.energies(sample, course.work, course.step)
+        self._measurements.write(row, sample, course)
+        row[-9 - len(energies) : -9] = energies
+        self._book.impulses(course, row[-9:])
         self._book.close(course, energies, before, self._remedy)
 
     @property
@@ -374,7 +368,7 @@ class StepObserver(Integrator):
             yield
         except Stopped as stop:
             if self._wrong is not None:
-                self._book.refuse_endless(*self._wrong)
+                refuse_endless(self.system, *self._wrong)
             system = self.system
             force = np.where(system.supported, 0.0, system.force(course.time, course.x, course.v))
             row = int(np.argmax(np.linalg.norm(force, axis=1)))

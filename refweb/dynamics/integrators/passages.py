@@ -1,0 +1,152 @@
+"""Check if lines or bodies have come through each other in a step of any method, on its dense output.
+
+A piece of a step is known at its start, in its middle and at its end. From each to the next rows are taken to move in
+straight lines, as in the drift of an explicit step, and the same kernels say what may meet there, see
+`refweb.dynamics.integrators.ccd`. A drift is checked before it is taken, and cut: from look to look it uses up what is
+free. A piece is a fact, and halved where rows are not sure not to meet, up to `HALVINGS` times. Two rows may come
+nearer than straight ways by as much as they are off these in the middle; a parabola leaves half of that open.
+
+What points of a body move by as it turns is at most twice the difference of its quaternions times their distance from
+its place. Two bodies come nearer by no more than their places do, and what points of either turn by. Where that and
+their depth at the start are less than the least distance from a middle to its surface, or less than what the balls
+around both are apart, neither passes the other.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ...kernels import kernel
+from .crossings import APART, BESIDE, PAIRS, THROUGH, note_met
+
+HALVINGS = 10
+"""Largest number of times that a piece is halved where it is not certain that nothing meets."""
+TRAVEL = 0.2
+"""Largest share of a body's thickness that anything may move in a step, so that nothing passes through; where bodies
+are further away, half of that distance."""
+
+
+class Position(NamedTuple):
+    """Positions of all rows: time [s], and displacement [m], shape (rows, 3)."""
+
+    time: float
+    x: np.ndarray
+
+
+class Passages:
+    """The lines and bodies of a system that push each other.
+
+    Parameters
+    ----------
+    system : refweb.system.system.System
+        What acts.
+    position : callable
+        Displacement of all rows [m], shape (rows, 3), at a time within the last step.
+    """
+
+    def __init__(self, system, position):
+        self._net, self._position = system.net, position
+        self._still, self._rows_met = np.zeros((system.rows, 3)), np.zeros(4, dtype=np.int64)
+        self._crossing = [term for term in system.terms if term.contact.crossing is not None]
+        self._pairs = [pair for term in system.terms for pair in term.contact.pairs]
+        self._checks = []
+        for term in system.terms:
+            crossing, passing = term.contact.crossing, term.contact.passing
+            if crossing is not None:
+                pushed, beside = (term.cells, term.data), (crossing.rows, crossing.data)
+                for which, cells in ((APART, pushed), (BESIDE, beside)):
+                    self._checks.append((which, partial(self._lines_met, (), crossing.meets, *cells)))
+            if passing is not None:
+                met = partial(self._lines_met, system.net.bodies, passing, term.cells, term.data)
+                self._checks.append((THROUGH, met))
+            if term.contact.pairs:
+                self._checks.append((PAIRS, partial(self._pair_met, term)))
+
+    def soon(self, x, v):
+        """Time in which no line comes through another, and no body much nearer to another, from a state [s]."""
+        times = [f.contact.crossing.soon(x, v, f.cells, f.data) for f in self._crossing]
+        for pair in self._pairs:
+            speed = np.linalg.norm(np.subtract(*(v[body.row] for body in pair))) + sum(
+                body.extent * np.linalg.norm(body.turning(x, v)) for body in pair if body.turn is not None
+            )
+            if speed > 0.0:
+                times.append(max(TRAVEL * _thickness(pair), 0.5 * self._apart(pair, x)) / speed)
+        return min(times, default=np.inf)
+
+    def inspect(self, course, piece):
+        """Note in a course the first of each kind that may have met in a piece of a step."""
+        for which, met in self._checks:
+            if not np.isfinite(course.crossings[which, 0]):
+                meeting = self._first(met, piece.start, piece.middle, piece.end, HALVINGS)
+                if meeting is not None:
+                    note_met(which, *meeting, course.crossings)
+
+    def _first(self, met, begin, middle, end, halvings):
+        """(Time from which on two may have met [s], their rows), None where none have."""
+        bend = middle.x - 0.5 * (begin.x + end.x)
+        for first, last in ((begin, middle), (middle, end)):
+            rows = met(first.x, last.x - first.x, bend)
+            if rows is None:
+                continue
+            if not halvings:
+                return first.time, rows
+            halfway = 0.5 * (first.time + last.time)
+            meeting = self._first(met, first, Position(halfway, self._position(halfway)), last, halvings - 1)
+            if meeting is not None:
+                return meeting
+        return None
+
+    def _lines_met(self, bodies, meets, cells, data, x, path, bend):
+        """Rows of lines, or of a line and one of some bodies, that may have met on a way; None where none can have."""
+        places = len(self._net.points) - self._net.spins if bodies else self._net.nodes
+        turned = sum(max((turned_by(body, moved) for body in bodies), default=0.0) for moved in (path, bend))
+        margin, largest, still = float(spread(bend, places) + turned), 2.0 * spread(path, places), self._still
+        came = meets(margin, largest, 0.0, 1.0, x, path, still, still, cells, data, self._rows_met)
+        return self._rows_met if came else None
+
+    def _pair_met(self, term, x, path, bend):
+        """Rows of two bodies that may have come to the middle of one of them on a way; None where none can have."""
+        deep = np.zeros((len(term.cells), term.columns))
+        term.force(0.0, x, self._still, np.zeros_like(x), term.cells, term.data, deep)
+        for pair, (depth, *_) in zip(term.contact.pairs, deep, strict=True):
+            nearer = _nearer(pair, path) + _nearer(pair, bend)
+            if not (depth + nearer < _thickness(pair) or nearer < self._apart(pair, x)):
+                return np.array([pair[0].row, pair[1].row, -1, -1])
+        return None
+
+    def _apart(self, pair, x):
+        """Distance of the balls around two bodies [m], below 0 where they overlap."""
+        first, second = (self._net.points[body.row] + x[body.row] for body in pair)
+        return float(np.linalg.norm(first - second)) - pair[0].extent - pair[1].extent
+
+
+@kernel()
+def spread(path, count):
+    """Largest distance of the first rows from the first of them [m]."""
+    square = 0.0
+    for r in range(1, count):
+        a, b, c = path[r, 0] - path[0, 0], path[r, 1] - path[0, 1], path[r, 2] - path[0, 2]
+        square = max(square, a * a + b * b + c * c)
+    return math.sqrt(square)
+
+
+def turned_by(body, path):
+    """Largest movement of points of a body as it turns [m]."""
+    return (
+        0.0 if body.turn is None else 2.0 * body.extent * np.hypot(np.linalg.norm(path[body.spin]), path[body.turn, 0])
+    )
+
+
+def _nearer(pair, path):
+    """Largest decrease of the distance of two bodies along a path [m]."""
+    moved = np.linalg.norm(path[pair[0].row] - path[pair[1].row])
+    return float(moved + sum(turned_by(body, path) for body in pair))
+
+
+def _thickness(pair):
+    """Least distance from the middle of either to its surface [m]."""
+    return min(body.thickness for body in pair)
