@@ -27,7 +27,9 @@ MOST_TIMES = 200
 """Largest number of times at which it is looked whether what acts from outside moves anything."""
 
 
-def run(scene, out=None, force=False, progress: bool | Callable | None = True, announce=None) -> Solution:
+def run(
+    scene, out=None, force=False, progress: bool | Callable | None = True, announce=None, checkpoint=(None, None)
+) -> Solution:
     """Solve a scene.
 
     Parameters
@@ -43,6 +45,8 @@ def run(scene, out=None, force=False, progress: bool | Callable | None = True, a
         is done, 0 to 1.
     announce : callable, optional
         Called with the scene and its system when the input has been accepted.
+    checkpoint : tuple, optional
+        Checkpoint and ``run.json`` of a run that goes on, see `resume`.
 
     Returns
     -------
@@ -58,7 +62,17 @@ def run(scene, out=None, force=False, progress: bool | Callable | None = True, a
     scene = scene if isinstance(scene, Scene) else Scene.load(scene)
     if out is not None:
         check_folder(out, force)
-    return _solve(scene, out, progress, announce)
+    clock, scene, repeats = Clock(), scene.settled(), []
+    with followed(progress) as tell:
+        while True:
+            try:
+                return _attempt(scene, out, tell, announce, clock, repeats, *checkpoint)
+            except PenetrationError as soft:  # repeated with a stiffer contact as often as the chosen one is too soft
+                table = "self_contact" if "self_contact" in soft.stiffness else "contact"
+                repeats.append(Finding("repeated", str(soft), table, NOTE))
+                scene, announce, checkpoint = scene.with_stiffness(soft.stiffness), None, (None, None)
+                if len(repeats) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
+                    scene = scene.replace(chosen=())
 
 
 def resume(folder, progress: bool | Callable | None = True, announce=None) -> Solution:
@@ -100,27 +114,12 @@ def resume(folder, progress: bool | Callable | None = True, announce=None) -> So
     check_folder(folder, force=True)
     kept = checkpoint(folder, name) if (folder / "checkpoint.npz").exists() else None
     if kept is None:
-        return _solve(scene, folder, progress, announce)
+        return run(scene, folder, True, progress, announce)
     if str(kept.get("scene", "")) not in ("", fingerprint(folder)):
         raise InputError(
             f"{name} its scene.toml is not that of the run any more: put it back, or use refweb run --force"
         )
-    return _solve(scene, folder, progress, announce, kept, summary)
-
-
-def _solve(scene, out, progress, announce, kept=None, summary=None):
-    """Solve a scene, with a stiffer contact as often as one that refweb chose is too soft; see `_attempt`."""
-    clock, scene, repeats = Clock(), scene.settled(), []
-    with followed(progress) as tell:
-        while True:
-            try:
-                return _attempt(scene, out, tell, announce, clock, repeats, kept, summary)
-            except PenetrationError as soft:
-                table = "self_contact" if "self_contact" in soft.stiffness else "contact"
-                repeats.append(Finding("repeated", str(soft), table, NOTE))
-                scene, announce, kept, summary = scene.with_stiffness(soft.stiffness), None, None, None
-                if len(repeats) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
-                    scene = scene.replace(chosen=())
+    return run(scene, folder, True, progress, announce, (kept, summary))
 
 
 def _attempt(scene, out, tell, announce, clock, repeats, kept=None, summary=None):

@@ -157,9 +157,10 @@ class Kernel:
             prepare([self])
         return self._entry(*arguments)
 
-    def call(self, *arguments):
-        """Call it in a run that has prepared it with its features: kernels for others may not be compiled."""
-        return self._entry(*arguments)
+    @property
+    def call(self):
+        """Entry for a run that has prepared it with its features: kernels for others may not be compiled."""
+        return self._entry
 
     @functools.cached_property
     def callees(self):

@@ -64,8 +64,8 @@ class AccuracyState:
         return {**counted, "missing": names, "shares": shares}
 
 
-def follow(simulation, folder, tell):
-    """Run, and run again at a higher accuracy as long as digits are asked for that are missing.
+def run_within_drift(simulation, folder, tell):
+    """Run with errors; one whose energy book stays open is repeated with a smaller knob, see `ATTEMPTS`.
 
     Parameters
     ----------
@@ -76,13 +76,6 @@ def follow(simulation, folder, tell):
     tell : callable
         Called with a text and the share that is done.
     """
-    run_within_drift(simulation, folder, tell)
-    if simulation.scene.accuracy.digits is not None:
-        reach_digits(simulation, simulation.scene.accuracy.digits, folder, tell)
-
-
-def run_within_drift(simulation, folder, tell):
-    """Run with errors; one whose energy book stays open is repeated with a smaller knob, see `ATTEMPTS`."""
     scene, solution, standing = simulation.scene, simulation.solution, simulation.standing
     while True:
         name = simulation.integrator.knob

@@ -84,19 +84,6 @@ class Block(NamedTuple):
     compared: History
 
 
-def _block(integrator, course, schedule, first, count):
-    """Advance through ``count`` rows from ``first`` on."""
-    rows = schedule.times[first : first + count]
-    if not len(schedule.between):
-        history = integrator.advance(course, rows)
-        return Block(first, history, history)
-    between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
-    history = integrator.advance(course, np.sort(np.concatenate([rows, between])))
-    selected = np.isin(history.time, rows)
-    selected[-1] = True  # where an event ends the run, its row is that of the event
-    return Block(first, history[selected], history)
-
-
 def blocks(integrator, course, schedule, first=0):
     """Advance through the times of a schedule in blocks that last about `BLOCK` and end at each of its frames.
 
@@ -125,8 +112,12 @@ def blocks(integrator, course, schedule, first=0):
     while first < len(times):
         stop = schedule.frames[np.searchsorted(schedule.frames, first)]
         count = min(size, stop + 1 - first)
-        began = time.perf_counter()
-        yield _block(integrator, course, schedule, first, count)
+        began, rows = time.perf_counter(), times[first : first + count]
+        between = schedule.between[(schedule.between > course.time) & (schedule.between < rows[-1])]
+        history = integrator.advance(course, np.sort(np.concatenate([rows, between])))
+        selected = np.isin(history.time, rows) | (len(schedule.between) == 0)
+        selected[-1] = True  # where an event ends the run, its row is that of the event
+        yield Block(first, history[selected], history)
         first += count
         spent = time.perf_counter() - began
         size = max(1, min(2 * size if spent < 0.5 * BLOCK else int(size * BLOCK / spent), MOST_ROWS))

@@ -12,7 +12,7 @@ from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
-from .accuracy_loop import AccuracyState, follow
+from .accuracy_loop import AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
 from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
@@ -139,7 +139,9 @@ class Simulation:
             self._settle(tell)
         while True:
             try:
-                follow(self, folder, tell)
+                run_within_drift(self, folder, tell)
+                if (digits := self.scene.accuracy.digits) is not None:
+                    reach_digits(self, digits, folder, tell)
             except IntegrationError as error:
                 if self._ways is None:
                     raise

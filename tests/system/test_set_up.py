@@ -1,11 +1,17 @@
-"""The set-up of a net runs over arrays: the number of calls, of Python and of its libraries, does not grow with it."""
+"""The set-up of a net runs over arrays: the number of calls, of Python and of its libraries, does not grow with it.
+
+From the command to the compiled loop it comes through few functions.
+"""
 
 import gc
 import sys
+import traceback
 
 import pytest
 
 import refweb
+from refweb.__main__ import main
+from refweb.dynamics.integrators.central_difference import advance_rows
 
 
 def calls(mesh, cells):
@@ -44,3 +50,17 @@ def test_no_loop_over_lines_or_nodes(mesh):
     """Nine times the lines, thousands more, take a few calls for each further row of cells."""
     calls(mesh, 8)
     assert calls(mesh, 36) - calls(mesh, 12) < 20 * (36 - 12)
+
+
+def test_a_run_comes_to_its_first_step_through_few_functions(monkeypatch, tmp_path):
+    """At most 7 stand between that of the command and the compiled loop."""
+    depths, entry = [], advance_rows.call
+
+    def noted(*arguments):
+        names = [frame.filename.replace("\\", "/") for frame in traceback.extract_stack()]
+        depths.extend(len(names) - 2 - n for n, name in enumerate(names) if name.endswith("refweb/commands/run.py"))
+        return entry(*arguments)
+
+    monkeypatch.setitem(vars(advance_rows), "_entry", noted)
+    assert main(["run", "square-impact", "--set", "solve.duration=0.02", "--out", str(tmp_path / "out")]) == 0
+    assert min(depths) <= 7  # without the command and what is put in the place of the loop
