@@ -183,8 +183,12 @@ ALIKE = (
     "triangle-load",
     "hexagon-load",
     "published-throw",
+    "square-load",
+    "spun-tight",
+    "falling-net",
+    "capture-satellite",
 )
-"""Scenes that call for what others of the same kind call for, on another web."""
+"""Scenes that call for what others call for, on another web, or of which others call for every part."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in ALIKE)) for n in SCENES])

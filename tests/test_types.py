@@ -14,6 +14,7 @@ import pytest
 import refweb
 
 pytest.importorskip("basedpyright")
+pytestmark = pytest.mark.slow
 ROOT = pathlib.Path(refweb.__file__).parents[1]
 
 SCRIPT = """
