@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from nets import some
 
 import refweb
 from refweb.__main__ import main
@@ -133,8 +134,11 @@ def saved(folder, name, polylines=False):
     )
 
 
-@pytest.mark.parametrize("polylines", [False, True])
-@pytest.mark.parametrize("name", ["p.vtp", "p.vtk", "p-a.vtk", "u.vtu", "u.vtk"])
+FORMATS = ("p.vtp", "p.vtk", "p-a.vtk", "u.vtu", "u.vtk")
+VTK = some([(name, polylines) for name in FORMATS for polylines in (False, True)], 3)
+
+
+@pytest.mark.parametrize("name, polylines", VTK)
 def test_vtk(tmp_path, name, polylines):
     """Polygonal data, texts and polylines, of which each piece has its share of natural length by distance."""
     saved(tmp_path, name, polylines)
