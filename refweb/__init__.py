@@ -45,6 +45,7 @@ if TYPE_CHECKING:  # what editors know; `refweb.registry.exports` has the same n
     from .results.throw import Throw as Throw
     from .runner import resume as resume
     from .runner import run as run
+    from .runner import trust as trust
     from .scene import Scene as Scene
     from .settings import Accuracy as Accuracy
     from .settings import Dynamic as Dynamic

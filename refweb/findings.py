@@ -10,6 +10,7 @@ CODES = {
     "balance-drift": "Energy or momentum does not follow from what acts.",
     "body-not-felt": "A body and no contact: the web does not feel it.",
     "breaks-in-doubt": "Breaks within ± of each other, or in another order in the step-refinement run.",
+    "chaotic": "Differences grow exponentially within the run.",
     "collapse": "Lines that do not push have let the web collapse.",
     "deep-contact": "A contact is deeper than is allowed of a body.",
     "digits-not-reached": "The digits asked for are not reached.",
@@ -46,6 +47,7 @@ CODES = {
     "two-equilibria": "Two starts lead to two equilibria.",
     "undetected-overlap": "Bodies in each other that do not touch each other.",
     "unstable": "The equilibrium is a saddle.",
+    "wide-error": "± of a peak is above a tenth of it.",
 }
 """Meaning of each code."""
 

@@ -166,6 +166,7 @@ COMMANDS = {
     "view": "refweb.commands.view",
     "modes": "refweb.commands.modes",
     "cost": "refweb.commands.cost",
+    "trust": "refweb.commands.trust",
     "sweep": "refweb.commands.sweep",
     "warm": "refweb.commands.warm",
 }
@@ -178,6 +179,7 @@ EXPORTS = (
     "refweb.studies.modes:modes",
     "refweb.studies.modes:Modes",
     "refweb.studies.work_precision:cost",
+    "refweb.runner:trust",
     "refweb.studies.cost:Cost",
     "refweb.sweeps.sweep:sweep",
     "refweb.sweeps.study_result:Sweep",

@@ -13,6 +13,7 @@ from . import memory
 from .errors import InputError, PenetrationError, in_file
 from .findings import NOTE, REFUSAL, Finding, read_findings
 from .messages import short
+from .results.error_budget import judge
 from .results.folder import Folder, check_folder, fingerprint, is_alive
 from .results.progress import followed
 from .results.provenance import versions, web_of
@@ -73,6 +74,47 @@ def run(
                 scene, announce, checkpoint = scene.with_stiffness(soft.stiffness), None, (None, None)
                 if len(repeats) == STIFFENINGS:  # what is chosen now counts as given: it is warned of, or refused
                     scene = scene.replace(chosen=())
+
+
+def trust(scene, budget=None, out=None, force=False, progress: bool | Callable | None = True, announce=None):
+    """Find all parts of the error of each result of a scene, and its verdict.
+
+    Parameters
+    ----------
+    scene : Scene, path-like or str
+        A scene, a scene file or the name of a scene shipped with refweb.
+    budget : float, optional
+        CPU time that all runs may take [s], see `refweb.Accuracy`.
+    out : path-like, optional
+        Result folder of the run, with ``trust.json`` and ``trust.png``; without it nothing touches the disk.
+    force : bool
+        Replace the results of an earlier run in ``out``.
+    progress, announce : callable, optional
+        See `refweb.run`.
+
+    Returns
+    -------
+    Solution
+        Its ``results`` have ``parts``, ``error`` and ``verdict``; ``further`` are the runs that have told.
+
+    Raises
+    ------
+    InputError
+        For wrong input; nothing has been written.
+    SolverError
+        Where the scene itself has no answer.
+    """
+    from dataclasses import replace
+
+    scene = scene if isinstance(scene, Scene) else Scene.load(scene)
+    budget = scene.accuracy.budget if budget is None else budget
+    accuracy = replace(scene.accuracy, error="twin", level="full", budget=budget)
+    solution = run(scene.replace(accuracy=accuracy), out, force, progress, announce)
+    if out is not None:
+        from .studies.further_runs import write
+
+        write(solution, out)
+    return solution
 
 
 def resume(folder, progress: bool | Callable | None = True, announce=None) -> Solution:
@@ -152,6 +194,15 @@ def _attempt(scene, out, tell, announce, clock, repeats, kept=None, summary=None
                 from .studies.predictability import horizon
 
                 solution.horizon = horizon(simulation, solution.results, scene.accuracy.ensemble, tell)
+            errors = None
+            if scene.accuracy.level == "full":
+                from .studies.further_runs import FurtherRuns
+
+                rows = simulation.rows if folder is None else folder.rows()
+                further = FurtherRuns(simulation, solution, rows, clock, run, tell)
+                further.follow()
+                errors = further.findings()
+            judge(solution, scene, simulation.system, simulation.price, errors)
     finally:
         if folder is None or scene.solve.kind == "static":
             solution.table = as_history(solution.columns, simulation.rows)

@@ -339,6 +339,10 @@ class Scene:
                     self.throw.on(self.observables, system, self.solve)
             return system
 
+    def trust(self, budget=None, out=None, force=False, progress=True):
+        """Find all parts of the error of each result, and its verdict, see `refweb.trust`."""
+        return load("refweb.runner:trust")(self, budget, out, force, progress)
+
 
 def file_of(source):
     """Path of a scene file, or of a scene shipped with refweb by its name; refused where there is neither."""

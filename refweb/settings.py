@@ -299,10 +299,11 @@ class Accuracy(Table):
         Of dynamics: significant digits that the ± of every observable has to leave. Accuracy is raised until that is
         so, or until it shows which observables cannot have them.
     budget : float, optional
-        With ``digits``: CPU time that all runs may take together [s]; by default 600, or 20 times what the first takes
-        if that is longer. The first run goes to its end. A later one is not begun where it is expected to take more
-        than what is left, and is ended where it is on its way to twice that; then the run before, which is made again
-        where it has been given up, is the result, with a warning that says what the digits would cost.
+        With ``digits`` and with ``level = "full"``: CPU time that all runs may take together [s]; by default 600, or 20
+        times what the first takes if that is longer. The first run goes to its end. A later one is not begun where it
+        is expected to take more than what is left, and is ended where it is on its way to twice that; then the run
+        before, which is made again where it has been given up, is the result, with a warning that says what the digits
+        would cost.
     refine : bool
         Whether to find the error of the elements, by two more runs with two and four times as many.
     horizon : bool
@@ -310,12 +311,17 @@ class Accuracy(Table):
         smallest difference at the start leaves no digit of it, see `refweb.studies.predictability`.
     ensemble : int, optional
         With ``horizon``: number of runs from which mean and spread of the results are taken.
+    level : {"time", "full"}
+        "full" finds all parts of the error of each result by further runs, within the ``budget``: with finer elements,
+        stiffer contact and less smoothing, and from starts side by side, see `refweb.studies.further_runs`. ``refweb
+        trust`` does the same.
 
     Raises
     ------
     InputError
         For digits that are not 1 … 12, an ensemble that is not 2 … 10 000 or without horizon, a budget that is not
-        above 0 or without digits, and digits without a twin; from `Scene`, for digits and horizon in statics.
+        above 0 or without digits and level = "full", digits and level = "full" without a twin; from `Scene`, for digits
+        and horizon in statics.
 
     Examples
     --------
@@ -330,12 +336,15 @@ class Accuracy(Table):
     refine: bool = boolean(default=False)
     horizon: bool = boolean(default=False)
     ensemble: int | None = integer(default=None, at_least=2, at_most=10_000)
+    level: str = choice("time", "full", default="time")
 
     def check(self):
         """Refuse what needs something else."""
         if self.ensemble is not None and not self.horizon:
             raise InputError(f"ensemble = {self.ensemble} needs horizon = true")
-        if self.budget is not None and self.digits is None:
-            raise InputError(f"budget = {self.budget:g} needs digits = ...")
+        if self.budget is not None and self.digits is None and self.level == "time":
+            raise InputError(f'budget = {self.budget:g} needs digits = ... or level = "full"')
         if self.digits is not None and self.error == "none":
             raise InputError(f'digits = {self.digits} needs error = "twin"')
+        if self.level == "full" and self.error == "none":
+            raise InputError('level = "full" needs error = "twin"')

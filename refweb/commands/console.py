@@ -20,12 +20,14 @@ from ..results.summary_text import (
     on_results,
     on_run,
     on_solver,
+    on_verdicts,
     on_web,
     rows_of_modes,
     rows_of_results,
     rows_of_steps,
+    verdict_of,
 )
-from ..results.units import readable
+from ..results.units import larger, readable, scale_of
 
 
 def _console():
@@ -139,6 +141,7 @@ def print_run(summary, more=()):
     elif summary["results"]:
         rows.append(("results", _results(summary["results"], dynamic=not summary["steps"])))
     rows += [("", text) for text in on_results(summary["results"])]
+    rows += [("verdict", text) for text in on_verdicts(summary["results"])]
     rows += on_run(summary)
     rows += more
     rows += [("solver", text) for text in on_solver(solver)]
@@ -198,6 +201,37 @@ def print_cost(summary):
     rows.append(("price", summary["sentence"]))
     rows.append(("cost", on_cost(summary["cost"])))
     _box(f"{summary['scene']}: what digits cost", rows)
+
+
+def print_trust(report):
+    """Print the box of an error budget from the content of its ``trust.json``."""
+    from ..results.error_budget import NONE, OPEN, PARTS, WORDS
+
+    results, grid = report["results"], Grid(box=None, padding=(0, 2), pad_edge=False)
+    columns = [part for part in PARTS if any(result["parts"][part] != NONE for result in results.values())]
+    grid.add_column(Text("result"), no_wrap=True)
+    for name in ("value ±", *(part.partition("_")[0] for part in columns)):
+        grid.add_column(Text(name), justify="right", no_wrap=True)
+    grid.add_column(Text("verdict"))
+    for name, result in results.items():
+        factor, _ = scale_of(larger(result["value"], result["error"]), result["unit"])
+        parts = (result["parts"][part] for part in columns)
+        said = [
+            {NONE: "none", OPEN: "?"}.get(part, "") if isinstance(part, str) else f"{part / factor:.2g}"
+            for part in parts
+        ]
+        value = readable(result["value"], result["error"], result["unit"])
+        grid.add_row(*map(Text, (name, value, *said, verdict_of(result))))
+    rows: list = [("errors", grid)]
+    reasons = {(part, text) for result in results.values() for part, text in result["reasons"].items()}
+    rows += [("" if n else "none", f"{WORDS[part]}: {text}") for n, (part, text) in enumerate(sorted(reasons))]
+    rows += [("verdict", text) for text in on_verdicts(results)]
+    for n, run in enumerate(report["runs"]):
+        ended = run["status"] if run["status"] != "solved" else f"{run['cpu_s']:.2f} s CPU"
+        rows.append(("runs" * (n == 0), f"{run['text']}: {ended}" + (f", {run['message']}" if run["message"] else "")))
+    given, spent = report["budget"]["given"], report["budget"]["spent"]
+    rows.append(("cost", f"{spent:.2f} s CPU" + (f" of a budget of {given:g} s" if given is not None else "")))
+    _box(f"{report['scene']}: what the results are worth", rows)
 
 
 def print_comparison(comparison):

@@ -12,7 +12,7 @@ from ..findings import NOTE, Finding
 from ..registry import INTEGRATORS
 from ..results.solution import SOLVER, Result
 from ..results.state import State, floor_remark, strain_remark, strength_remark
-from .accuracy_loop import AccuracyState, reach_digits, run_within_drift
+from .accuracy_loop import CLIMBS, AccuracyState, reach_digits, run_within_drift
 from .budget import Budget, check_budget
 from .history import Watch
 from .initial_state import Start, equilibrium, fields_of, record_of, remarks_on, stored
@@ -113,6 +113,10 @@ class Simulation:
     def done(self):
         """Text that says how far the run came."""
         return f"t = {self._tables[-1][-1, 0] if self._tables else 0.0:.6g} s"
+
+    def price(self, share):
+        """CPU time that errors take which are to fall by a factor ``share`` [s], see `refweb.dynamics.budget`."""
+        return self.budget.price_of(self.integrator, share, CLIMBS)
 
     @property
     def rows(self):

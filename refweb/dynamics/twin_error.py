@@ -14,6 +14,7 @@ import numpy as np
 from ..findings import Finding
 from ..results.solution import Result
 from .budget import check_budget
+from .divergence import divergence
 from .history import SPREAD
 from .integrators.integrator import IntegratorState
 from .schedule import blocks
@@ -127,7 +128,7 @@ def _mean(values):
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _largest_mean(times, apart, end):
+def largest_mean(times, apart, end):
     """Largest root mean square of differences, of those of all parts of the time to ``end``."""
     return max((_mean(apart[near]) for near in _parts(times, end)), default=0.0)
 
@@ -205,7 +206,7 @@ def with_errors(results, floors, twin, kept_rows, rows_refined, order=2.0, drift
         end = result.time
         if end not in chances:
             chances[end] = _of_chance(times, off, apart[:, -1], end, order, ROUNDING * energy)
-        apart_then = max(abs(result.value - twin[name].value), _largest_mean(times, apart[:, i], end))
+        apart_then = max(abs(result.value - twin[name].value), largest_mean(times, apart[:, i], end))
         apart_then = max(apart_then, drifts.get(name, 0.0) if end == last else 0.0)
         error = max(SPREAD * order * chances[end] * apart_then + 4e-16 * abs(result.value), floors.get(name, 0.0))
         results_found[name] = result._replace(error=float(error))
@@ -241,6 +242,7 @@ def add_errors(simulation, run, twin, rows):
     factor = 1.0 / (1.0 - simulation.integrator.error_share(first_run, refined))
     drifts = simulation.watch.drifts(first_run, refined, np.diff(rows[-2:, 0]).sum())
     compared = run.results, run.corrections, twin.results, rows, twin.rows
+    solution.divergence = divergence(rows, twin.rows)
     solution.reduced = with_errors(*compared, factor, drifts, first_run.largest)
     widths, count = zip(first_run.events["width"], refined.events["time"], strict=True), len(solution.events)
     for entry, (width, time) in zip(solution.events, list(widths)[:count], strict=True):

@@ -21,7 +21,7 @@ SOLVER = dict.fromkeys(
 
 
 OTHER_ERRORS = {"smoothing": "smoothing moves", "discretisation": "discretisation error", "neglected": "orbit neglects"}
-"""Errors of a result besides ± of the scene as it stands, and the words before them."""
+"""Errors of a result that have keys of their own, and the words before them; ± holds the first two."""
 
 
 class Names(dict):
@@ -34,13 +34,15 @@ class Names(dict):
 class Result(NamedTuple):
     """A result of a run: value, its error (None where none is known), unit, time and place.
 
-    ``error`` is that of the solution of the scene as it stands. In statics ``smoothing`` is how far a smooth law's η
-    moves the value from that at η → 0, and with ``refine = true`` ``discretisation`` how far it is from infinitely many
-    elements; in an orbit ``neglected`` is what its equations leave out, see `refweb.Orbit`; None where there is
-    none. ``interval`` are the least and the largest value in all equilibria, where parts of the web float; an end that
-    nothing holds is infinite. ``within`` are the least and the largest value that ± leaves of those which are possible,
-    where it goes beyond them: a length is not negative, and a share is 0 to 1. ``at`` says what ``where`` is the number
-    of, "node" or "line".
+    ``error`` is the sum of all ``parts`` that are known, see `refweb.results.error_budget`: each of these is a number,
+    or "none" for one of the ``reasons``, or "not estimated". ``verdict`` is what the number is worth, None where parts
+    are missing for that, with a sentence ``verdict_text`` and, where it is determined, its ``digits``. ``proven`` says
+    that ± of an equilibrium is a bound from duality. ``smoothing`` and ``discretisation`` are the parts of the smooth
+    law and of elements, where these were looked for. In an orbit ``neglected`` is what its equations leave out, see
+    `refweb.Orbit`; None where there is none. ``interval`` are the least and the largest value in all equilibria, where
+    parts of the web float; an end that nothing holds is infinite. ``within`` are the least and the largest value that ±
+    leaves of those which are possible, where it goes beyond them: a length is not negative, and a share is 0 to 1.
+    ``at`` says what ``where`` is the number of, "node" or "line".
     """
 
     value: float
@@ -54,6 +56,12 @@ class Result(NamedTuple):
     interval: tuple[float, float] | None = None
     at: str | None = None
     within: tuple[float, float] | None = None
+    parts: dict[str, float | str] | None = None
+    reasons: dict[str, str] | None = None
+    verdict: str | None = None
+    verdict_text: str = ""
+    digits: int | None = None
+    proven: bool = False
 
     def bounded(self, lower, upper):
         """The result where only what lies from ``lower`` to ``upper`` is possible."""
@@ -73,6 +81,10 @@ class Result(NamedTuple):
             extra["within"] = list(self.within)
         if self.interval is not None:
             extra["interval"] = [end if np.isfinite(end) else None for end in self.interval]
+        if self.proven:
+            extra["proven"] = True
+        if self.parts is not None:
+            extra |= {key: getattr(self, key) for key in ("parts", "reasons", "verdict", "verdict_text", "digits")}
         return {key: getattr(self, key) for key in ("value", "error", "unit", "time", "where")} | extra
 
 
@@ -141,6 +153,11 @@ class SolutionData:
     horizon : dict
         How long the motion is determined, see `refweb.studies.predictability.horizon`; empty where that was not asked
         for.
+    divergence : refweb.dynamics.divergence.Divergence, optional
+        Exponential growth of the difference of a run and its twin; None where there is none.
+    further : list of dict
+        Further runs that have told of parts of errors, see `refweb.studies.further_runs`: ``part``, ``text``, ``cpu_s``
+        and ``status`` of each.
     events : list of dict
         Of each event its ``name``, the ``time`` it happened at [s], None if it did not, and the ``error`` of that.
     throw : dict
@@ -179,6 +196,8 @@ class SolutionData:
     frames: list = field(default_factory=list)
     reduced: dict = field(default_factory=dict)
     horizon: dict = field(default_factory=dict)
+    divergence: Any = None
+    further: list = field(default_factory=list)
     utilisation: tuple | None = None
     bodies: dict = field(default_factory=dict)
     pairs: dict = field(default_factory=dict)
@@ -238,6 +257,7 @@ class SolutionData:
             **({"passage": self.passage} if self.passage else {}),
             **({"throw": self.throw} if self.throw else {}),
             **({"horizon": self.horizon} if self.horizon else {}),
+            **({"further_runs": self.further} if self.further else {}),
         }
 
 

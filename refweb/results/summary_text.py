@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from .error_budget import DETERMINED, shares
 from .units import larger, other_errors, position_text, readable, scale_of, with_error
 
 FEW_BREAKS = 5
@@ -22,13 +23,29 @@ class Rows(NamedTuple):
 
 
 def rows_of_results(results, dynamic):
-    """Results with their ±, where and, in dynamics, when they are."""
-    rows = []
+    """Results with their ±, where and, in dynamics, when they are, and their verdicts."""
+    rows, judged = [], any(result.get("parts") for result in results.values())
     for name, result in results.items():
         value = readable(result["value"], result["error"], result["unit"], result.get("within"))
+        value += f" ({parts})" if (parts := shares(result)) else ""
         time = [f"t = {result['time']:.6g} s"] if dynamic else []
-        rows.append([name, value, *time, f"at {where}" if (where := _position(result)) else ""])
-    return Rows(["result", "value", *(["time"] if dynamic else []), "place"], rows, [])
+        verdict = [verdict_of(result)] if judged else []
+        rows.append([name, value, *time, f"at {where}" if (where := _position(result)) else "", *verdict])
+    return Rows(["result", "value", *(["time"] if dynamic else []), "place", *(["verdict"] * judged)], rows, [])
+
+
+def verdict_of(result):
+    """Verdict of a result in a few words: "determined, 3 digits", "wide"; without one how many digits ± leaves."""
+    verdict, digits = result.get("verdict"), result.get("digits")
+    count = "" if digits is None else f"{digits} digit{'s' * (digits != 1)}"
+    return ", ".join(filter(None, [verdict, count]))
+
+
+def on_verdicts(results):
+    """Sentences on results that are not determined: why, and what to ask instead."""
+    for name, result in results.items():
+        if result.get("verdict") not in (None, DETERMINED):
+            yield f"{name}: {result['verdict']}: {result['verdict_text']}"
 
 
 def rows_of_steps(steps):

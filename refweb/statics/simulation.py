@@ -47,6 +47,9 @@ class Simulation:
         self.columns = [FIRST["static"], *(f"{o.name} [{o.unit}]" for o in scene.observables)]
         self.columns += [f"{name} [J]" for name in static_energies(system)]
 
+    price = None
+    """CPU time of errors that are to fall: those of statics are found, not chosen."""
+
     @property
     def done(self):
         """Text that says how far the run came."""
@@ -153,6 +156,7 @@ class Simulation:
                     interval=o.interval(state, equilibrium),
                     neglected=None if share is None else abs(value.value) * share,
                     at=None if value.where is None else o.observable.at,
+                    proven=error is not None and o.observable.proven(equilibrium),
                 ),
                 self.system,
             )

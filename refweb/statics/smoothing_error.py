@@ -22,9 +22,9 @@ class Smoothing:
 
     def __init__(self, scene):
         cable = scene.cable
-        groups = {name: _less_smooth(group) for name, group in cable.groups.items()}
+        groups = {name: less_smooth(group) for name, group in cable.groups.items()}
         self._observables = scene.observables
-        self._system = scene.replace(cable=replace(_less_smooth(cable), groups=groups)).build()
+        self._system = scene.replace(cable=replace(less_smooth(cable), groups=groups)).build()
         self._newton = Newton(at_rest(self._system))
 
     def errors(self, equilibrium, values):
@@ -38,6 +38,6 @@ class Smoothing:
         return [abs(value - value_near) / (1.0 - SHARE) for value, value_near in zip(values, values_near, strict=True)]
 
 
-def _less_smooth(table):
+def less_smooth(table):
     """A cable or a group of it with `SHARE` of its smoothing, where it has one."""
     return table if table.smoothing is None else replace(table, smoothing=SHARE * table.smoothing)

@@ -45,8 +45,12 @@ def discretisation_errors(scene, results, solve):
 
 def _left(coarse, fine, finest):
     """Error of the first of three values."""
-    first, second = abs(coarse - fine), abs(fine - finest)
+    return left_of(abs(coarse - fine), abs(fine - finest), abs(coarse - finest))
+
+
+def left_of(first, second, both):
+    """Error of the first of three values that are ``first`` and ``second`` apart one after another, and ``both``."""
     if second * SLOWEST > first:
-        return 2.0 * max(first, second, abs(coarse - finest))
+        return 2.0 * max(first, second, both)
     ratio = min(first / second, FASTEST) if second > 0.0 else FASTEST
     return MARGIN * first * ratio / (ratio - 1.0)

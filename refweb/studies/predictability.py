@@ -18,7 +18,7 @@ PERTURBATION = 1e-12
 """Largest difference of an unknown at the start, over the natural length of the shortest element."""
 
 
-def horizon(simulation, results, ensemble=None, tell=None):
+def horizon(simulation, results, members=None, tell=None):
     """Find the growth of a small difference.
 
     Parameters
@@ -27,7 +27,7 @@ def horizon(simulation, results, ensemble=None, tell=None):
         That of a motion which has been run.
     results : dict of str to refweb.results.solution.Result
         Its results.
-    ensemble : int, optional
+    members : int, optional
         Number of runs that mean and spread are taken of.
     tell : callable, optional
         Called with a text and the share that is done.
@@ -65,8 +65,8 @@ def horizon(simulation, results, ensemble=None, tell=None):
         "digits": digits,
         "statistical": [name for name, r in results.items() if end is not None and r.time > end],
     }
-    if ensemble is not None:
-        horizon_data["ensemble"] = _ensemble(simulation, ensemble, tell)
+    if members is not None:
+        horizon_data["ensemble"] = ensemble(simulation, members, tell)
     return horizon_data
 
 
@@ -84,7 +84,7 @@ def _beside(simulation, seed):
     return Start(x, simulation.begin.v)
 
 
-def _ensemble(simulation, count, tell):
+def ensemble(simulation, count, tell):
     """Mean and standard deviation of each result over runs of different seeds."""
     watch, values = simulation.watch, []
     for seed in range(1, count + 1):

@@ -77,7 +77,11 @@ def is_number(value):
 def check_results(results):
     for name, result in results.items():
         place = ["at"] if result["where"] is not None else []
-        assert isinstance(name, str) and list(result) == ["value", "error", "unit", "time", "where", *place]
+        budget = ["parts", "reasons", "verdict", "verdict_text", "digits"]
+        proven = ["proven"] if "proven" in result else []
+        assert list(result) == ["value", "error", "unit", "time", "where", *place, *proven, *budget]
+        assert list(result["parts"]) == ["time", "elements", "contact_stiffness", "smoothing", "chance", "rounding"]
+        assert isinstance(name, str)
         assert result.get("at") in (None, "node", "line")
         assert isinstance(result["value"], float) and isinstance(result["time"], float) and is_number(result["error"])
         assert result["error"] is None or result["error"] > 0.0

@@ -82,6 +82,10 @@ class Line(Observable):
         bound = self.bound(equilibrium.duality_bound.tension, net)[self.elements(net)]
         return float(bound.max()) + self.of_held_lines(state)
 
+    def proven(self, equilibrium):
+        """True where there is a bound from duality."""
+        return equilibrium.duality_bound is not None
+
 
 class Tension(Line):
     """Tension."""

@@ -96,6 +96,10 @@ class Observable:
         rounding = 2.0 * np.finfo(float).eps * abs(self.of(state).value) + self.of_held_lines(state)
         return float(changes[0] + 3.0 * max(changes[1:]) + rounding)
 
+    def proven(self, equilibrium):
+        """Tell if ± in an equilibrium is a proven bound."""
+        return False
+
     def _change(self, state, move):
         """Size of the change of the value under a move of the rows, to first order."""
         size = np.abs(move).max()

@@ -1,0 +1,39 @@
+"""Find all parts of the error of each result, and say what the numbers are worth."""
+
+import pathlib
+
+from .arguments import add_force, add_scene, add_values, scene_of
+
+
+def add_arguments(parser):
+    """The scene, the folder and the time it may take."""
+    add_scene(parser)
+    add_values(parser)
+    parser.add_argument("--out", metavar="DIR", help="folder for trust.json and trust.png (default: none is written)")
+    parser.add_argument(
+        "--budget", type=float, metavar="SECONDS", help="CPU time of all runs (default: 600, or 20 times the first)"
+    )
+    add_force(parser)
+
+
+def run(arguments):
+    """Print what is solved, find the errors, print them with their verdicts."""
+    from ..results.progress import followed
+    from ..runner import trust
+    from ..studies.further_runs import report
+    from .console import print_scene
+
+    scene, out = scene_of(arguments), arguments.out
+    options = {"budget": arguments.budget, "out": out, "force": arguments.force}
+    with followed(True) as tell:
+        solution = trust(scene, progress=tell, announce=print_scene, **options)
+    show(report(solution))
+    if out is not None:
+        print(f"budget of errors in {pathlib.Path(out) / 'trust.png'}")
+
+
+def show(report):
+    """Print the box of an error budget from the content of its ``trust.json``."""
+    from .console import print_trust
+
+    print_trust(report)

@@ -1,0 +1,73 @@
+"""Exponential growth of what two runs of one scene differ by: a sign of chaos that costs nothing.
+
+Errors of steps grow with a low power of time. Where the motion is chaotic any difference grows by the same factor in
+equal times, until nothing of the motion is left. The run and its twin of smaller errors are two such motions.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+WINDOWS, ROWS = 16, 3
+"""Number of parts of the time, and least number of rows in each."""
+IN_TURN, FACTOR = 5, 2.5
+"""Number of parts one after another in each of which differences grow by at least this factor.
+
+A touch in a smooth motion starts from nothing, and then differences grow with the square of the time since: by 9, 2.8,
+2.0 from part to part, which is no longer in turn."""
+LOST = 0.1
+"""Difference over the size of the motion at which no digit of it is left."""
+SEEN = 1e-3
+"""Least difference over the size of the motion that matters."""
+
+
+class Divergence(NamedTuple):
+    """Growth of a difference.
+
+    Attributes
+    ----------
+    growth : float
+        Number of e-folds per time [1/s].
+    lost : float
+        Time at which no digit is left [s], infinite where some is.
+    """
+
+    growth: float
+    lost: float
+
+
+def divergence(rows, refined):
+    """Find exponential growth of the differences of two runs.
+
+    Parameters
+    ----------
+    rows, refined : ndarray, shape (rows, columns)
+        Time [s], observables and a balance, see `refweb.dynamics.history.Watch.compared`.
+
+    Returns
+    -------
+    Divergence or None
+        None where differences do not grow so, or there are too few rows to tell.
+    """
+    count = min(len(rows), len(refined))
+    if count < WINDOWS * ROWS:
+        return None
+    same = rows[:count, 0] == refined[:count, 0]
+    times, values = rows[:count, 0][same], rows[:count, 1:-1][same]
+    size = np.abs(values).max(axis=0, initial=0.0)
+    if not (size > 0.0).any() or not times[-1] > 0.0:
+        return None
+    apart = np.abs(values - refined[:count, 1:-1][same])[:, size > 0.0] / size[size > 0.0]
+    part = np.minimum((times / times[-1] * WINDOWS).astype(int), WINDOWS - 1)
+    means = np.array([np.sqrt(np.mean(apart[part == k] ** 2)) if (part == k).any() else 0.0 for k in range(WINDOWS)])
+    ratios = means[1:] / np.maximum(means[:-1], 1e-300)
+    grows = ratios >= FACTOR
+    for last in range(len(ratios) - 1, IN_TURN - 2, -1):
+        first = last + 1 - IN_TURN
+        if grows[first : last + 1].all() and means[first] > 0.0 and means[last + 1] >= SEEN:
+            rate = np.log(means[last + 1] / means[first]) / (IN_TURN * times[-1] / WINDOWS)
+            behind = np.flatnonzero(means >= LOST)
+            return Divergence(float(rate), float(times[-1] * behind[0] / WINDOWS) if len(behind) else np.inf)
+    return None

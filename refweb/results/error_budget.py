@@ -1,0 +1,287 @@
+"""Error budget of results: its parts, their sum ±, and a verdict that says what the number is worth.
+
+Parts are the errors of time steps, of elements, of the stiffness of contact, of the smoothing of the cable law, of
+chance where the motion is chaotic, and of rounding. Each is a number in the unit of the result, "none" where it does
+not exist here, or "not estimated" where nothing was run that tells. ± is the sum of the numbers.
+
+Every verdict follows from ± and the parts alone:
+
+=====================  =================================================================================
+`determined`           all parts are known, and ± is at most a tenth of the value
+`wide`                 ± is above a tenth of the value: more steps make it smaller
+`statistical`          ± is above a tenth, most of it by chance: runs have a mean and a spread, and no run has more
+`depends on the model` ± is above a tenth, most of it by elements, stiffness of contact or smoothing
+`no limit`             finer elements do not converge: the number is one of the mesh
+=====================  =================================================================================
+
+A result has n digits where ± is at most 10^−n of its value. Where ± is small and a part is not estimated there is no
+verdict.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..findings import Finding
+from ..net.tension_laws import SMOOTH
+from .units import readable
+
+PARTS = ("time", "elements", "contact_stiffness", "smoothing", "chance", "rounding")
+MODELS = ("elements", "contact_stiffness", "smoothing")
+"""Parts that are of the model and not of its solution."""
+NONE, OPEN = "none", "not estimated"
+DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS = (
+    "determined",
+    "wide",
+    "statistical",
+    "depends on the model",
+    "no limit",
+)
+ALLOWED = 0.1
+"""± over the value above which a result is not determined."""
+MOST_DIGITS = 12
+"""Most digits that are named."""
+TOUCH = 4.0
+"""Force of a contact over that of its first touch of one node up to which it is one of the mesh."""
+WORDS = {
+    "time": "time steps",
+    "elements": "elements",
+    "contact_stiffness": "stiffness of contact",
+    "smoothing": "smoothing",
+    "chance": "chance",
+    "rounding": "rounding",
+}
+EXACT = {"load", "motion", "reel", "temperature", "point_mass", "link"}
+"""Effects of statics that leave straight elements straight, so that more of them change nothing."""
+
+
+def reasons_of(scene, system, solution):
+    """Reasons why parts of the error do not exist in a scene, by part; the others apply."""
+    reasons = {}
+    if scene.solve.kind == "static":
+        reasons |= dict.fromkeys(("time", "chance"), "an equilibrium has none")
+        terms = {term.name for term in system.terms if not term.over_lines}
+        if scene.cable.order == 1 and terms <= EXACT:
+            reasons["elements"] = "straight elements that are loaded at their ends alone are exact"
+    else:
+        reasons["rounding"] = "part of that of time steps: both runs round differently"
+    touching = [entry["overlap"] for table in (solution.bodies, solution.pairs) for entry in table.values()]
+    touching += [solution.lines["overlap"]] if solution.lines else []
+    if not touching:
+        reasons["contact_stiffness"] = "no contact in the scene"
+    elif not any(touching):
+        reasons["contact_stiffness"] = "nothing touches"
+    if not (system.net.laws == SMOOTH).any():
+        reasons["smoothing"] = "the cable law has none"
+    return reasons
+
+
+def with_parts(result, static, reasons):
+    """A `refweb.results.solution.Result` with the parts of its error, as far as its run tells, not summed yet."""
+    known = {
+        "rounding" if static else "time": result.error,
+        "elements": result.discretisation,
+        "smoothing": result.smoothing,
+    }
+    parts = {}
+    for part in PARTS:
+        value = known.get(part)
+        parts[part] = (NONE if part in reasons else OPEN) if value is None else float(value)
+    return result._replace(parts=parts, reasons={part: reasons[part] for part in PARTS if parts[part] == NONE})
+
+
+def summed(result):
+    """The result with ± the sum of the parts that are known; None where none is."""
+    numbers = [value for value in result.parts.values() if isinstance(value, float)]
+    return result._replace(error=float(sum(numbers)) if numbers else None)
+
+
+def digits_of(value, error):
+    """Number of digits that ± leaves of a value: ± is at most 10^−n of it."""
+    if error == 0.0:
+        return MOST_DIGITS
+    return max(0, min(MOST_DIGITS, math.floor(math.log10(abs(value) / error) + 1e-9))) if value else 0
+
+
+def with_verdict(result, remedies, mesh_only=False):
+    """The result with its verdict and a sentence on that.
+
+    Parameters
+    ----------
+    result : refweb.results.solution.Result
+        With its parts and their sum.
+    remedies : dict of str to str
+        Sentence by verdict on what makes ± smaller, or on what to ask instead.
+    mesh_only : bool
+        Whether finer elements are known not to converge.
+    """
+    value, error = abs(result.value), result.error
+    missing = [WORDS[part] for part, state in result.parts.items() if state == OPEN]
+    numbers = {part: state for part, state in result.parts.items() if isinstance(state, float)}
+    if mesh_only:
+        return _judged(
+            result, NO_LIMIT, "it falls with the size of elements, and grows with the stiffness of contact", remedies
+        )
+    if error is None or not math.isfinite(error):
+        return result._replace(verdict=None, verdict_text="its error is not known")
+    if error <= ALLOWED * value or error == 0.0:
+        digits = digits_of(value, error)
+        plural = "s" * (digits != 1)
+        if missing:
+            text = f"{digits} digit{plural}, but {listed(missing)} {'is' if len(missing) == 1 else 'are'} not estimated"
+            return result._replace(verdict=None, verdict_text=text, digits=digits)
+        return result._replace(verdict=DETERMINED, verdict_text=f"{digits} digit{plural}", digits=digits)
+    largest = max(numbers, key=lambda part: numbers[part])
+    share = readable(numbers[largest], None, result.unit)
+    cause = f"most of ± is that of {WORDS[largest]}, {share}"
+    if largest in MODELS:
+        return _judged(result, MODEL, cause, remedies)
+    return _judged(result, STATISTICAL if largest == "chance" else WIDE, cause, remedies)
+
+
+def _judged(result, verdict, cause, remedies):
+    remedy = remedies.get(verdict, "")
+    return result._replace(verdict=verdict, verdict_text=f"{cause}; {remedy}" if remedy else cause)
+
+
+def listed(words):
+    """Words in a row: "a", "a and b", "a, b and c"."""
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
+def shares(result):
+    """Words behind ± that say what it holds, where parts of the error are not estimated: "time only"."""
+    parts, proven = result.get("parts") or {}, ["proven"] if result.get("proven") else []
+    if parts.get("time") == NONE:  # an equilibrium
+        of = {"elements": "elements", "contact_stiffness": "stiffness of contact", "smoothing": "smoothing"}
+        given = [word for part, word in of.items() if parts[part] == OPEN]
+        return ", ".join([*([f"of these {listed(given)}"] if given else []), *proven])
+    known = [part.replace("_", " ") for part in PARTS if isinstance(parts.get(part), float)]
+    return f"{listed(known)} only" if known and OPEN in parts.values() else ""
+
+
+def first_touch(scene, system, observable):
+    """Force at which a body first meets the mass of one node [N], that of an unlimited number of elements is zero.
+
+    A mass m that meets a spring k δ^p at the speed v compresses it to ½ m v² = k δ^(p + 1)/(p + 1). The mass is the
+    largest that elements give a node which is free to move, the speed that of the body over that of the web at the
+    start. None for what is no instant of a force of contact.
+    """
+    if observable.quantity != "reaction" or observable.body is None or observable.average is not None:
+        return None
+    if scene.solve.kind == "static" or observable.reduce != "max" or not system.contact:
+        return None
+    body = next(b for b in system.net.bodies if b.name == observable.body)
+    stiffness, exponent = scene.settled().contact.law_of(body)
+    nodes, v = np.arange(system.net.nodes), system.initial_velocity()
+    free = nodes[~system.fixed[nodes].all(axis=1)]
+    if stiffness is None or not len(free):
+        return None
+    speed = float(np.linalg.norm(v[free] - v[body.row], axis=1).max())
+    volume = system.net.area * system.net.natural_length
+    cells = system.net.cells
+    share = np.repeat(system.net.cable_mass * volume / volume.sum() / cells.shape[1], cells.shape[1])
+    mass = float(np.bincount(cells.ravel(), share, system.net.nodes)[free].max())
+    depth = (0.5 * mass * speed**2 * (exponent + 1.0) / stiffness) ** (1.0 / (exponent + 1.0))
+    return stiffness * depth**exponent
+
+
+def judge(solution, scene, system, price=None, asked=None):
+    """Give the results of a solution their parts, ± and verdicts, and add warnings of what is wide.
+
+    Parameters
+    ----------
+    solution : refweb.solution.Solution
+        Its ``steps`` or ``reduced`` results are replaced; ``findings`` grow.
+    scene : refweb.Scene
+        As it was solved.
+    system : refweb.system.system.System
+        That of the scene.
+    price : callable, optional
+        ``price(share)``, the CPU time [s] that errors take which are to fall by a factor.
+    asked : dict, optional
+        Errors by result of further runs: ``parts``, ``reasons`` and ``mesh_only``, see `refweb.studies.further_runs`.
+    """
+    static, reasons, asked = scene.solve.kind == "static", reasons_of(scene, system, solution), asked or {}
+    named = {o.name: o for o in scene.observables}
+
+    def judged(results):
+        made = {}
+        for name, result in results.items():
+            further = asked.get(name, {})
+            known = with_parts(result, static, {**reasons, **further.get("reasons", {})})
+            known = known._replace(parts={**known.parts, **further.get("parts", {})})
+            total = named[name].bounded(summed(known), system)
+            mesh_only = further.get("mesh_only")
+            if mesh_only is None:
+                touch = first_touch(scene, system, named[name])
+                mesh_only = touch is not None and 0.0 < total.value <= TOUCH * touch
+            made[name] = with_verdict(total, _remedies(total, solution, price), mesh_only)
+            if solution.divergence is not None and made[name].verdict == WIDE:
+                made[name] = _of_chaos(made[name], solution.divergence, solution.horizon)
+        return made
+
+    if static:
+        for step in solution.steps:
+            step["results"] = judged(step["results"])
+        return
+    solution.reduced = judged(solution.reduced)
+    solution.findings += _warnings(solution, named, known=bool(asked))
+
+
+def _remedies(result, solution, price):
+    """Sentences by verdict on what to do about a result."""
+    share = math.inf if not result.value else (result.error or 0.0) / (ALLOWED * abs(result.value))
+    cost = ""
+    if price is not None and 1.0 < share < math.inf:
+        cost = f", for some {price(share):.2g} s of CPU time"
+    horizon = next((time for k, time in reversed(solution.horizon.get("digits", ())) if time is not None), None)
+    until = f" at t < {horizon:.3g} s" if horizon else ""
+    return {
+        WIDE: f"[accuracy] digits = 1 makes it smaller{cost}",
+        STATISTICAL: f"ask for a result{until}, for a mean (average), or for quantiles of many runs (refweb sweep)",
+        MODEL: _of_model(result),
+        NO_LIMIT: "ask for its mean over a time (average = 0.01), which is an impulse",
+    }
+
+
+def _of_model(result):
+    """Sentence on the largest part of a model."""
+    parts = {part: result.parts[part] for part in MODELS if isinstance(result.parts[part], float)}
+    largest = max(parts, key=lambda part: parts[part], default="elements")
+    return {
+        "elements": "[cable] subdivide = 2 makes it smaller, or ask for a mean (average)",
+        "contact_stiffness": "give [contact] the stiffness of the real surface, or a larger one",
+        "smoothing": "lower [cable] smoothing, or take the tension-only law",
+    }[largest]
+
+
+def _of_chaos(result, divergence, horizon):
+    """A result that is wide in a run and twin that grow apart exponentially."""
+    if result.time < divergence.lost:
+        return result
+    text = (
+        f"run and step refinement grow apart with {divergence.growth:.3g} 1/s and leave no digit from t = "
+        f"{divergence.lost:.3g} s on; refweb trust finds mean and spread"
+    )
+    return result._replace(verdict=STATISTICAL, verdict_text=text)
+
+
+def _warnings(solution, named, known):
+    """Findings on ± of peaks that are wide, and on motions that grow apart."""
+    wide = {
+        name: result.error / abs(result.value)
+        for name, result in solution.reduced.items()
+        if named[name].reduce != "final" and result.verdict in (WIDE, STATISTICAL, MODEL) and result.value
+    }
+    remedy = "see its verdict" if known else "refweb trust SCENE finds what of it is determined"
+    if wide:
+        text = listed([f"{name} ({100.0 * share:.2g} %)" for name, share in wide.items()])
+        yield Finding("wide-error", f"± is above a tenth of the peak: {text}; {remedy}", "accuracy")
+    if solution.divergence is not None:
+        text = (
+            f"the motion may be chaotic: run and step refinement grow apart with {solution.divergence.growth:.3g} 1/s; "
+        )
+        yield Finding("chaotic", text + remedy, "accuracy")

@@ -1,0 +1,308 @@
+"""All parts of the error of results, by further runs within a budget of CPU time.
+
+A run and its twin tell of time steps alone. Further runs of the same scene tell of the rest: with twice and four times
+the elements, with 4 and 16 times the stiffness of contact, with a tenth of the smoothing, with two starts side by side
+and, where these grow apart, with several. Those that cost least come first; one that is expected to take more than what
+is left of the budget is not begun, and one that is seen to is ended. A part of which no run is left is "not estimated".
+
+Two runs are held against each other by their result, and by the mean difference of the observable before, as a run and
+its twin are, see `refweb.dynamics.twin_error`: results may agree by chance.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import InputError, SolverError
+from ..registry import EFFECTS, INTEGRATORS, name_of
+from ..settings import Accuracy
+from .discretisation_error import MARGIN, left_of
+
+LEAST, RUNS = 600.0, 20.0
+"""Budget where none is given: this time [s], or so many times the cost of the first run, whichever is larger."""
+SURE = 1.1
+"""Time that a run takes by its progress, over what is left, at which it is ended."""
+SEEN = 0.1
+"""Share of a run that has to be done before it is judged by its progress."""
+STIFFER = (4.0, 16.0)
+"""Stiffness of contact that is compared with, over that of the scene."""
+LESS = 0.1
+"""Smoothing that is compared with, over that of the scene."""
+MEMBERS, QUANTILE = 8, 2.5
+"""Number of runs of an ensemble, and how many standard deviations 95 in 100 more runs are from its mean at most."""
+FALLS, GROWS = 0.8, 1.5
+"""Factors on a force of contact, with twice the elements and with 4 times the stiffness, below and above which it is
+that of a first touch: that has 0.71 and 2."""
+
+
+class Spent(Exception):
+    """A run was ended because it would have cost more than what is left of the budget."""
+
+
+class Variant(NamedTuple):
+    """A further run.
+
+    Attributes
+    ----------
+    part : str
+        The part of the error that it tells of.
+    text : str
+        What differs, in words.
+    scene : refweb.Scene or None
+        What is run; None for runs from starts side by side.
+    price : float
+        Expected CPU time [s].
+    follows : str or None
+        Text of the variant that comes before.
+    """
+
+    part: str
+    text: str
+    scene: object
+    price: float
+    follows: str | None = None
+
+
+class FurtherRuns:
+    """Further runs of a scene, and what they tell.
+
+    Parameters
+    ----------
+    simulation : refweb.dynamics.simulation.Simulation or refweb.statics.simulation.Simulation
+        That of the scene, at its end.
+    solution : refweb.solution.Solution
+        Its solution; ``further`` grows.
+    rows : ndarray, shape (rows, columns)
+        Its history.
+    clock : refweb.results.run_status.Clock
+        Of all that the budget is for.
+    run : callable
+        `refweb.run`.
+    tell : callable
+        Called with a text and the share of the budget that is spent.
+    """
+
+    def __init__(self, simulation, solution, rows, clock, run, tell):
+        self.simulation, self.solution, self._clock, self._run, self._tell = simulation, solution, clock, run, tell
+        self.scene = scene = _at_knob(simulation)
+        self.static = scene.solve.kind == "static"
+        spent = clock.spent()
+        first = max(spent["cpu_s"] - spent["compile_s"], 1e-3)
+        from ..dynamics.budget import steps_with_twin
+
+        self._single = first if self.static else first / steps_with_twin(simulation.scene)
+        given = scene.accuracy.budget
+        self.budget = max(LEAST, RUNS * first) if given is None else given
+        self._compared = {None: (_results(solution), _history(solution.columns, rows))}
+
+    @property
+    def spent(self):
+        """CPU time that is spent of the budget [s]."""
+        return self._clock.spent()["cpu_s"]
+
+    def follow(self):
+        """Run what the budget allows, cheapest first."""
+        waiting = list(variants(self.scene, self.simulation.system, self.solution, self._single))
+        done = {None}
+        while ready := [v for v in waiting if v.follows in done]:
+            variant = min(ready, key=lambda v: v.price)
+            waiting.remove(variant)
+            left = self.budget - self.spent
+            entry = {"part": variant.part, "text": variant.text, "expected_s": variant.price, "cpu_s": 0.0}
+            if variant.price > left:
+                entry |= {"status": "left out", "message": f"{variant.price:.3g} s expected, {left:.3g} s left"}
+            else:
+                entry |= self._tried(variant, left)
+            self.solution.further.append(entry)
+            if entry["status"] == "solved":
+                done.add(variant.text)
+                grown = entry["cpu_s"] / max(variant.price, 1e-9)
+                waiting = [v._replace(price=v.price * grown) if v.part == variant.part else v for v in waiting]
+                if variant.text == HORIZON and self.solution.horizon["statistical"]:
+                    waiting.append(Variant("chance", ENSEMBLE, None, 0.5 * MEMBERS * entry["cpu_s"]))
+
+    def _tried(self, variant, left):
+        """Run a variant; how that ended."""
+        before = self.spent
+
+        def watched(text, share):
+            spent = self.spent - before
+            if spent > SURE * left or (share > SEEN and spent > SURE * left * share):
+                raise Spent(f"ended after {spent:.3g} s, {100.0 * share:.2g} % done")
+            self._tell(variant.text, min(self.spent / self.budget, 1.0))
+
+        try:
+            if variant.scene is None:
+                self._side_by_side(variant.text, watched)
+            else:
+                run = self._run(variant.scene, progress=watched)
+                self._compared[variant.text] = _results(run), run.history
+            status, message = "solved", ""
+        except Spent as error:
+            status, message = "ended", str(error)
+        except (InputError, SolverError) as error:
+            status, message = "failed", str(error)
+        return {"status": status, "message": message, "cpu_s": self.spent - before}
+
+    def _side_by_side(self, text, tell):
+        """Find the horizon, or mean and spread of an ensemble."""
+        from .predictability import ensemble, horizon
+
+        if text == HORIZON:
+            self.solution.horizon = horizon(self.simulation, self.solution.results, None, tell)
+        else:
+            self.solution.horizon["ensemble"] = ensemble(self.simulation, MEMBERS, tell)
+
+    def findings(self):
+        """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
+        return {o.name: self._found_of(o) for o in self.scene.observables}
+
+    def _found_of(self, observable):
+        name, parts, reasons = observable.name, {}, {}
+        for part, texts in (("elements", FINER), ("contact_stiffness", STIFFNESS), ("smoothing", (SMOOTHER,))):
+            texts = [text for text in texts if text in self._compared]
+            if texts:
+                parts[part] = self._left(name, texts, 1.0 / (1.0 - LESS) if part == "smoothing" else 2.0)
+        entry = {"parts": parts, "reasons": reasons, "mesh_only": self._mesh_only(observable)}
+        if (mean := self.solution.horizon.get("ensemble", {}).get(name)) is not None:
+            value = self.solution.results[name].value
+            parts["chance"] = abs(value - mean["mean"]) + QUANTILE * mean["deviation"]
+        elif self.solution.horizon and name not in self.solution.horizon["statistical"]:
+            parts["chance"] = "none"
+            reasons["chance"] = "a difference of 1e-12 of an element at the start leaves a digit at its time"
+        return entry
+
+    def _left(self, name, texts, factor):
+        """Error of a result by one or two runs nearer to the limit; one leaves ``factor`` times the change."""
+        values = [self._compared[text][0][name] for text in (None, *texts)]
+        first = abs(values[0] - values[1])
+        if len(values) == 2:
+            left = MARGIN * factor * first
+        else:
+            left = left_of(first, abs(values[1] - values[2]), abs(values[0] - values[2]))
+        return max(left, MARGIN * self._mean_apart(name, texts[-1]))
+
+    def _mean_apart(self, name, text):
+        """Mean difference of an observable before its result between the scene and another run; 0 in statics."""
+        if self.static:
+            return 0.0
+        from ..dynamics.twin_error import largest_mean
+
+        table, compared = self._compared[None][1], self._compared[text][1]
+        count, end = min(len(table["time"]), len(compared["time"])), self.solution.results[name].time
+        same = table["time"][:count] == compared["time"][:count]
+        off = np.abs(table[name][:count] - compared[name][:count])[same]
+        return largest_mean(table["time"][:count][same], off, end)
+
+    def _mesh_only(self, observable):
+        """Tell if a force of contact is that of a first touch; None where that is not to be told.
+
+        It falls with the mass of a node, and grows with the root of the stiffness.
+        """
+        from ..results.error_budget import first_touch
+
+        touch = first_touch(self.scene, self.simulation.system, observable)
+        if touch is None or not self.solution.results[observable.name].value > 0.0:
+            return False
+        values = [[self._compared[text][0][observable.name] for text in (None, *texts) if text in self._compared]
+                  for texts in (FINER, STIFFNESS)]  # fmt: skip
+        finer, stiffer = ([b / max(a, 1e-300) for a, b in itertools.pairwise(of)] for of in values)
+        if not finer and not stiffer:
+            return None
+        return bool((stiffer and min(stiffer) > GROWS) or (finer and max(finer) < FALLS))
+
+
+FINER = ("twice the elements", "four times the elements")
+STIFFNESS = tuple(f"{times:g} times the stiffness of contact" for times in STIFFER)
+SMOOTHER, HORIZON, ENSEMBLE = "a tenth of the smoothing", "two starts side by side", f"{MEMBERS} starts side by side"
+
+
+def variants(scene, system, solution, single):
+    """Yield the `Variant` of a scene that its error budget asks for; ``single`` is the cost of one run [s]."""
+    from ..results.error_budget import reasons_of
+
+    reasons, static = reasons_of(scene, system, solution), scene.solve.kind == "static"
+    plain = scene.replace(accuracy=Accuracy(error="none"), chosen=())
+    explicit = not static and INTEGRATORS[scene.solve.method].knob == "safety"
+    if "elements" not in reasons:
+        for n, (text, times) in enumerate(zip(FINER, (2, 4), strict=True)):
+            finer = plain.replace(cable=replace(scene.cable, subdivide=times * scene.cable.subdivide))
+            price = single * float(times) ** (2.0 if explicit else 1.2)
+            yield Variant("elements", text, finer, price, FINER[0] if n else None)
+    if "contact_stiffness" not in reasons:
+        given = stiffness_of(scene, system)
+        for n, (text, times) in enumerate(zip(STIFFNESS, STIFFER, strict=True)):
+            stiffer = plain.with_stiffness({name: times * value for name, value in given.items()}).replace(chosen=())
+            price = single * (times**0.5 if explicit else 1.5)
+            yield Variant("contact_stiffness", text, stiffer, price, STIFFNESS[0] if n else None)
+    if "smoothing" not in reasons and not static:
+        from ..statics.smoothing_error import less_smooth
+
+        groups = {name: less_smooth(group) for name, group in scene.cable.groups.items()}
+        cable = replace(less_smooth(scene.cable), groups=groups)
+        yield Variant("smoothing", SMOOTHER, plain.replace(cable=cable), single)
+    if not static:
+        yield Variant("chance", HORIZON, None, 2.0 * single)
+
+
+def stiffness_of(scene, system):
+    """Stiffness of contact of each body that is touched, and of lines as "self_contact"."""
+    given = {}
+    if scene.contact is not None and scene.contact is not False:
+        given |= {body.name: scene.contact.law_of(body)[0] for body in system.net.bodies}
+    for effect in scene.effects:
+        if name_of(EFFECTS, effect) == "self_contact":
+            given["self_contact"] = effect.stiffness
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _at_knob(simulation):
+    """The scene with the stiffness that was chosen, the method and the knob that its run came to."""
+    scene = simulation.scene.settled()
+    if scene.solve.kind == "static":
+        return scene
+    name = simulation.integrator.knob
+    if simulation.standing.knob == getattr(scene.solve, name):
+        return scene
+    return scene.replace(solve=replace(scene.solve, **{name: simulation.standing.knob}))
+
+
+def _results(solution):
+    return {name: result.value for name, result in solution.results.items()}
+
+
+def _history(columns, rows):
+    from ..results.solution import as_history
+
+    return as_history(columns, rows)
+
+
+def report(solution):
+    """The content of ``trust.json``, a dict of plain values."""
+    keys = ("value", "error", "unit", "time", "parts", "reasons", "verdict", "verdict_text", "digits")
+    results = {name: {key: getattr(r, key) for key in keys} for name, r in solution.results.items()}
+    spent = solution.cost["cpu_s"]
+    return {
+        "scene": solution.scene.title,
+        "results": results,
+        "runs": solution.further,
+        "horizon": solution.horizon,
+        "budget": {"given": solution.scene.accuracy.budget, "spent": spent},
+    }
+
+
+def write(solution, folder):
+    """Write ``trust.json`` and ``trust.png`` to a folder."""
+    import json
+    import pathlib
+
+    from ..pictures.error_budget import draw
+    from ..results.files import write_atomically, write_text
+
+    folder = pathlib.Path(folder)
+    write_text(folder / "trust.json", json.dumps(report(solution), indent=1, ensure_ascii=False))
+    write_atomically(folder / "trust.png", lambda name: draw(solution.results, solution.scene.title).savefig(name))
