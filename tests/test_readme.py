@@ -73,7 +73,7 @@ def test_two_commands_are_one_line_each(marker, words):
 
 
 UNITS = {"mm": 1e-3, "kPa": 1e3, "N": 1.0, "mm/s": 1e-3}
-PRINTED = re.compile(r"(\w+) +(-?[\d.]+) ± ([\d.]+) (\S+) +t = ([\d.]+) s")
+PRINTED = re.compile(r"(\w+) +(-?[\d.]+) ± ([\d.]+) (\S+) \(time only\) +t = ([\d.]+) s")
 
 
 def check_what_it_prints(solution):

@@ -222,7 +222,7 @@ def test_defaults(tmp_path):
             {"name": "max_stress", "quantity": "stress", "reduce": "max"},
             {"name": "max_tension", "quantity": "tension", "reduce": "max"},
         ],
-        "accuracy": {"error": "twin", "refine": False, "horizon": False},
+        "accuracy": {"error": "twin", "refine": False, "horizon": False, "level": "time"},
     }
 
 

@@ -252,7 +252,7 @@ def _of_model(result):
     parts = {part: result.parts[part] for part in MODELS if isinstance(result.parts[part], float)}
     largest = max(parts, key=lambda part: parts[part], default="elements")
     return {
-        "elements": "[cable] subdivide = 2 makes it smaller, or ask for a mean (average)",
+        "elements": "[cable] subdivide = 2 makes it smaller, or ask for its mean over a longer time (average)",
         "contact_stiffness": "give [contact] the stiffness of the real surface, or a larger one",
         "smoothing": "lower [cable] smoothing, or take the tension-only law",
     }[largest]

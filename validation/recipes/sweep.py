@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import refweb
 
 SPEEDS = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0]  # m/s
-FOLLOWED = {"deflection": 1e3, "contact_force": 1.0}  # results, and what they are drawn times
+FOLLOWED = {"deflection": 1e3, "force_mean_10ms": 1.0}  # results, and what they are drawn times
 
 
 def main(folder=".", duration=0.1):
@@ -30,10 +30,10 @@ def main(folder=".", duration=0.1):
     folder = pathlib.Path(folder)
     with open(folder / "sweep.csv", "w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
-        table.writerow(["speed [m/s]", "deflection [m]", "±", "contact_force [N]", "±"])
+        table.writerow(["speed [m/s]", "deflection [m]", "±", "force_mean_10ms [N]", "±"])
         table.writerows(rows)
     figure, panels = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
-    for n, (axes, label) in enumerate(zip(panels, ["deflection [mm]", "contact force [N]"], strict=True)):
+    for n, (axes, label) in enumerate(zip(panels, ["deflection [mm]", "mean contact force in 10 ms [N]"], strict=True)):
         scale = list(FOLLOWED.values())[n]
         values, errors = ([scale * row[k] for row in rows] for k in (1 + 2 * n, 2 + 2 * n))
         axes.errorbar(SPEEDS, values, yerr=errors, fmt="o-", capsize=3, lw=1)
