@@ -218,15 +218,18 @@ class Solution(SolutionData):
             write(figure, path)
         return figure
 
-    def report(self, out: str | PathLike | None = None, frames: int | None = None) -> pathlib.Path:
+    def report(self, out: str | PathLike | None = None, frames: int | None = None, sheet: bool = False) -> pathlib.Path:
         """Write one page of the run, HTML that needs nothing else, with the web in space to turn and play.
 
         Parameters
         ----------
         out : path-like, optional
-            The file, which ends in ``.html``; by default ``report.html`` in the folder of the run, where it has one.
+            The file, which ends in ``.html``; by default ``report.html`` in the folder of the run, where it has one,
+            of the sheet ``sheet.html``.
         frames : int, optional
             Number of frames to turn and play; by default as many as leave the page small.
+        sheet : bool
+            Whether only the sheet is written: sizes, largest tension, margin of safety and the worth of each result.
 
         Returns
         -------
@@ -240,7 +243,7 @@ class Solution(SolutionData):
         """
         from .pages.page import report_of
 
-        return report_of(self, out, frames)
+        return report_of(self, out, frames, sheet)
 
     def save(self, folder, force=False):
         """Write the result folder.
@@ -308,6 +311,7 @@ def load(folder) -> Solution:
         solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             solution.utilisation = used["value"], used["line"]
+        solution.margin = summary.get("margin")
         solution.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
         solution.reduced = {} if solution.steps else read_results(summary["results"])
     except (KeyError, TypeError, ValueError, AttributeError):

@@ -156,6 +156,11 @@ def default():
     )
 
 
+def observes_of(tables):
+    """Observables of the tables of a scene file, each an `Observe`."""
+    return [Observe.read("[[observe]]", entry) for entry in tables.get("observe") or ()] or list(default())
+
+
 def bounds_by_name(tables):
     """Least and largest possible value of each result of a scene by name, and of all that is called as a quantity is.
 
@@ -175,6 +180,5 @@ def bounds_by_name(tables):
         For an observable that is none.
     """
     observes = {quantity: Observe(name=quantity, quantity=quantity) for quantity in OBSERVABLES}
-    given = [Observe.read("[[observe]]", entry) for entry in tables.get("observe") or ()] or default()
-    observes |= {observe.name: observe for observe in given}
+    observes |= {observe.name: observe for observe in observes_of(tables)}
     return {name: observe.observable.bounds_by_tables(tables) for name, observe in observes.items()}
