@@ -131,6 +131,7 @@ class Solution(SolutionData):
         scale: float = 1.0,
         view: Sequence[float] | str | None = None,
         out: str | PathLike | None = None,
+        labels: str | None = None,
     ) -> Figure:
         """Draw one frame, as `refweb.picture` does, whose options these are.
 
@@ -146,7 +147,7 @@ class Solution(SolutionData):
         """
         from .pictures.pictures import picture
 
-        return picture(self, frame, time, field, range, scale, view, out)
+        return picture(self, frame, time, field, range, scale, view, out, labels)
 
     def to_pandas(self, what="history"):
         """Results or history as a table of pandas, which is to be installed.

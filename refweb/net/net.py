@@ -50,6 +50,8 @@ class Net:
         Cross section [m²] and strength [Pa].
     allowed_share : ndarray, shape (cells,), optional
         Knot factor over safety factor: the share of the strength that is allowed; None where it is 1 of all.
+    point_mass : ndarray, shape (nodes,), optional
+        Part of ``mass`` that point masses have added [kg]; None where there are none.
     gradients : ndarray, shape (points, nodes per cell)
         dN/dξ on the reference element [0, 1].
     weights : ndarray, shape (points,)
@@ -96,6 +98,7 @@ class Net:
     factors: tuple = ()
     end: float = math.inf
     allowed_share: np.ndarray | None = None
+    point_mass: np.ndarray | None = None
 
     @property
     def allowed(self):

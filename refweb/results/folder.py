@@ -296,6 +296,8 @@ class Folder:
             arrays |= {"lines": net.web.lines, "scene": self._scene}
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
+            if net.point_mass is not None:
+                arrays["point_masses"] = net.point_mass
             if state.system.weakness is not None:
                 arrays |= {
                     "broken": net.broken,

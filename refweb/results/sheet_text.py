@@ -28,7 +28,7 @@ class Largest(NamedTuple):
     error : float or None
         Its ± [N], None where none is known.
     line : int or None
-        Number of its line.
+        Number of its line, of a quantity of nodes of its node.
     time : float
         When it was [s], in statics the load step.
     source : str
@@ -87,12 +87,12 @@ def largest_tension(summary, scene, of_frames=None):
     Largest or None
         None where it is not known.
     """
-    if (largest := _observed(summary, scene, "tension")) is not None:
+    if (largest := observed(summary, scene, "tension")) is not None:
         return largest
     cable = scene.get("cable") or {}
     groups = list((cable.get("groups") or {}).values())
     alike = "area" in cable and not any("area" in group for group in groups)
-    if alike and (stress := _observed(summary, scene, "stress")) is not None:
+    if alike and (stress := observed(summary, scene, "stress")) is not None:
         return stress.times(cable["area"], "it is the largest stress times the area")
     margin = summary.get("margin")
     keys = ("strength", "safety_factor", "knot_factor")
@@ -186,7 +186,7 @@ def _factors(margin, scene):
 def _error_of(summary, scene, margin):
     """± of the stress of the smallest margin [Pa], by a result that stands at its line; None where there is none."""
     for quantity, factor in (("stress", 1.0), ("tension", 1.0 / margin["area"])):
-        largest = _observed(summary, scene, quantity)
+        largest = observed(summary, scene, quantity)
         if largest is None or largest.error is None or largest.line != margin["line"]:
             continue
         if abs(factor * largest.value - margin["stress"]) <= BESIDE * margin["stress"]:
@@ -194,13 +194,14 @@ def _error_of(summary, scene, margin):
     return None
 
 
-def _observed(summary, scene, quantity):
-    """The `Largest` of the results of a quantity over all lines; None where there is none."""
+def observed(summary, scene, quantity):
+    """The `Largest` of the results of a quantity over all lines, or over all nodes; None where there is none."""
     steps = summary.get("steps") or []
     tables = [step.get("results") or {} for step in steps] or [summary.get("results") or {}]
     found = []
     for observe in observes_of(scene):
-        every = observe.line is None and observe.average is None and (steps or observe.reduce == "max")
+        keys = (observe.line, observe.node, observe.body, observe.component, observe.average)
+        every = keys == (None,) * len(keys) and (steps or observe.reduce == "max")
         if observe.quantity == quantity and every:
             found += [results[observe.name] for results in tables if observe.name in results]
     if not found:
