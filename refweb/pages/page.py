@@ -16,10 +16,10 @@ from ..pictures.pictures import target
 from ..pictures.record import of_folder, of_solution
 from ..results.files import write_text
 from ..results.folder import read_summary, so_far
-from ..results.sheet_text import PACKING
 from . import drawings, sections
 from . import sheet as sheets
 from .markup import Html, html, tag
+from .sheet_text import PACKING
 
 SCRIPTS = ("model.js", "webgl.js", "hand.js", "view.js")
 ENDINGS = ("html", "htm")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..results import sheet_text as words
+from ..pictures.peaks import Largest, largest_tension
+from . import sheet_text as words
 from .markup import pairs, section, table, tag
 
 NAME = "sheet.html"
@@ -19,7 +20,7 @@ def sheet(record, packing=words.PACKING):
     parts = [tag("h3", "What it is"), pairs(sizes) if sizes else tag("p", "The sizes are not known.")]
     if record.kind != "modes":
         try:
-            largest = words.largest_tension(summary, record.scene, lambda: of_frames(record))
+            largest = largest_tension(summary, record.scene, lambda: of_frames(record))
             happens = [*words.on_tension(largest, dynamic), *words.on_margin(summary, record.scene, dynamic)]
             parts += [tag("h3", "What happens"), pairs(happens)]
         except (InputError, KeyError, TypeError, ValueError, AttributeError):
@@ -39,7 +40,7 @@ def _worth(summary):
 
 
 def of_frames(record):
-    """The `refweb.results.sheet_text.Largest` tension in the frames of a record, None where there are none."""
+    """The `refweb.pictures.peaks.Largest` tension in the frames of a record, None where there are none."""
     best = None
     for number, time in record.times.items():
         try:
@@ -53,4 +54,4 @@ def of_frames(record):
     value, element, number, time = best
     lines = record.frame(number).fields.get("line")
     source = "it is the largest in the frames that were written, between which it may be larger"
-    return words.Largest(value, None, element if lines is None else int(lines[element]), time, source)
+    return Largest(value, None, element if lines is None else int(lines[element]), time, source)

@@ -61,13 +61,13 @@ def window(values, bars=(), bounds=(-np.inf, np.inf)):
         return None
     low, high = float(values.min()), float(values.max())
     size = (high - low) or abs(high)
-    least, largest = low, high
+    lowest, highest = low, high
     for bar in bars:
-        least = min(least, bar.value - bar.below) if bar.below <= size else least
-        largest = max(largest, bar.value + bar.above) if bar.above <= size else largest
-    margin = MARGIN * ((largest - least) or abs(high) or 1.0)
-    least = least - margin if low < bounds[0] else max(least - margin, bounds[0])
-    return least, max(largest + margin, least + margin)
+        lowest = min(lowest, bar.value - bar.below) if bar.below <= size else lowest
+        highest = max(highest, bar.value + bar.above) if bar.above <= size else highest
+    margin = MARGIN * ((highest - lowest) or abs(high) or 1.0)
+    lower = lowest - margin if low < bounds[0] else max(lowest - margin, bounds[0])
+    return lower, max(highest + margin, lower + margin)
 
 
 def limit(axes, values, bars=(), bounds=(-np.inf, np.inf), unit=""):
@@ -126,7 +126,7 @@ def _mark(axes, cut, end, sign, unit):
         cut = cut[int(np.argmax(sizes)) :][:1]
     for bar, text in zip(cut, words, strict=True):
         left = bar.along <= 0.5 * (first + last)
-        near = sum(abs(bar.along - other) < NEAR * (last - first) for other in printed)
+        near = sum(abs(bar.along - position) < NEAR * (last - first) for position in printed)
         printed.append(bar.along)
         shift = {"xytext": (7 if left else -7, -sign * (5 + 13 * near)), "textcoords": "offset points"}
         style = {"ha": "left" if left else "right", "va": "center", "fontsize": LETTERS - 1, "color": DARK}

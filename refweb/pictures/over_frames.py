@@ -7,8 +7,8 @@ import functools
 import numpy as np
 
 from ..errors import InputError
-from ..results.sheet_text import Largest, observed, when
 from ..results.units import readable
+from .peaks import Largest, observed, when
 from .record import Values
 from .stage import LARGEST, UNITS
 
@@ -86,20 +86,22 @@ def on_peak(record, field, high):
     peak = _peak(record, name)
     if peak is None or not peak.value > high + MISSED * abs(high):
         return ""
-    place = "node" if name in ("displacement", "velocity") else "line"
-    at = f" at {place} {peak.line}" if peak.line is not None else ""
+    kind = "node" if name in ("displacement", "velocity") else "line"
+    at = f" at {kind} {peak.line}" if peak.line is not None else ""
     clock = f", {when(peak.time, record.kind == 'dynamic')}," if peak.time is not None else ""
     return f"the peak {readable(peak.value, None, UNITS.get(name, ''))}{at}{clock} is between frames"
 
 
 def _peak(record, name):
-    """The largest value of a field over the run, a `refweb.results.sheet_text.Largest`; None where it is not known."""
+    """The largest value of a field over the run, a `refweb.pictures.peaks.Largest`; None where it is not known."""
     summary = record.summary
     try:
         if name != "utilisation":
             return observed(summary, record.scene, name)
         used, margin = summary.get("utilisation"), summary.get("margin") or {}
-        time = margin.get("time") if used and margin.get("line") == used["line"] else None
-        return Largest(used["value"], None, used["line"], time) if used and record.kind == "dynamic" else None
+        if not used or record.kind != "dynamic":
+            return None
+        time = margin["time"] if margin.get("line") == used["line"] else None
+        return Largest(used["value"], None, used["line"], time)
     except (InputError, KeyError, TypeError, ValueError, AttributeError):  # of files that no run has written
         return None

@@ -249,8 +249,8 @@ class Stage:
         if self._seen_in(self.views, self.limits.supports):
             marks.append(Line2D([], [], color=SUPPORT, marker="o", ls="", ms=7, label="support"))
         if self.limits.masses:
-            least, largest = (f"{mass:.3g}" for mass in self.limits.masses)
-            label = f"{least} kg" if least == largest else f"{least} to {largest} kg"
+            lowest, highest = (f"{mass:.3g}" for mass in self.limits.masses)
+            label = f"{lowest} kg" if lowest == highest else f"{lowest} to {highest} kg"
             marks.append(Line2D([], [], color=MASSES, marker="o", ls="", ms=11, label=label))
         if self._seen_in(parallel, self.origin.reshape(-1, 3)):
             marks.append(Line2D([], [], color=BEFORE, lw=0.8, label="undeformed"))

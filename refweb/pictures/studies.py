@@ -141,7 +141,7 @@ def _shares(study, result, column, factor, unit):
     """The panel of the share of cases below a value; its band is what ± leaves."""
 
     def plot(axes):
-        shown = []
+        groups = []
         for _, rows, ink in _inked(study):
             valid = [row for row in rows if row.get(column) is not None]
             y = np.array([row[column] for row in valid]) / factor
@@ -149,12 +149,12 @@ def _shares(study, result, column, factor, unit):
             steps = np.arange(1, len(y) + 1) / max(len(y), 1)
             axes.step(np.sort(y), steps, where="post", color=ink.colour, linestyle=ink.style)
             axes.fill_betweenx(steps, np.sort(y - error), np.sort(y + error), color=ink.colour, alpha=0.2, step="pre")
-            shown.append((y, error))
+            groups.append((y, error))
         limits = [_limit(text, result.name) for text in study.summary["study"].get("conditions", {}).values()]
         limits = [at / factor for at in limits if at is not None]
         for at in limits:
             axes.axvline(at, color=PALE, linestyle=":")
-        values, errors = (np.concatenate(parts) for parts in zip(*shown, strict=True))
+        values, errors = (np.concatenate(parts) for parts in zip(*groups, strict=True))
         limit_along(axes, [*values, *limits], [*errors, *np.zeros(len(limits))], _bounds(study, result), unit)
         axes.set_ylim(0.0, 1.02)
         axes.set_ylabel("share of cases below", color=DARK)

@@ -19,7 +19,7 @@ def web_of(system):
     of all bodies that move [kg].
     """
     web, net = system.net.web, system.net
-    held = sum(net.mass[body.row] for body in net.bodies if body.fixed)
+    fixed_mass = sum(net.mass[body.row] for body in net.bodies if body.fixed)
     return {
         "nodes": len(web.points),
         "lines": len(web.lines),
@@ -30,7 +30,7 @@ def web_of(system):
         "extent": np.ptp(web.points, axis=0).tolist(),
         "diameter": np.sqrt(4.0 / np.pi * np.array([net.area.min(), net.area.max()])).tolist(),
         "volume": float(net.area @ net.natural_length),
-        "total_mass": float(net.mass[: len(net.mass) - net.spins].sum() - held),
+        "total_mass": float(net.mass[: len(net.mass) - net.spins].sum() - fixed_mass),
     }
 
 

@@ -76,8 +76,8 @@ class Sweep:
         tables, names = ("observe", "cable", "damping"), None
         cases = {json.dumps([case.given.get(key) for key in tables]): case for case in self.cases if case.given}
         for case in cases.values():
-            here = {name for name, (lower, _) in bounds_by_name(case.given).items() if lower >= 0.0}
-            names = here if names is None else names & here
+            names_of_case = {name for name, (lower, _) in bounds_by_name(case.given).items() if lower >= 0.0}
+            names = names_of_case if names is None else names & names_of_case
         return names or set()
 
     def gather(self, known):

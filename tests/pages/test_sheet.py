@@ -12,8 +12,9 @@ from refweb.__main__ import main
 from refweb.errors import InputError
 from refweb.net.web import Web
 from refweb.pages import page, sheet
+from refweb.pages import sheet_text as words
+from refweb.pictures.peaks import largest_tension
 from refweb.pictures.record import of_folder
-from refweb.results import sheet_text as words
 
 E, AREA, MASS, SPEED = 1e9, 1e-6, 1.0, 2.0
 CABLE = {"law": "tension-only", "modulus": E, "area": AREA, "density": 1000.0}
@@ -72,7 +73,7 @@ def said(folder):
     """Names and sentences of a sheet, as a dict; what stands below the margin is named "product"."""
     record = of_folder(folder, with_frames=False)
     dynamic = record.kind == "dynamic"
-    largest = words.largest_tension(record.summary, record.scene, lambda: sheet.of_frames(record))
+    largest = largest_tension(record.summary, record.scene, lambda: sheet.of_frames(record))
     rows = [*words.on_sizes(record.summary["web"]), *words.on_tension(largest, dynamic)]
     rows += words.on_margin(record.summary, record.scene, dynamic)
     return {name or "product": text for name, text in rows}

@@ -1,54 +1,20 @@
 """Sheet of a run in words: sizes of the web, its largest tension, its margin of safety, and the worth of each result.
 
-All of it comes from the content of ``run.json`` and of ``scene.toml``, and where these do not hold the largest tension,
-from the frames.
+All of it comes from the content of ``run.json`` and of ``scene.toml``.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-from .observables.observe import observes_of
-from .units import readable, scale_of, with_error
+from ..pictures.peaks import observed, when
+from ..results.units import readable, scale_of, with_error
 
 PACKING = 0.5
 """Share of a packed volume that is cable, where none is given."""
 BESIDE = 1e-6
 """Relative difference of two stresses of one line up to which they are the same."""
-
-
-class Largest(NamedTuple):
-    """The largest tension of a run.
-
-    Attributes
-    ----------
-    value : float
-        The tension [N].
-    error : float or None
-        Its ± [N], None where none is known.
-    line : int or None
-        Number of its line, of a quantity of nodes of its node.
-    time : float
-        When it was [s], in statics the load step.
-    source : str
-        A remark on where it is from; empty where a result holds it.
-    within : tuple or None
-        Least and largest value that are possible [N], where ± goes beyond them.
-    """
-
-    value: float
-    error: float | None
-    line: int | None
-    time: float
-    source: str = ""
-    within: tuple | None = None
-
-    def times(self, factor, source):
-        """The same with all values times a factor."""
-        error = None if self.error is None else factor * self.error
-        within = self.within and tuple(factor * end for end in self.within)
-        return self._replace(value=factor * self.value, error=error, within=within, source=source)
 
 
 def on_sizes(web, packing=PACKING):
@@ -70,38 +36,6 @@ def on_sizes(web, packing=PACKING):
         yield "packed volume", f"{packed}, if {100.0 * packing:.3g} % of it is cable; the cable alone has {solid}"
 
 
-def largest_tension(summary, scene, of_frames=None):
-    """The `Largest` tension of a run.
-
-    Parameters
-    ----------
-    summary : dict
-        The content of ``run.json``.
-    scene : dict
-        The tables of the scene file.
-    of_frames : callable, optional
-        Gives the `Largest` of the frames, or None; it is called where nothing else is known.
-
-    Returns
-    -------
-    Largest or None
-        None where it is not known.
-    """
-    if (largest := observed(summary, scene, "tension")) is not None:
-        return largest
-    cable = scene.get("cable") or {}
-    groups = list((cable.get("groups") or {}).values())
-    alike = "area" in cable and not any("area" in group for group in groups)
-    if alike and (stress := observed(summary, scene, "stress")) is not None:
-        return stress.times(cable["area"], "it is the largest stress times the area")
-    margin = summary.get("margin")
-    keys = ("strength", "safety_factor", "knot_factor")
-    if alike and margin and "rupture" not in scene and not any(key in group for group in groups for key in keys):
-        stress = Largest(margin["stress"], None, margin["line"], margin["time"])
-        return stress.times(margin["area"], "it is the largest stress times the area, and its ± is not known")
-    return of_frames() if of_frames is not None else None
-
-
 def on_tension(largest, dynamic):
     """(Name, sentence) of the largest tension, a `Largest` or None."""
     if largest is None:
@@ -111,11 +45,6 @@ def on_tension(largest, dynamic):
     text += f" in line {largest.line}" if largest.line is not None else ""
     text += f" at {when(largest.time, dynamic)}" + (f"; {largest.source}" if largest.source else "")
     yield "largest tension", text
-
-
-def when(time, dynamic):
-    """A time, or a load step, in words."""
-    return f"t = {time:.6g} s" if dynamic else f"load step {time:g}"
 
 
 def on_margin(summary, scene, dynamic):
@@ -194,31 +123,12 @@ def _error_of(summary, scene, margin):
     return None
 
 
-def observed(summary, scene, quantity):
-    """The `Largest` of the results of a quantity over all lines, or over all nodes; None where there is none."""
-    steps = summary.get("steps") or []
-    tables = [step.get("results") or {} for step in steps] or [summary.get("results") or {}]
-    found = []
-    for observe in observes_of(scene):
-        keys = (observe.line, observe.node, observe.body, observe.component, observe.average)
-        every = keys == (None,) * len(keys) and (steps or observe.reduce == "max")
-        if observe.quantity == quantity and every:
-            found += [results[observe.name] for results in tables if observe.name in results]
-    if not found:
-        return None
-    best = max(found, key=lambda result: result["value"])
-    within = best.get("within")
-    return Largest(
-        best["value"], best["error"], best["where"], best["time"], within=None if within is None else tuple(within)
-    )
-
-
 def rows_of_worth(results):
     """(Columns, rows) of results with ±, and where a run gives them, a verdict on each and its reason."""
-    told = any(result.get("verdict") or result.get("verdict_text") for result in results.values())
+    has_verdicts = any(result.get("verdict") or result.get("verdict_text") for result in results.values())
     rows = []
     for name, result in results.items():
         row = [name, readable(result["value"], result["error"], result["unit"], result.get("within"))]
-        row += [result.get("verdict") or "", result.get("verdict_text") or ""] if told else []
+        row += [result.get("verdict") or "", result.get("verdict_text") or ""] if has_verdicts else []
         rows.append(row)
-    return ["result", "value", *(["verdict", "reason"] if told else [])], rows
+    return ["result", "value", *(["verdict", "reason"] if has_verdicts else [])], rows
