@@ -9,7 +9,7 @@ import math
 from typing import Any
 
 from ..pictures.peaks import observed, when
-from ..results.units import readable, scale_of, with_error
+from ..results.units import readable, with_error
 
 PACKING = 0.5
 """Share of a packed volume that is cable, where none is given."""
@@ -63,13 +63,13 @@ def on_margin(summary, scene, dynamic):
         return
     error = _error_of(summary, scene, margin)
     yield "margin of safety", _decided(margin, error)
-    factors = _factors(margin, scene)
-    stress = readable(margin["stress"], error, "Pa")
-    yield "", f"{factors} / {stress} − 1, of line {margin['line']} at {when(margin['time'], dynamic)}"
-    used = summary.get("utilisation") or {}
-    if used:
-        share = f"its stress reaches {100.0 * used['value']:.3g} % of its strength"
-        yield "breaks first", f"line {used['line']}: {share}"
+    terms = _terms(margin, scene, readable(margin["stress"], error, "Pa"))
+    yield "its terms", f"{terms}, of line {margin['line']} at {when(margin['time'], dynamic)}"
+    used = {"value": margin["stress"] / margin["strength"], "line": margin["line"]}
+    if (given := summary.get("utilisation")) and given["value"] > used["value"]:  # in statics that of the last step
+        used = given
+    share = f"its stress reaches {100.0 * used['value']:.3g} % of its strength"
+    yield "breaks first", f"line {used['line']}: {share}"
 
 
 def decision(margin, error):
@@ -92,24 +92,22 @@ def _decided(margin, error):
         text = "the ± of the largest stress is not known: an [[observe]] of its stress over all lines, with reduce = "
         return f'{value:.3g}, {verdict} without ±; {text}"max", has it'
     to = "without limit" if math.isinf(upper) else f"to {upper:.3g}"
+    ends = "" if f"{lower:.3g}" == f"{upper:.3g}" else f", from {lower:.3g} {to}"
     reason = ", as 0 lies within ±" if verdict == "undecided" else ""
     towards_zero = value - lower if value > 0.0 else upper - value
     text = with_error(value, towards_zero) if math.isfinite(towards_zero) else f"{value:.3g}"
-    return f"{text}, from {lower:.3g} {to}: {verdict}{reason}"
+    return f"{text}{ends}: {verdict}{reason}"
 
 
-def _factors(margin, scene):
-    """The allowed stress as a product, where the factors are those of the cable, else as it is."""
-    factor, name = scale_of(margin["strength"], "Pa")
-    strength = f"{margin['strength'] / factor:.4g} {name}"
+def _terms(margin, scene, stress):
+    """The margin as its terms, of its largest stress in words: the factors are those of the cable, or of its line."""
+    strength, allowed = (readable(float(f"{margin[key]:.4g}"), None, "Pa") for key in ("strength", "allowed"))
     cable = scene.get("cable") or {}
     safety, knot = cable.get("safety_factor", 1.0), cable.get("knot_factor", 1.0)
     if abs(margin["strength"] * knot / safety / margin["allowed"] - 1.0) > BESIDE:
-        factor, name = scale_of(margin["allowed"], "Pa")
-        return f"{margin['allowed'] / factor:.4g} {name} allowed of {strength}"
-    return (
-        strength + (f" × {knot:g} left at knots" if knot != 1.0 else "") + (f" / {safety:g}" if safety != 1.0 else "")
-    )
+        return f"{allowed}, allowed of a strength of {strength}, / {stress} − 1"
+    strength += f" × {knot:g} left at knots" if knot != 1.0 else ""
+    return f"{strength} / " + (f"({safety:g} × {stress})" if safety != 1.0 else stress) + " − 1"
 
 
 def _error_of(summary, scene, margin):

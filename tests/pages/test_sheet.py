@@ -70,13 +70,13 @@ def thrown(**cable):
 
 
 def said(folder):
-    """Names and sentences of a sheet, as a dict; what stands below the margin is named "product"."""
+    """Names and sentences of a sheet, as a dict."""
     record = of_folder(folder, with_frames=False)
     dynamic = record.kind == "dynamic"
     largest = largest_tension(record.summary, record.scene, lambda: sheet.of_frames(record))
     rows = [*words.on_sizes(record.summary["web"]), *words.on_tension(largest, dynamic)]
     rows += words.on_margin(record.summary, record.scene, dynamic)
-    return {name or "product": text for name, text in rows}
+    return dict(rows)
 
 
 def test_sizes_are_those_of_the_web(tmp_path):
@@ -133,9 +133,9 @@ def test_the_margin_of_safety(tmp_path, strength, factors, verdict):
     assert summary["utilisation"]["value"] == pytest.approx(80.0 / AREA / strength, rel=1e-6)  # of the last step
     found = said(folder)
     assert float(found["margin of safety"].split()[0]) == pytest.approx(margin, abs=1e-3)
-    assert found["margin of safety"].endswith(verdict) and "line 0 at load step 3" in found["product"]
-    assert ("0.8 left at knots / 1.5" in found["product"]) == bool(factors)
-    assert found["breaks first"].startswith("line 0")
+    assert found["margin of safety"].endswith(verdict) and "line 0 at load step 3" in found["its terms"]
+    assert (" × 0.8 left at knots / (1.5 × " in found["its terms"]) == bool(factors)
+    assert found["breaks first"] == f"line 0: its stress reaches {100.0 * stress / strength:.3g} % of its strength"
 
 
 def test_factors_change_nothing_else(tmp_path):
