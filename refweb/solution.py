@@ -131,6 +131,7 @@ class Solution(SolutionData):
         scale: float = 1.0,
         view: Sequence[float] | str | None = None,
         out: str | PathLike | None = None,
+        labels: str | None = None,
     ) -> Figure:
         """Draw one frame, as `refweb.picture` does, whose options these are.
 
@@ -146,7 +147,7 @@ class Solution(SolutionData):
         """
         from .pictures.pictures import picture
 
-        return picture(self, frame, time, field, range, scale, view, out)
+        return picture(self, frame, time, field, range, scale, view, out, labels)
 
     def to_pandas(self, what="history"):
         """Results or history as a table of pandas, which is to be installed.
@@ -218,15 +219,18 @@ class Solution(SolutionData):
             write(figure, path)
         return figure
 
-    def report(self, out: str | PathLike | None = None, frames: int | None = None) -> pathlib.Path:
+    def report(self, out: str | PathLike | None = None, frames: int | None = None, sheet: bool = False) -> pathlib.Path:
         """Write one page of the run, HTML that needs nothing else, with the web in space to turn and play.
 
         Parameters
         ----------
         out : path-like, optional
-            The file, which ends in ``.html``; by default ``report.html`` in the folder of the run, where it has one.
+            The file, which ends in ``.html``; by default ``report.html`` in the folder of the run, where it has one,
+            of the sheet ``sheet.html``.
         frames : int, optional
             Number of frames to turn and play; by default as many as leave the page small.
+        sheet : bool
+            Whether only the sheet is written: sizes, largest tension, margin of safety and the worth of each result.
 
         Returns
         -------
@@ -240,7 +244,7 @@ class Solution(SolutionData):
         """
         from .pages.page import report_of
 
-        return report_of(self, out, frames)
+        return report_of(self, out, frames, sheet)
 
     def save(self, folder, force=False):
         """Write the result folder.
@@ -308,6 +312,7 @@ def load(folder) -> Solution:
         solution.breaks, solution.throw = summary.get("breaks"), summary.get("throw", {})
         if used := summary.get("utilisation"):
             solution.utilisation = used["value"], used["line"]
+        solution.margin = summary.get("margin")
         solution.steps = [{**step, "results": read_results(step["results"])} for step in summary["steps"]]
         solution.reduced = {} if solution.steps else read_results(summary["results"])
     except (KeyError, TypeError, ValueError, AttributeError):

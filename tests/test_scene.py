@@ -211,6 +211,8 @@ def test_defaults(tmp_path):
             "slackness": 0.0,
             "smoothing": 1e-5,
             "prestrain": 0.0,
+            "safety_factor": 1.0,
+            "knot_factor": 1.0,
             "order": 1,
             "subdivide": 1,
             "groups": {},

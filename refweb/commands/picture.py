@@ -3,6 +3,8 @@
 import argparse
 import pathlib
 
+from ..errors import InputError
+
 
 def add_arguments(parser):
     """The folder, what is drawn of it, how and where."""
@@ -12,7 +14,10 @@ def add_arguments(parser):
     )
     text = "the frame nearest this time [s] or load step (default: that of the largest value of the first observable)"
     parser.add_argument("--time", type=float, metavar="T", help=text)
-    text = "what the colours show: stress, tension, strain, slack, displacement, velocity, reaction (default: stress)"
+    text = (
+        "what the colours show: stress, tension, strain, slack, displacement, velocity, reaction, of lines that have a "
+    )
+    text += "strength utilisation, and largest_NAME, of each line the largest NAME over all frames (default: stress)"
     parser.add_argument("--field", metavar="NAME", help=text)
     text = "range of the colours [SI], --range=-1e3,2e3 where it begins with a minus, or auto: that of the one frame "
     text += "(default: that of all frames)"
@@ -22,6 +27,8 @@ def add_arguments(parser):
     parser.add_argument("--scale", type=float, default=1.0, metavar="S", help="what displacements are drawn times")
     text = "one view: oblique, side, front, top, or a direction to the viewer such as 1 0 0.5 (default: two views)"
     parser.add_argument("--view", nargs="+", action=_Words, maximum=3, folder=folder, metavar=("NAME", "X"), help=text)
+    text = "number the lines, those with the largest values first, as many as do not cover each other"
+    parser.add_argument("--labels", choices=["lines"], help=text)
     parser.add_argument("--out", metavar="FILE", help="picture to write (default: DIR/web.png)")
     text = "a film of all frames, of a mode its swing: a GIF (default: DIR/web.gif), or where ffmpeg is found an MP4"
     parser.add_argument("--animate", action="store_true", help=text)
@@ -52,6 +59,8 @@ def run(arguments):
 
     folder, out = pathlib.Path(arguments.folder), arguments.out
     options = {name: getattr(arguments, name) for name in ("frame", "time", "field", "scale")}
+    if arguments.animate and arguments.labels:
+        raise InputError(f"--labels {arguments.labels} has no meaning with --animate: leave one of them out")
     options["range"], options["view"] = _values(arguments.range), _values(arguments.view)
     with followed(True, "drawing") as tell:
         if arguments.animate:
@@ -61,7 +70,7 @@ def run(arguments):
             animate(folder, out, **options, progress=tell)
         else:
             out = folder / "web.png" if out is None else out
-            picture(folder, **options, out=out)
+            picture(folder, **options, out=out, labels=arguments.labels)
     print(out)
 
 

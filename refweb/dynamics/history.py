@@ -15,7 +15,7 @@ from ..results.columns import FIRST, components, dynamic_energies, vectors
 from ..results.observables.balances import weights
 from ..results.observables.observe import SIGN, Observe
 from ..results.solution import Result
-from ..results.state import State
+from ..results.state import State, margin_of
 from .integrators.crossings import PAIRS
 from .integrators.events import Event
 from .integrators.integrator import History, Sum
@@ -36,6 +36,8 @@ def _probes_of_warnings(system, followed, step_size):
         scales["stress"] = tension, 1.0 / net.area
     if np.isfinite(net.strength).any():
         scales["utilisation"] = tension, 1.0 / (net.area * net.strength)
+        if _shares_differ(net):
+            scales["margin"] = tension, 1.0 / (net.area * net.allowed)
     tell = [scale for _, scale in scales.values()]
     if not any(_tells_strain(system, scale) for scale in (*tell, *(p.data[:, 0] for p in followed if _of_tension(p)))):
         scales["strain"] = STRAIN, np.ones(len(net.cells))
@@ -60,6 +62,11 @@ def _probes_of_warnings(system, followed, step_size):
         if step_size is not None:
             by_name["body speed"] = probe_of_speed(system)
     return by_name
+
+
+def _shares_differ(net):
+    """Tell if the line of the smallest margin of safety may be another one than that of the largest utilisation."""
+    return net.allowed_share is not None and np.ptp(net.allowed_share[np.isfinite(net.strength)]) > 0.0
 
 
 def _of_tension(probe):
@@ -288,6 +295,15 @@ class Watch:
         if at is None:
             return None
         return float(course.extremes.values[at]), int(self.system.net.line[course.extremes.places[at]])
+
+    def margin(self, course):
+        """Smallest margin of safety of all steps, see `margin_of`; None where no line has a strength."""
+        net, extremes, at = self.system.net, course.extremes, self._of_warning("margin")
+        share = None if at is not None else net.allowed_share
+        if at is None and (at := self._of_warning("utilisation")) is None:
+            return None
+        element, used = int(extremes.places[at]), float(extremes.values[at])
+        return margin_of(net, element, used if share is None else used / float(share[element]), extremes.times[at])
 
     def strain(self, course):
         """Largest strain of all steps [1] and its line."""

@@ -281,7 +281,7 @@ class Simulation:
         solution, watch = self.solution, self.watch
         self._largest_stress, self._unfilled = watch.largest_stress(course), watch.unfilled(course)
         if (used := watch.utilisation(course)) is not None:
-            solution.utilisation = used
+            solution.utilisation, solution.margin = used, watch.margin(course)
         self._strain = watch.strain(course)
         if self.overlaps is not None:
             solution.bodies = self.overlaps.plain()

@@ -39,6 +39,7 @@ class PointMass(Table):
 
     def extend(self, net):
         """The net with the masses added."""
-        mass = net.mass.copy()
-        np.add.at(mass, net.web.find(self.node), self.mass)
-        return replace(net, mass=mass)
+        added = np.zeros(len(net.mass))
+        np.add.at(added, net.web.find(self.node), self.mass)
+        before = 0.0 if net.point_mass is None else net.point_mass
+        return replace(net, mass=net.mass + added, point_mass=before + added[: net.nodes])

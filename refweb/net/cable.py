@@ -38,6 +38,8 @@ class Group(Table):
         Natural length = distance/(1 + prestrain) [1], > −1.
     strength : float, optional
         Stress at which a line breaks [Pa], > 0.
+    safety_factor, knot_factor : float, optional
+        Of the margin of safety, see `Cable`.
 
     Raises
     ------
@@ -59,6 +61,8 @@ class Group(Table):
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     prestrain: float | None = real(default=None, above=-1, unit="1")
     strength: float | None = real(default=None, above=0, unit="Pa")
+    safety_factor: float | None = real(default=None, above=0, unit="1")
+    knot_factor: float | None = real(default=None, above=0, at_most=1, unit="1")
 
     def filled(self):
         """The group with the smooth law's parameters where it has none."""
@@ -87,6 +91,12 @@ class Cable(Table):
         Natural length = distance/(1 + prestrain) [1], > −1; negative is slack.
     strength : float, optional
         Stress at which a line breaks [Pa]; utilisation is reported against it.
+    safety_factor : float
+        Factor on the largest stress in the margin of safety [1], > 0. The margin of a line is
+        strength × knot_factor / (safety_factor × largest stress) − 1, and ``refweb report`` gives the smallest of all
+        lines; nothing else depends on the two factors.
+    knot_factor : float
+        Share of the strength that is left at knots [1], > 0 and ≤ 1.
     order : {1, 2, 3}
         Order of the elements: straight, quadratic, cubic.
     subdivide : int
@@ -119,6 +129,8 @@ class Cable(Table):
     smoothing: float | None = real(default=None, at_least=0, unit="1")
     prestrain: float = real(default=0.0, above=-1, unit="1")
     strength: float | None = real(default=None, above=0, unit="Pa")
+    safety_factor: float = real(default=1.0, above=0, unit="1")
+    knot_factor: float = real(default=1.0, above=0, at_most=1, unit="1")
     order: int = choice(1, 2, 3, default=1)
     subdivide: int = integer(default=1, at_least=1, at_most=1000)
     groups: dict = by_group(Group, "cable", default_factory=dict)
@@ -145,7 +157,8 @@ class Cable(Table):
         -------
         dict of str to ndarray
             ``law`` (its number), ``modulus``, ``area``, ``density``, ``slackness``, ``smoothing``, ``strength``
-            (infinite where none is given) and ``natural_length``, each of shape (lines,).
+            (infinite where none is given), ``safety_factor``, ``knot_factor`` and ``natural_length``, each of shape
+            (lines,).
 
         Raises
         ------

@@ -186,6 +186,7 @@ def build(web, cable, quasi_static=False, consistent=False):
     length = values["natural_length"] / pieces
     cut = _elements(web, element, pieces, length)
     share = values["density"] * values["area"] * length
+    allowed = values["knot_factor"] / values["safety_factor"]
     mass, apart = _masses(element, cut.cells, share, len(cut.points), consistent)
     net = Net(
         web=web,
@@ -205,5 +206,6 @@ def build(web, cable, quasi_static=False, consistent=False):
         quasi_static=quasi_static,
         cable_mass=float(mass.sum()),
         consistent_minus_lumped=apart,
+        allowed_share=None if (allowed == 1.0).all() else allowed,
     )
     return net if net.law else net.with_column("law", values["law"])

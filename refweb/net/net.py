@@ -48,6 +48,10 @@ class Net:
         Time at which a run ends at the latest [s], or its last load step.
     area, strength : ndarray, shape (cells,)
         Cross section [m²] and strength [Pa].
+    allowed_share : ndarray, shape (cells,), optional
+        Knot factor over safety factor: the share of the strength that is allowed; None where it is 1 of all.
+    point_mass : ndarray, shape (nodes,), optional
+        Part of ``mass`` that point masses have added [kg]; None where there are none.
     gradients : ndarray, shape (points, nodes per cell)
         dN/dξ on the reference element [0, 1].
     weights : ndarray, shape (points,)
@@ -93,6 +97,13 @@ class Net:
     spins: int = 0
     factors: tuple = ()
     end: float = math.inf
+    allowed_share: np.ndarray | None = None
+    point_mass: np.ndarray | None = None
+
+    @property
+    def allowed(self):
+        """Stress of each element that is allowed [Pa], infinite where it has no strength, shape (cells,)."""
+        return self.strength if self.allowed_share is None else self.strength * self.allowed_share
 
     @property
     def law_number(self):

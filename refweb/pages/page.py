@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 import hashlib
 import json
 import re
@@ -16,7 +17,9 @@ from ..pictures.record import of_folder, of_solution
 from ..results.files import write_text
 from ..results.folder import read_summary, so_far
 from . import drawings, sections
+from . import sheet as sheets
 from .markup import Html, html, tag
+from .sheet_text import PACKING
 
 SCRIPTS = ("model.js", "webgl.js", "hand.js", "view.js")
 ENDINGS = ("html", "htm")
@@ -49,21 +52,65 @@ def report(folder, out=None, frames=None, progress=None):
         Where the folder is none of a run or of modes, the file cannot be written, or ``frames`` is below 1.
     """
     folder = Path(folder)
+    record, unread = _record(folder)
+    text = functools.partial(page_of, record, frames, progress, unread)
+    return _write(text, folder / NAME if out is None else out)
+
+
+def sheet(folder, out=None, packing=PACKING):
+    """Write the sheet of a result folder: sizes, largest tension, margin of safety and the worth of the results.
+
+    Parameters
+    ----------
+    folder : path-like
+        A result folder of a run or of modes.
+    out : path-like, optional
+        The file; by default ``sheet.html`` in the folder.
+    packing : float
+        Share of the packed volume that is cable [1], > 0 and ≤ 1.
+
+    Returns
+    -------
+    pathlib.Path
+        The file written.
+
+    Raises
+    ------
+    InputError
+        Where the folder is none of a run or of modes, or the file cannot be written.
+    """
+    folder = Path(folder)
+    if not 0.0 < packing <= 1.0:
+        raise InputError(
+            f"packing = {packing:g} must be > 0 and ≤ 1: it is the share of the packed volume that is cable"
+        )
+    text = functools.partial(_sheet_of, *_record(folder), packing)
+    return _write(text, folder / sheets.NAME if out is None else out)
+
+
+def _sheet_of(record, unread="", packing=PACKING):
+    """The page of the sheet alone, as text."""
+    return filled(record.title, _status(record, unread), [sheets.sheet(record, packing)], "")
+
+
+def _record(folder):
+    """(Record, why it has no summary) of a result folder; refuses what is none of a run or of modes."""
     record = of_folder(folder, with_frames=False)
     record.refuse_others("pages")
     if record.status == "running":
         record = record._replace(summary=so_far(folder, read_summary(folder)))
-    unread = "" if record.summary else _unread(folder / "run.json")
-    return _write(record, folder / NAME if out is None else out, frames, progress, unread)
+    return record, "" if record.summary else _unread(folder / "run.json")
 
 
-def report_of(solution, out=None, frames=None):
-    """Write the page of a solution, wherever it is, by default into its folder; see `report`."""
+def report_of(solution, out=None, frames=None, only_sheet=False):
+    """Write the page of a solution, wherever it is, or its sheet alone, by default into its folder; see `report`."""
     if out is None and solution.path is None:
         raise InputError("out is missing: this solution has no folder, so say where the page goes, such as report.html")
-    return _write(
-        of_solution(solution, with_frames=False), Path(solution.path) / NAME if out is None else out, frames, None
-    )
+    if only_sheet and frames is not None:
+        raise InputError(f"frames = {frames} has no meaning for a sheet, which shows none: leave it out")
+    record = of_solution(solution, with_frames=False)
+    text = functools.partial(_sheet_of, record) if only_sheet else functools.partial(page_of, record, frames)
+    return _write(text, Path(solution.path) / (sheets.NAME if only_sheet else NAME) if out is None else out)
 
 
 def _unread(path):
@@ -77,11 +124,12 @@ def _unread(path):
     return "run.json cannot be read: it is not what a run of refweb writes"
 
 
-def _write(record, out, frames, progress, unread=""):
+def _write(text, out):
+    """Write the page that ``text`` makes, once it is known that it can be written."""
     out = Path(out)
     if out.suffix[1:].lower() not in ENDINGS:
         raise InputError(f'out = "{out}" must end in .html')
-    write_text(target(out, ENDINGS), page_of(record, frames, progress, unread))
+    write_text(target(out, ENDINGS), text())
     return out
 
 
@@ -89,7 +137,8 @@ def page_of(record, frames=None, progress=None, unread=""):
     """The page of a record, as text; ``unread`` says why it has no summary, where it has none."""
     frames_found = drawings.frames_of(record, frames, progress)
     lacking = list(_lacking(record, frames_found, unread))
-    parts = [sections.results(record), sections.warnings(record, lacking), drawings.space(record, frames_found)]
+    parts = [sheets.sheet(record), sections.results(record)]
+    parts += [sections.warnings(record, lacking), drawings.space(record, frames_found)]
     parts += [sections.simulated(record), drawings.plots(record), drawings.pictures(record)]
     parts += [make(record) for make in (sections.cost, sections.scene, sections.versions)]
     parts = [part for part in parts if part]

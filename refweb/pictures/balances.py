@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..results.units import readable
-from .histories import clock_of, tick_steps
+from .histories import bounds_of, clock_of, tick_steps
+from .limits import limit
 from .plot_data import unit_of
 from .sheet import COLOURS, DARK, LOW, STYLES, TALL, Ink, Panel, dot, label, legend, telling
 
@@ -163,6 +164,8 @@ def _energies_beside(runs):
                 mask = telling(s.history[name])
                 style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
                 axes.plot(s.along[mask] / second, s.history[name][mask] / factor, marker=dot(mask), **style)
+            values = np.concatenate([s.history[name] for s in having]) / factor
+            limit(axes, values, bounds=bounds_of(having, name, factor))
             label(axes, name.removesuffix("_energy").replace("_", " "), unit)
             if first:
                 legend(axes, names_of(axes, runs))

@@ -10,6 +10,8 @@ from ..errors import InputError
 from ..net.web import Web
 from ..results.units import readable
 from .frames import Frame
+from .histories import bounds_of
+from .limits import limit
 from .plot_data import unit_of
 from .record import CLOCKS
 from .sheet import PALE, Panel, label, legend
@@ -138,6 +140,9 @@ def distances(runs, field):
                 )
                 all_of_it = "" if taut.any() else f" at {when}{origin_text}"
                 entries.append((points, s.said(f"slack: {item.slack.sum()} of {len(item.slack)} lines{all_of_it}")))
+        values = np.concatenate([item.values for item in spreads]) / factor
+        limit(axes, values, bounds=bounds_of(runs, field, factor))
+        axes.set_xlim(left=0.0)
         label(axes, field, called)
         legend(axes, entries)
 

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import InputError
 from ..results.files import write_atomically
 from . import movie_writer, render
+from .over_frames import with_largest
 from .pictures import blank_page, clock_line, look_of, pixels, record_of, target, with_clear_white
 from .polygons import flat_images
 from .stage import DARK, PALE, Seen, Stage, colour_map
@@ -57,7 +58,7 @@ def animate(source, out, frame=None, time=None, field=None, range=None, scale=1.
     InputError
         As for `refweb.picture`; for an ``.mp4`` without ffmpeg.
     """
-    record = record_of(source)
+    record = with_largest(record_of(source), field)
     out = target(out, movie_writer.ENDINGS)
     if out.suffix.lower() == ".mp4":
         movie_writer.ffmpeg()

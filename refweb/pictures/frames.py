@@ -50,6 +50,8 @@ class Frame(NamedTuple):
         Displacements of supported nodes [m].
     swing : ndarray, shape (lines, points, 3), or None
         What a mode adds to the paths [m]; None of what is no mode.
+    masses : Masses or None
+        Point masses; None where there are none.
     """
 
     number: int
@@ -64,6 +66,7 @@ class Frame(NamedTuple):
     ends: np.ndarray
     lifted: np.ndarray
     swing: np.ndarray | None
+    masses: Masses | None = None
 
     @property
     def broken(self):
@@ -85,7 +88,15 @@ class Frame(NamedTuple):
             for name, body in self.bodies.items()
         }
         paths = self.origin + scale * (self.paths - self.origin)
-        return self._replace(paths=paths, supports=self.supports + (scale - 1.0) * self.lifted, bodies=bodies)
+        supports = self.supports + (scale - 1.0) * self.lifted
+        return self._replace(paths=paths, supports=supports, bodies=bodies, masses=self._masses_posed(scale))
+
+    def _masses_posed(self, scale):
+        """Point masses with displacements times a factor."""
+        masses = self.masses
+        if masses is None:
+            return None
+        return masses._replace(points=masses.points + (scale - 1.0) * masses.displacement)
 
 
 class Body(NamedTuple):
@@ -94,6 +105,14 @@ class Body(NamedTuple):
     points: np.ndarray
     triangles: np.ndarray
     displacement: np.ndarray
+
+
+class Masses(NamedTuple):
+    """Point masses: points and displacement [m], both of shape (n, 3), and mass [kg], shape (n,)."""
+
+    points: np.ndarray
+    displacement: np.ndarray
+    mass: np.ndarray
 
 
 class Listed(NamedTuple):
@@ -161,10 +180,10 @@ def read(folder, number, known_paths=None):
     if not any(block.type in CELLS for block in web.cells):
         raise InputError(f'"{paths["web"]}" has no lines')
     meshes = {"web": web, **{name: _mesh(path) for name, path in paths.items() if name != "web"}}
-    return frame_of(number, time, meshes, _supported(folder, web))
+    return frame_of(number, time, meshes, _supported(folder, web), _point_masses(folder))
 
 
-def frame_of(number, time, meshes, supported):
+def frame_of(number, time, meshes, supported, point_mass=None):
     """A frame of meshes.
 
     Parameters
@@ -177,6 +196,8 @@ def frame_of(number, time, meshes, supported):
         ``web``, and bodies by name, as `refweb.results.vtu.meshes` makes them.
     supported : ndarray of bool, shape (points,)
         Which points of the web are supported.
+    point_mass : ndarray, shape (points,), optional
+        Point mass on each point of the web [kg].
     """
     web = meshes["web"]
     origin = web.points - web.point_data.get("displacement", 0.0)
@@ -197,7 +218,11 @@ def frame_of(number, time, meshes, supported):
         mode = _amplitude(web.points, web.point_data["shape"]) * web.point_data["shape"]
         swing = np.concatenate([_curves(mode[cells], samples) for _, cells in blocks])
     fixed = web.points[supported]
-    return Frame(number, time, paths, start, tree, fields, slack, fixed, bodies, ends, lifted, swing)
+    masses = None
+    if point_mass is not None and len(at := np.flatnonzero(point_mass[: len(web.points)] > 0.0)):
+        moved = np.broadcast_to(web.points - origin, web.points.shape)
+        masses = Masses(web.points[at], moved[at], point_mass[at])
+    return Frame(number, time, paths, start, tree, fields, slack, fixed, bodies, ends, lifted, swing, masses)
 
 
 def _amplitude(points, shape):
@@ -236,6 +261,15 @@ def _supported(folder, mesh):
             return checkpoint["supported"][:count].any(axis=1)
     except Exception:  # whatever a spoilt file makes of it
         return _size(mesh.point_data.get("reaction", np.zeros(count))) > 0
+
+
+def _point_masses(folder):
+    """Point mass on each node [kg], as the checkpoint has it; None where it has none."""
+    try:
+        with np.load(Path(folder) / "checkpoint.npz") as checkpoint:
+            return checkpoint["point_masses"] if "point_masses" in checkpoint else None
+    except Exception:  # whatever a spoilt file makes of it
+        return None
 
 
 def _size(data):

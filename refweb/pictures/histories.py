@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..results.units import scale_of
+from .limits import Bar, bar_of, limit
 from .plot_data import bar, text_of, unit_of
 from .sheet import COLOURS, DARK, LETTERS, MARKERS, PALE, STYLES, Panel, dot, label, legend, telling
 
@@ -22,7 +23,7 @@ def history(runs, name):
     second, clock = clock_of(having)
 
     def draw(axes):
-        entries = []
+        entries, bars = [], []
         for s in having:
             mask = telling(s.history[name])
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.4}
@@ -35,8 +36,11 @@ def history(runs, name):
             error = bar(result, factor)
             ink = {"color": s.ink.colour, "markeredgecolor": DARK, "capsize": 5.0, "elinewidth": 2.0, "markersize": 6.0}
             point = axes.errorbar(result.time / second, result.value / factor, error, fmt=s.ink.marker, **ink, zorder=3)
+            bars.append(bar_of(result.time / second, result, factor, error))
             entries.append((point, s.said(f"{text_of(result)} at t = {_time(result.time, second, clock)}")))
         marks(axes, having, second)
+        values = np.concatenate([s.history[name] for s in having]) / factor
+        limit(axes, values, bars, bounds_of(having, name, factor), called)
         label(axes, name, called)
         legend(axes, entries)
 
@@ -44,6 +48,12 @@ def history(runs, name):
     return [
         Panel(draw, f"time [{clock}]", notes=(*notes, *(remark for s in having for remark in s.other_errors(name))))
     ]
+
+
+def bounds_of(runs, name, factor):
+    """Least and largest possible value of a column in all of some runs, in units of the axis."""
+    lower, upper = zip(*(s.bounds.get(name, (-np.inf, np.inf)) for s in runs), strict=True)
+    return min(lower) / factor, max(upper) / factor
 
 
 def clock_of(runs):
@@ -77,16 +87,18 @@ def steps(runs, name):
     factor, called = unit_of(unit, *(np.array([result.value for _, result in rows]) for rows in series))
 
     def draw(axes):
-        entries = []
+        entries, bars = [], []
         for s, rows in zip(having, series, strict=True):
             at, values = [step for step, _ in rows], [result.value / factor for _, result in rows]
             style = {"color": s.ink.colour, "linestyle": s.ink.style, "linewidth": 1.2}
             axes.plot(at, values, **style)
             for step, result in rows:
                 ink = {"color": s.ink.colour, "fmt": s.ink.marker, "capsize": 5.0, "elinewidth": 2.0, "markersize": 6.0}
-                point = axes.errorbar(step, result.value / factor, bar(result, factor), **ink)
+                point = axes.errorbar(step, result.value / factor, error := bar(result, factor), **ink)
+                bars.append(bar_of(step, result, factor, error))
             entries.append((point, s.said(f"{text_of(rows[-1][1])} at step {rows[-1][0]:g}")))
         tick_steps(axes, [step for rows in series for step, _ in rows])
+        limit(axes, [], bars, bounds_of(having, name, factor), called)
         label(axes, name, called)
         legend(axes, entries)
 
@@ -119,6 +131,8 @@ def _columns(runs, name, along, pairs):
             style["linestyle"] = "" if along == "mode" else s.ink.style  # between modes there is nothing
             (line,) = axes.plot(at, values / factor, **style)
             entries += [(line, s.name)] if s.name else []
+        values = np.concatenate([values for _, values in pairs]) / factor
+        limit(axes, values, bounds=bounds_of(runs, name, factor))
         label(axes, name, called)
         legend(axes, entries)
 
@@ -132,7 +146,7 @@ def frequencies(runs):
     factor, called = scale_of(largest, "Hz")
 
     def draw(axes):
-        entries = []
+        entries, bars = [], []
         for s in runs:
             table = s.history
             table_of = {"step": table["step"], "mode": table["mode"], "frequency": table["frequency"] / factor}
@@ -141,6 +155,8 @@ def frequencies(runs):
             draw_one = _over_steps if several else _over_modes
             handle = draw_one(axes, table_of, errors, s)
             entries.append((handle, s.said(f"{count[1]} modes, ± at most {count[0]:.2g} {called}")))
+            columns = (table_of["step" if several else "mode"], table_of["frequency"], errors, errors)
+            bars += [Bar(*row) for row in zip(*columns, strict=True)]
             unstable = table_of["frequency"] < 0
             if unstable.any():
                 at = table_of["step" if several else "mode"][unstable]
@@ -153,6 +169,7 @@ def frequencies(runs):
             tick_steps(axes, [step for s in runs for step in s.history["step"].tolist()])
         else:
             axes.xaxis.get_major_locator().set_params(integer=True)
+        limit(axes, [], bars, (0.0, np.inf), called)
         label(axes, "frequency", called)
         legend(axes, entries)
 

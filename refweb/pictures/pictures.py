@@ -22,17 +22,21 @@ from ..results.files import write_atomically
 from ..results.solution import SolutionData
 from . import render
 from .camera import VIEWS
+from .line_numbers import number_lines
+from .over_frames import on_frames, on_peak, with_largest
 from .polygons import polygons
 from .record import of_folder, of_solution
 from .stage import DARK, PALE, Look, Seen, Stage, limits_of
 
 SIZE = (1600, 1000)
 """Of a picture [pixel]."""
+LABELS = ("lines",)
+"""What can be numbered."""
 MOST_SCALED = 1e6
 """Largest factor on displacements."""
 
 
-def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, view=None, out=None):
+def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, view=None, out=None, labels=None):
     """Draw one frame of a run.
 
     Parameters
@@ -46,7 +50,8 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
         first observable; of modes the first.
     field : str, optional
         Cell data, or point data: lines show the largest of their nodes, of vectors the magnitude. Default
-        ``stress``, of modes ``shape``, or the first there is.
+        ``stress``, of modes ``shape``, or the first there is. ``utilisation`` is that of lines that have a strength,
+        and ``largest_NAME`` of each line the largest NAME over the frames that were written.
     range : (low, high) or "auto", optional
         What the colours span [SI]; ``"auto"`` the values of this frame. Default the values of all frames.
     scale : float
@@ -56,6 +61,8 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
         the web to the viewer. Default an oblique view and one from the side.
     out : path-like, optional
         File to write, in any format that matplotlib writes.
+    labels : {"lines"}, optional
+        What is numbered. Of lines whose numbers would cover each other, that with the largest value has its own.
 
     Returns
     -------
@@ -69,7 +76,7 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
     """
     record = record_of(source)
     out = None if out is None else target(out)
-    page = drawn(record, frame, time, field, range, scale, view)
+    page = drawn(record, frame, time, field, range, scale, view, labels)
     if out is not None:
         if out.suffix.lower() == ".png":
             write_atomically(out, lambda name: Path(name).write_bytes(png(page)))
@@ -78,8 +85,11 @@ def picture(source, frame=None, time=None, field=None, range=None, scale=1.0, vi
     return page
 
 
-def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view=None):
+def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view=None, labels=None):
     """The page of a frame of a `refweb.pictures.record.Record`, as `picture` gives it."""
+    if labels not in (None, *LABELS):
+        raise InputError(f"labels = {quote(labels)} is nothing that can be numbered, {nearest(str(labels), LABELS)}")
+    record = with_largest(record, field)
     number = record.chosen(frame, time)
     frame_drawn = record.frame(number)
     options = look_of(record, frame_drawn, field, range, scale, view)
@@ -98,8 +108,9 @@ def drawn(record, frame=None, time=None, field=None, range=None, scale=1.0, view
         else:
             polygons(axes, model, view, height)
         axes.set(xlim=view.extent[:2], ylim=view.extent[2:])
-    page.text(0.03, 0.905, clock_line(record, number, options), size=16, color=DARK, parse_math=False)
-    page.text(0.985, 0.015, f"frame {number}", size=11, color=PALE, ha="right")
+    page.text(0.03, 0.905, clock_line(record, number, options), size=15, color=DARK, parse_math=False)
+    words = number_lines(page, stage.views, posed, options.field) if labels is not None else ""
+    page.text(0.985, 0.015, f"{words}frame {number}", size=11, color=PALE, ha="right")
     return page
 
 
@@ -112,10 +123,13 @@ def record_of(source):
 
 def look_of(record, frame, field, limits, scale, view):
     """Check the options and make a `Look`; without limits [SI] they are those of all frames."""
-    field = _field(frame, field)
+    field, asked = _field(frame, field), limits
     if not isinstance(scale, int | float) or not 0.0 < scale <= MOST_SCALED:
         raise InputError(f"scale = {quote(scale)} must be a number > 0 and ≤ {MOST_SCALED:g}")
-    return Look(field, _limits(record, frame, field, limits), float(scale), _view(view))
+    limits = _limits(record, frame, field, limits)
+    peak = on_peak(record, field, limits[1]) if asked is None and field != "slack" else ""
+    remark = "  —  ".join(filter(None, [on_frames(record, field), peak]))
+    return Look(field, limits, float(scale), _view(view), remark, bool(peak))
 
 
 def stage_of(record, frame, field, size):
@@ -135,7 +149,7 @@ def clock_line(record, number, options, decimals=None):
     parts = [record.clock(number, decimals)]
     if options.scale != 1:
         parts.append(f"{'shape' if record.kind == 'modes' else 'displacements'} × {options.scale:g}")
-    return "  —  ".join(filter(None, [*parts, record.ending]))
+    return "  —  ".join(filter(None, [*parts, record.ending, options.remark]))
 
 
 def blank_page(stage, title, size):

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..results.observables.observe import bounds_by_name
 from ..results.solution import Result, read_results
 from ..results.units import other_errors, readable, scale_of
 from .record import Record
@@ -70,6 +71,14 @@ class Shown:
     def results(self):
         """Results by name, each a `refweb.results.solution.Result`; none while the run goes on."""
         return _results(self.record.summary)
+
+    @functools.cached_property
+    def bounds(self):
+        """Least and largest possible value of columns of the history by name, as far as the scene says."""
+        try:
+            return bounds_by_name(self.record.scene)
+        except (InputError, TypeError, AttributeError):  # of a file that no run has written
+            return {}
 
     @property
     def events(self):

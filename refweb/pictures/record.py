@@ -206,7 +206,7 @@ def of_solution(solution, with_frames=True):
     def frame(number):
         state, shape = states[number]
         supported = state.system.fixed[: state.system.net.nodes].any(axis=1)
-        return frame_of(number, times[number], meshes(state, shape), supported)
+        return frame_of(number, times[number], meshes(state, shape), supported, state.system.net.point_mass)
 
     scene = solution.scene
     try:

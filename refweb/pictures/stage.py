@@ -22,6 +22,10 @@ BROKEN, THIN = (0.86, 0.36, 0.30), 0.4
 GREY_WHERE_SLACK = ("tension", "stress", "strain")
 UNITS = {"tension": "N", "reaction": "N", "stress": "Pa", "natural_length": "m", "displacement": "m"}
 UNITS |= {"velocity": "m/s", "mass": "kg"}
+LARGEST = "largest_"
+"""What the names of fields over all frames begin with."""
+MASSES, MASS_RADIUS, MASS_SIZES = (0.55, 0.16, 0.42), 5.0, 6
+"""Colour of point masses, the radius of the largest over that of lines, and the number of their sizes."""
 MOST_UNDEFORMED = 20_000
 """Undeformed lines that are drawn as lines of matplotlib; more are first looked at, and marked pixel by pixel."""
 
@@ -39,12 +43,18 @@ class Look(NamedTuple):
         What displacements are drawn times.
     view : str, ndarray of shape (3,) or None
         The only view; None for those that show the web best.
+    remark : str
+        Words on the field, which stand beside the time.
+    missed : bool
+        Whether the largest value of the run is above the range, as no frame has it.
     """
 
     field: str
     limits: tuple
     scale: float = 1.0
     view: object = None
+    remark: str = ""
+    missed: bool = False
 
 
 class Seen(NamedTuple):
@@ -68,6 +78,8 @@ class Seen(NamedTuple):
         Whether some line is broken.
     lower, upper : float
         Values of lines that are not [SI].
+    masses : tuple
+        Least and largest point mass [kg]; empty where there is none.
     """
 
     points: np.ndarray
@@ -80,6 +92,7 @@ class Seen(NamedTuple):
     broken: bool
     lower: float
     upper: float
+    masses: tuple = ()
 
     @classmethod
     def of(cls, frame, field):
@@ -107,6 +120,7 @@ class Seen(NamedTuple):
             bool(frame.broken.any()),
             lower,
             upper,
+            () if frame.masses is None else (float(frame.masses.mass.min()), float(frame.masses.mass.max())),
         )
 
     def spanned(self):
@@ -185,9 +199,18 @@ class Stage:
         model: list[Tubes | Surface | Balls] = [Tubes(frame.paths, colours, radius)]
         if len(frame.supports):
             model.append(Balls(frame.supports, SUPPORT, 2.2 * self.radius))
+        if frame.masses is not None:
+            model += self._dots(frame.masses)
         for i, body in enumerate(frame.bodies.values()):
             model.append(Surface(body.points, body.triangles, BODIES[i % len(BODIES)]))
         return model
+
+    def _dots(self, masses):
+        """Balls on the nodes that have point masses, whose volumes are as these, to `MASS_SIZES` sizes."""
+        shares = np.cbrt(masses.mass / masses.mass.max())
+        sizes = np.ceil(MASS_SIZES * shares - 1e-9) / MASS_SIZES
+        radius = MASS_RADIUS * self.radius
+        return [Balls(masses.points[sizes == size], MASSES, float(size) * radius) for size in np.unique(sizes)]
 
     def annotate(self, axes, view):
         """Metres along the axes of a parallel view, and the undeformed web; a triad of known length in perspective."""
@@ -225,6 +248,10 @@ class Stage:
             marks.append(Line2D([], [], color=BROKEN, lw=2, label="broken"))
         if self._seen_in(self.views, self.limits.supports):
             marks.append(Line2D([], [], color=SUPPORT, marker="o", ls="", ms=7, label="support"))
+        if self.limits.masses:
+            lowest, highest = (f"{mass:.3g}" for mass in self.limits.masses)
+            label = f"{lowest} kg" if lowest == highest else f"{lowest} to {highest} kg"
+            marks.append(Line2D([], [], color=MASSES, marker="o", ls="", ms=11, label=label))
         if self._seen_in(parallel, self.origin.reshape(-1, 3)):
             marks.append(Line2D([], [], color=BEFORE, lw=0.8, label="undeformed"))
         for i, (name, points) in enumerate(self.limits.bodies.items()):
@@ -245,13 +272,18 @@ class Stage:
         factor, unit = scaled_unit(self.options.field, max(abs(low), abs(high)))
         slip = 1e-9 * (high - low)
         beyond = {(0, 0): "neither", (1, 0): "min", (0, 1): "max", (1, 1): "both"}
-        beyond = beyond[int(self.limits.lower < low - slip), int(self.limits.upper > high + slip)]
+        beyond = beyond[
+            int(self.limits.lower < low - slip), int(self.options.missed or self.limits.upper > high + slip)
+        ]
         scale = ScalarMappable(Normalize(factor * low, factor * high), colour_map())
         bar = figure.colorbar(scale, cax=figure.add_axes((0.905, 0.36, 0.014, 0.48)), extend=beyond)
         bar.outline.set_visible(False)
         bar.ax.tick_params(labelsize=13, colors=DARK)
-        name = _cut(self.options.field.replace("_", " "))
-        bar.ax.set_title(name + (f" [{unit}]" if unit else ""), size=15, pad=14, color=DARK)
+        over, name = "", self.options.field
+        if name.startswith(LARGEST):
+            over, name = "largest\n", name.removeprefix(LARGEST)
+        name = over + _cut(name.replace("_", " "))
+        bar.ax.set_title(name + (f" [{unit}]" if unit else ""), size=13 if over else 15, pad=14, color=DARK)
 
 
 def _different(lines):
@@ -328,6 +360,7 @@ def limits_of(record, field, numbers):
 
 def scaled_unit(field, largest):
     """Factor and unit that make the largest value [SI] a number of one to three digits."""
+    field = field.removeprefix(LARGEST)
     unit = UNITS.get(field, "")
     if field == "strain":
         return (100.0, "%") if largest >= 1e-4 else (1e6, "10⁻⁶")

@@ -14,6 +14,7 @@ from ..messages import quote, short
 from ..results.case_rows import NAME, read, results_among
 from ..results.folder import read_summary
 from ..results.units import scale_of
+from .limits import Bar, limit, limit_along
 from .plots import write
 from .sheet import DARK, PALE, Ink, Panel, label, legend, sheet
 
@@ -118,7 +119,7 @@ def _over(study, result, column, path, factor, unit):
     ratio = isinstance(spread, dict) and spread.get("spacing") == "log"
 
     def plot(axes):
-        entries = []
+        entries, bars = [], []
         for words, rows, ink in _inked(study):
             valid = [row for row in rows if row.get(column) is not None and isinstance(row[path], int | float)]
             x, y = ([row[name] for row in valid] for name in (path, column))
@@ -126,8 +127,10 @@ def _over(study, result, column, path, factor, unit):
             style = {"color": ink.colour, "markersize": 4.0, "elinewidth": 1.0, "capsize": 2.0}
             drawn = axes.errorbar(x, np.array(y) / factor, error, fmt=ink.marker, linestyle="none", **style)
             entries += [(drawn, words)] if words else []
+            bars += [Bar(*row) for row in zip(x, np.array(y) / factor, error, error, strict=True)]
         if ratio:
             axes.set_xscale("log")
+        limit(axes, [], bars, _bounds(study, result), unit)
         label(axes, result.name, unit)
         legend(axes, entries, columns=2)
 
@@ -138,6 +141,7 @@ def _shares(study, result, column, factor, unit):
     """The panel of the share of cases below a value; its band is what ± leaves."""
 
     def plot(axes):
+        groups = []
         for _, rows, ink in _inked(study):
             valid = [row for row in rows if row.get(column) is not None]
             y = np.array([row[column] for row in valid]) / factor
@@ -145,13 +149,22 @@ def _shares(study, result, column, factor, unit):
             steps = np.arange(1, len(y) + 1) / max(len(y), 1)
             axes.step(np.sort(y), steps, where="post", color=ink.colour, linestyle=ink.style)
             axes.fill_betweenx(steps, np.sort(y - error), np.sort(y + error), color=ink.colour, alpha=0.2, step="pre")
-        for text in study.summary["study"].get("conditions", {}).values():
-            if (at := _limit(text, result.name)) is not None:
-                axes.axvline(at / factor, color=PALE, linestyle=":")
+            groups.append((y, error))
+        limits = [_limit(text, result.name) for text in study.summary["study"].get("conditions", {}).values()]
+        limits = [at / factor for at in limits if at is not None]
+        for at in limits:
+            axes.axvline(at, color=PALE, linestyle=":")
+        values, errors = (np.concatenate(parts) for parts in zip(*groups, strict=True))
+        limit_along(axes, [*values, *limits], [*errors, *np.zeros(len(limits))], _bounds(study, result), unit)
         axes.set_ylim(0.0, 1.02)
         axes.set_ylabel("share of cases below", color=DARK)
 
     return Panel(plot, f"{result.name} [{unit}]" if unit else result.name)
+
+
+def _bounds(study, result):
+    """Least and largest possible value of a result."""
+    return (0.0 if result.name in study.summary.get("not_negative", ()) else -math.inf), math.inf
 
 
 def _limit(text, name):

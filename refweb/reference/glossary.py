@@ -32,6 +32,7 @@ GLOSSARY = {
         "taut": "Under tension.",
         "utilisation": "Stress over strength.",
         "strength": "Stress at which a line breaks [Pa].",
+        "margin of safety": "Allowed stress over the largest stress of a line, less 1; below 0 the line breaks.",
         "bar": "Line of the linear law, which carries compression as well.",
         "lumped mass": "Mass of an element divided among its nodes.",
         "consistent mass": "Mass matrix of the shape functions of the elements.",

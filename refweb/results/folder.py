@@ -25,7 +25,7 @@ from .vtu_file import quoted
 
 RESULT_FILES = re.compile(
     r"scene\.toml|checkpoint\.npz|(history|modes|cost)\.csv|run\.json|web\.pvd|(web|cost)\.png|web\.gif"
-    r"|plot\.(png|svg|pdf)|report\.html|web_in_paraview\.py"
+    r"|plot\.(png|svg|pdf)|report\.html|sheet\.html|web_in_paraview\.py"
     r"|frames/[^/]+_\d{6,}\.vtu|(frames/)?\.refweb-[^/]+"
 )
 """Files that a run writes, and that ``--force`` removes."""
@@ -296,6 +296,8 @@ class Folder:
             arrays |= {"lines": net.web.lines, "scene": self._scene}
             for key in ("axes", "inertia", "offset") if net.bodies else ():
                 arrays[f"body_{key}"] = np.array([getattr(body, key) for body in net.bodies])
+            if net.point_mass is not None:
+                arrays["point_masses"] = net.point_mass
             if state.system.weakness is not None:
                 arrays |= {
                     "broken": net.broken,

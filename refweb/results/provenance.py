@@ -12,8 +12,14 @@ from .. import __version__
 
 
 def web_of(system):
-    """Sizes of the web, as `run.json` holds them."""
+    """Sizes of the web, as `run.json` holds them.
+
+    ``extent`` is that along x, y and z as the web is built [m], ``diameter`` the least and the largest of a round cable
+    of the same area [m], ``volume`` that of the cable [m³], and ``total_mass`` that of the cable, of point masses and
+    of all bodies that move [kg].
+    """
     web, net = system.net.web, system.net
+    fixed_mass = sum(net.mass[body.row] for body in net.bodies if body.fixed)
     return {
         "nodes": len(web.points),
         "lines": len(web.lines),
@@ -21,6 +27,10 @@ def web_of(system):
         "cable_length": float(np.sum(net.natural_length)),
         "area": float(web.area),
         "mass": net.cable_mass,
+        "extent": np.ptp(web.points, axis=0).tolist(),
+        "diameter": np.sqrt(4.0 / np.pi * np.array([net.area.min(), net.area.max()])).tolist(),
+        "volume": float(net.area @ net.natural_length),
+        "total_mass": float(net.mass[: len(net.mass) - net.spins].sum() - fixed_mass),
     }
 
 

@@ -135,6 +135,9 @@ class SolutionData:
         The result folder that a run wrote while it went.
     utilisation : (float, int), optional
         Largest stress over strength, in dynamics over time, and its line; None where no line has a strength.
+    margin : dict, optional
+        The smallest margin of safety, in dynamics over time, in statics over load steps, see
+        `refweb.results.state.margin_of`; None where no line has a strength.
     bodies : dict
         Of each body that the web may touch, by name: its deepest ``overlap`` [m], ``time`` and ``line`` of that, the
         overlap ``allowed``, and the ``stiffness`` of its contact, ``chosen`` by refweb or given; of a mesh the
@@ -199,6 +202,7 @@ class SolutionData:
     divergence: Any = None
     further: list = field(default_factory=list)
     utilisation: tuple | None = None
+    margin: dict | None = None
     bodies: dict = field(default_factory=dict)
     pairs: dict = field(default_factory=dict)
     lines: dict = field(default_factory=dict)
@@ -251,6 +255,7 @@ class SolutionData:
             "warnings": self.warnings,
             "findings": [finding._asdict() for finding in self.findings],
             **({"utilisation": dict(zip(("value", "line"), used, strict=True))} if (used := self.utilisation) else {}),
+            **({"margin": self.margin} if self.margin else {}),
             **({"bodies": self.bodies} if self.bodies else {}),
             **({"pairs": self.pairs} if self.pairs else {}),
             **({"lines": self.lines} if self.lines else {}),

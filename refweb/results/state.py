@@ -121,6 +121,15 @@ class State:
         return self._by_line(self.element_tension / (net.area * net.strength))
 
     @cached_property
+    def margin(self):
+        """Smallest margin of safety, see `margin_of`; None where no line has a strength."""
+        net = self.system.net
+        if not np.isfinite(net.strength).any():
+            return None
+        used = self.element_tension / (net.area * net.allowed)
+        return margin_of(net, int(used.argmax()), float(used.max()), self.time)
+
+    @cached_property
     def energies(self):
         """Energies by column of the book [J]: those of the effects that are present, and their total.
 
@@ -133,6 +142,40 @@ class State:
         work = -book.pop("work", 0.0)
         book |= {"total_energy": sum(book.values()), "work": work}
         return {name: book[name] for name in static_energies(self.system)}
+
+
+def margin_of(net, element, used, time):
+    """The margin of safety at an element, as ``run.json`` holds it.
+
+    Parameters
+    ----------
+    net : refweb.net.net.Net
+        The net.
+    element : int
+        Its number.
+    used : float
+        Its largest stress over the allowed one, strength × knot_factor / safety_factor [1].
+    time : float
+        When that was [s], in statics the load step.
+
+    Returns
+    -------
+    dict
+        ``value``, the allowed stress over the largest one less 1; the stress ``used`` over the one ``allowed`` [Pa];
+        the ``line``, its largest ``stress`` [Pa], ``area`` [m²] and ``strength`` [Pa]; and the ``time``. ``value``,
+        ``allowed`` and ``strength`` are None where they are infinite.
+    """
+    allowed, strength = float(net.allowed[element]), float(net.strength[element])
+    return {
+        "value": 1.0 / used - 1.0 if used > 0.0 else None,
+        "used": used,
+        "line": int(net.line[element]),
+        "stress": used * allowed if used else 0.0,
+        "allowed": allowed if np.isfinite(allowed) else None,
+        "strength": strength if np.isfinite(strength) else None,
+        "area": float(net.area[element]),
+        "time": float(time),
+    }
 
 
 def strength_remark(utilisation):

@@ -127,6 +127,9 @@ class Simulation:
         solution.state = state
         if (used := state.utilisation) is not None:
             solution.utilisation = float(used.max()), int(used.argmax())
+        if (margin := state.margin) is not None:
+            if solution.margin is None or margin["used"] > solution.margin["used"]:
+                solution.margin = margin
         self._remarks.record(equilibrium.step, remarks_on(state, stats, solution.utilisation, equilibrium))
         return row
 

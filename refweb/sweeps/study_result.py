@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+import json
 import pathlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..results.case_rows import FIRST, LAST, results_among
+from ..results.observables.observe import bounds_by_name
 from ..results.provenance import versions
 from .chances import chances
 from .design import groups
@@ -67,6 +70,16 @@ class Sweep:
             counts[row["status"]] += 1
         return {status: number for status, number in counts.items() if number}
 
+    @functools.cached_property
+    def _not_negative(self):
+        """Names of what is not negative in any case, whatever its parameters are."""
+        tables, names = ("observe", "cable", "damping"), None
+        cases = {json.dumps([case.given.get(key) for key in tables]): case for case in self.cases if case.given}
+        for case in cases.values():
+            names_of_case = {name for name, (lower, _) in bounds_by_name(case.given).items() if lower >= 0.0}
+            names = names_of_case if names is None else names & names_of_case
+        return names or set()
+
     def gather(self, known):
         """Let ``rows`` be those of all cases, of what is known by their keys, and find what they say together."""
         self.rows = [row_of(self.study, case, known) for case in self.cases]
@@ -112,6 +125,7 @@ class Sweep:
             "count": self.count,
             "reasons": self.reasons,
             "chances": finite(self.chances),
+            "not_negative": [item.name for item in results_among(self.columns) if item.name in self._not_negative],
             "cost": self.cost,
             "versions": self.versions,
             "seed": self.study.seed,

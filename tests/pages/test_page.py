@@ -29,7 +29,7 @@ from refweb.pages.packed import PLACES, VALUES, differences, levels, pack, summe
 from refweb.pictures.record import of_folder
 from refweb.registry import EFFECTS
 
-ALWAYS = {"results", "warnings", "space", "simulated", "plots", "pictures", "cost", "scene", "versions"}
+ALWAYS = {"sheet", "results", "warnings", "space", "simulated", "plots", "pictures", "cost", "scene", "versions"}
 VOID = {"meta", "img", "input", "br", "link"}
 HOSTILE = "</script><script>alert(1)</script> \"'&\u2028<!--"
 

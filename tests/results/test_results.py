@@ -106,11 +106,15 @@ def test_run_json(written, web):
     keys = "status message scene web results steps events solver cost versions seed warnings findings"
     assert list(run) == keys.split()
     assert (run["status"], run["message"], run["scene"], run["seed"]) == ("solved", "", "Loaded hexagons", 7)
-    assert list(run["web"]) == ["nodes", "lines", "cells", "cable_length", "area", "mass"]
+    sizes = "nodes lines cells cable_length area mass extent diameter volume total_mass"
+    assert list(run["web"]) == sizes.split()
     assert (run["web"]["nodes"], run["web"]["lines"]) == (len(web.points), len(web.lines))
     width, height, _ = np.ptp(web.points, axis=0)
     length = 0.3 * len(web.lines)
-    for key, value in [("cable_length", length), ("area", width * height), ("mass", DENSITY * AREA * length)]:
+    mass, size = DENSITY * AREA * length, 2.0 * (AREA / np.pi) ** 0.5
+    values = {"cable_length": length, "area": width * height, "mass": mass, "extent": [width, height, 0.0]}
+    values |= {"diameter": [size, size], "volume": AREA * length, "total_mass": mass}
+    for key, value in values.items():
         assert run["web"][key] == pytest.approx(value, rel=1e-12)
     assert list(run["results"]) == ["sag", "largest tension", "support"] and run["events"] == []
     check_results(run["results"])

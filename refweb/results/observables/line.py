@@ -14,9 +14,15 @@ class Line(Observable):
 
     Subclasses have `values`, `bound` and `scale`, by which ``column`` of tension and strain of each element is
     multiplied.
+
+    Attributes
+    ----------
+    pull : bool
+        Whether it has the sign of the tension.
     """
 
     keys, at = ("line",), "line"
+    pull = True
 
     def values(self, state):
         """Value of each line in a state, shape (lines,)."""
@@ -64,7 +70,14 @@ class Line(Observable):
         """Lines that can only pull have tensions that are not negative, damping apart, and the largest has none."""
         pulls = (system.net.laws[self.elements(system.net)] == TENSION_ONLY).any()
         alone = sum(term.over_lines for term in system.terms) == 1
-        return NOT_NEGATIVE if self.column(system) != STRAIN and pulls and alone else ANY
+        return NOT_NEGATIVE if self.pull and pulls and alone else ANY
+
+    def bounds_by_tables(self, tables):
+        """The same where the law of all lines is known without the net: one law, of the cable and of its groups."""
+        cable = tables.get("cable", {})
+        laws = {table["law"] for table in (cable, *cable.get("groups", {}).values()) if "law" in table}
+        damped = tables.get("damping", {}).get("time", 0.0) > 0.0
+        return NOT_NEGATIVE if self.pull and laws == {"tension-only"} and not damped else ANY
 
     def column(self, system):
         """Column of tension of what the lines observe."""
@@ -121,6 +134,8 @@ class Stress(Line):
 
 class Strain(Line):
     """Engineering strain."""
+
+    pull = False
 
     def column(self, system):
         """Column of strain."""

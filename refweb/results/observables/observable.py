@@ -79,6 +79,10 @@ class Observable:
         """Least and largest value that are possible, whatever the state: a magnitude is not negative."""
         return NOT_NEGATIVE if "component" in self.keys and self.observe.component is None else ANY
 
+    def bounds_by_tables(self, tables):
+        """Least and largest value that the tables of a scene file leave, a dict; where they say less, any value."""
+        return self.bounds(None)
+
     def position(self, system, at):
         """Node or line of the scene, where the probe says it stands at row or element ``at``; None for the whole."""
         return None

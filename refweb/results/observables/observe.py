@@ -154,3 +154,31 @@ def default():
         Observe(name="max_stress", quantity="stress", reduce="max"),
         Observe(name="max_tension", quantity="tension", reduce="max"),
     )
+
+
+def observes_of(tables):
+    """Observables of the tables of a scene file, each an `Observe`."""
+    return [Observe.read("[[observe]]", entry) for entry in tables.get("observe") or ()] or list(default())
+
+
+def bounds_by_name(tables):
+    """Least and largest possible value of each result of a scene by name, and of all that is called as a quantity is.
+
+    Parameters
+    ----------
+    tables : dict
+        The tables of a scene file.
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Bounds by name.
+
+    Raises
+    ------
+    InputError
+        For an observable that is none.
+    """
+    observes = {quantity: Observe(name=quantity, quantity=quantity) for quantity in OBSERVABLES}
+    observes |= {observe.name: observe for observe in observes_of(tables)}
+    return {name: observe.observable.bounds_by_tables(tables) for name, observe in observes.items()}

@@ -1,0 +1,132 @@
+"""Sheet of a run in words: sizes of the web, its largest tension, its margin of safety, and the worth of each result.
+
+All of it comes from the content of ``run.json`` and of ``scene.toml``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..pictures.peaks import observed, when
+from ..results.units import readable, with_error
+
+PACKING = 0.5
+"""Share of a packed volume that is cable, where none is given."""
+BESIDE = 1e-6
+"""Relative difference of two stresses of one line up to which they are the same."""
+
+
+def on_sizes(web, packing=PACKING):
+    """(Name, sentence) of the sizes of a web, of ``web`` of ``run.json``; ``packing`` is cable over packed volume."""
+    if "extent" in web:
+        x, y, z = (f"{length:.4g}" for length in web["extent"])
+        yield "overall size", f"{x} × {y} × {z} m along x, y and z, as the web is built"
+    if "lines" in web:
+        yield "lines", f"{web['lines']}, {web['cable_length']:.6g} m of cable"
+    if "diameter" in web:
+        thin, thick = (readable(float(f"{size:.4g}"), None, "m") for size in web["diameter"])
+        yield "cable diameter", f"{thin if thin == thick else f'{thin} to {thick}'}, of a round cable of the same area"
+    if "mass" in web:
+        yield "cable mass", f"{web['mass']:.4g} kg"
+    if "total_mass" in web:
+        yield "total mass", f"{web['total_mass']:.4g} kg, with point masses and bodies that move"
+    if "volume" in web:
+        packed, solid = (f"{1e3 * size:.4g} l" for size in (web["volume"] / packing, web["volume"]))
+        yield "packed volume", f"{packed}, if {100.0 * packing:.3g} % of it is cable; the cable alone has {solid}"
+
+
+def on_tension(largest, dynamic):
+    """(Name, sentence) of the largest tension, a `Largest` or None."""
+    if largest is None:
+        yield "largest tension", 'not known: give an [[observe]] with quantity = "tension" and reduce = "max"'
+        return
+    text = readable(largest.value, largest.error, "N", largest.within)
+    text += f" in line {largest.line}" if largest.line is not None else ""
+    text += f" at {when(largest.time, dynamic)}" + (f"; {largest.source}" if largest.source else "")
+    yield "largest tension", text
+
+
+def on_margin(summary, scene, dynamic):
+    """(Name, sentence) of the margin of safety and of the line that breaks first."""
+    margin: dict[str, Any] | None = summary.get("margin")
+    if margin is None:
+        lacking = "the run has no strength: give [cable] strength [Pa], or that of [cable.groups]"
+        given = [scene.get("cable") or {}, scene.get("rupture") or {}]
+        given += [group for table in given for group in (table.get("groups") or {}).values()]
+        if any("strength" in table for table in given):
+            lacking = "this run.json does not hold it: it does where a run has ended"
+        yield "margin of safety", f"not known, as {lacking}"
+        return
+    if margin["value"] is None:
+        yield "margin of safety", "unlimited: no line that has a strength is under tension"
+        return
+    error = _error_of(summary, scene, margin)
+    yield "margin of safety", _decided(margin, error)
+    terms = _terms(margin, scene, readable(margin["stress"], error, "Pa"))
+    yield "its terms", f"{terms}, of line {margin['line']} at {when(margin['time'], dynamic)}"
+    used = {"value": margin["stress"] / margin["strength"], "line": margin["line"]}
+    if (given := summary.get("utilisation")) and given["value"] > used["value"]:  # in statics that of the last step
+        used = given
+    share = f"its stress reaches {100.0 * used['value']:.3g} % of its strength"
+    yield "breaks first", f"line {used['line']}: {share}"
+
+
+def decision(margin, error):
+    """(Lower, upper end, verdict) of a margin, of the ± of its stress [Pa]; "holds", "breaks" or "undecided"."""
+    stress, allowed = margin["stress"], margin["allowed"]
+    error = error or 0.0
+    lower = allowed / (stress + error) - 1.0
+    upper = allowed / (stress - error) - 1.0 if stress > error else math.inf
+    return lower, upper, "holds" if lower > 0.0 else "breaks" if upper < 0.0 else "undecided"
+
+
+def _decided(margin, error):
+    """A margin with its ±, and the verdict.
+
+    The margin is not linear in the stress: ± is how far it may lie towards 0, and both ends follow it.
+    """
+    lower, upper, verdict = decision(margin, error)
+    value = margin["value"]
+    if error is None:
+        text = "the ± of the largest stress is not known: an [[observe]] of its stress over all lines, with reduce = "
+        return f'{value:.3g}, {verdict} without ±; {text}"max", has it'
+    to = "without limit" if math.isinf(upper) else f"to {upper:.3g}"
+    ends = "" if f"{lower:.3g}" == f"{upper:.3g}" else f", from {lower:.3g} {to}"
+    reason = ", as 0 lies within ±" if verdict == "undecided" else ""
+    towards_zero = value - lower if value > 0.0 else upper - value
+    text = with_error(value, towards_zero) if math.isfinite(towards_zero) else f"{value:.3g}"
+    return f"{text}{ends}: {verdict}{reason}"
+
+
+def _terms(margin, scene, stress):
+    """The margin as its terms, of its largest stress in words: the factors are those of the cable, or of its line."""
+    strength, allowed = (readable(float(f"{margin[key]:.4g}"), None, "Pa") for key in ("strength", "allowed"))
+    cable = scene.get("cable") or {}
+    safety, knot = cable.get("safety_factor", 1.0), cable.get("knot_factor", 1.0)
+    if abs(margin["strength"] * knot / safety / margin["allowed"] - 1.0) > BESIDE:
+        return f"{allowed}, allowed of a strength of {strength}, / {stress} − 1"
+    strength += f" × {knot:g} left at knots" if knot != 1.0 else ""
+    return f"{strength} / " + (f"({safety:g} × {stress})" if safety != 1.0 else stress) + " − 1"
+
+
+def _error_of(summary, scene, margin):
+    """± of the stress of the smallest margin [Pa], by a result that stands at its line; None where there is none."""
+    for quantity, factor in (("stress", 1.0), ("tension", 1.0 / margin["area"])):
+        largest = observed(summary, scene, quantity)
+        if largest is None or largest.error is None or largest.line != margin["line"]:
+            continue
+        if abs(factor * largest.value - margin["stress"]) <= BESIDE * margin["stress"]:
+            return factor * largest.error
+    return None
+
+
+def rows_of_worth(results):
+    """(Columns, rows) of results with ±, and where a run gives them, a verdict on each and its reason."""
+    has_verdicts = any(result.get("verdict") or result.get("verdict_text") for result in results.values())
+    rows = []
+    for name, result in results.items():
+        row = [name, readable(result["value"], result["error"], result["unit"], result.get("within"))]
+        row += [result.get("verdict") or "", result.get("verdict_text") or ""] if has_verdicts else []
+        rows.append(row)
+    return ["result", "value", *(["verdict", "reason"] if has_verdicts else [])], rows

@@ -1,0 +1,66 @@
+"""Numbers of lines on a picture: those of the largest values first, and none that covers another one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .stage import LARGEST
+
+SIZE, WIDE, HIGH = 9, 0.75, 1.5
+"""Size of the numbers [pt], and over that the width of a digit and the height, with room between them."""
+MOST, LOOKED_AT = 200, 20_000
+"""Lines that are numbered at most, and those of the largest values that are looked at."""
+
+
+def number_lines(page, views, frame, field):
+    """Write numbers of lines on a page, in its view in perspective if there is one, else in its first.
+
+    Parameters
+    ----------
+    page : matplotlib.figure.Figure
+        The page, with an axes for each view.
+    views : list of refweb.pictures.camera.View
+        Its views.
+    frame : refweb.pictures.frames.Frame
+        The frame that is drawn.
+    field : str
+        The field whose largest values come first.
+
+    Returns
+    -------
+    str
+        Words on the lines that have no number; empty where all have one.
+    """
+    from matplotlib.patheffects import withStroke
+
+    elements = np.asarray(frame.fields.get("line", np.arange(len(frame.paths)))).astype(int)
+    lines, first, count = np.unique(elements, return_index=True, return_counts=True)
+    largest = np.full(len(lines), -np.inf)
+    np.maximum.at(largest, np.searchsorted(lines, elements), np.nan_to_num(frame.fields[field], nan=-np.inf))
+    axes, view = next((pair for pair in zip(page.axes, views, strict=False) if pair[1].perspective), (None, views[0]))
+    axes = axes or page.axes[0]
+    middles = first + count // 2
+    paths = frame.paths[middles]
+    places = view.project(0.5 * (paths[:, (paths.shape[1] - 1) // 2] + paths[:, paths.shape[1] // 2]))[0]
+    points = 72.0 * page.get_size_inches() * axes.get_position().size / (2.0 * np.asarray(view.half))
+    style = {"size": SIZE, "color": "#111111", "ha": "center", "va": "center", "clip_on": True, "zorder": 6}
+    style["path_effects"] = [withStroke(linewidth=2.0, foreground="white")]
+    chosen = _apart(places * points, np.argsort(-largest, kind="stable"), SIZE * WIDE * len(str(lines[-1])))
+    for index in chosen:
+        axes.text(*places[index], str(lines[index]), **style)
+    if len(chosen) == len(lines):
+        return ""
+    name = field.removeprefix(LARGEST).replace("_", " ")
+    return f"{len(chosen)} of {len(lines)} lines are numbered, those of large {name} first   "
+
+
+def _apart(places, order, width):
+    """Numbers of places [pt], shape (n, 2), that are apart from those before them in an order, `MOST` at most."""
+    chosen: list = []
+    for index in order[:LOOKED_AT]:
+        beside = np.abs(places[chosen] - places[index])
+        if not ((beside[:, 0] < width) & (beside[:, 1] < SIZE * HIGH)).any():
+            chosen.append(index)
+            if len(chosen) == MOST:
+                break
+    return chosen

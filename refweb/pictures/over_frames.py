@@ -1,0 +1,107 @@
+"""Fields over all frames of a run: the largest value of each line, and the peak of the run that frames miss."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..errors import InputError
+from ..results.units import readable
+from .peaks import Largest, observed, when
+from .record import Values
+from .stage import LARGEST, UNITS
+
+MISSED = 1e-3
+"""Share by which the peak of a run is above all frames where that is said."""
+
+
+def with_largest(record, field):
+    """A record whose frames have the field ``largest_NAME``: of each line the largest NAME of all frames.
+
+    Parameters
+    ----------
+    record : refweb.pictures.record.Record
+        The record.
+    field : str or None
+        The field that is asked for; the record is returned as it is where this is no such field.
+
+    Returns
+    -------
+    refweb.pictures.record.Record
+    """
+    base = field.removeprefix(LARGEST) if isinstance(field, str) and field.startswith(LARGEST) else ""
+    if not base or not record.times or base not in record.frame(next(iter(record.times))).fields:
+        return record
+
+    @functools.cache
+    def largest():
+        return functools.reduce(np.fmax, (values for _, values in _values_of(record, base)))
+
+    def frame(number):
+        plain = record.frame(number)
+        if len(largest()) != len(plain.paths):
+            raise InputError(f'field = "{field}": the frames have webs of different lines')
+        return plain._replace(fields={**plain.fields, field: largest()})
+
+    def values(number, name):
+        return Values(largest(), np.zeros(len(largest()), dtype=bool)) if name == field else record.values(number, name)
+
+    return record._replace(frame=frame, values=values)
+
+
+def _values_of(record, field):
+    """(Number, values) of a field in each frame that can be read."""
+    shape = None
+    for number in record.times:
+        try:
+            values = record.values(number, field).field
+        except (InputError, KeyError):
+            continue
+        if shape is not None and values.shape != shape:
+            raise InputError(f'field = "{LARGEST}{field}": the frames have webs of different lines')
+        shape = values.shape
+        yield number, values
+
+
+def on_frames(record, field):
+    """Words that a field over all frames is of those that were written; empty for another field."""
+    count = len(record.times)
+    return f"largest over the {count} frames written" if field.startswith(LARGEST) else ""
+
+
+def on_peak(record, field, high):
+    """Sentence on the peak of a field over the run where all frames are below it; empty where they are not.
+
+    Parameters
+    ----------
+    record : refweb.pictures.record.Record
+        The run.
+    field : str
+        The field that is drawn.
+    high : float
+        Its largest value in all frames [SI].
+    """
+    name = field.removeprefix(LARGEST)
+    peak = _peak(record, name)
+    if peak is None or not peak.value > high + MISSED * abs(high):
+        return ""
+    kind = "node" if name in ("displacement", "velocity") else "line"
+    at = f" at {kind} {peak.line}" if peak.line is not None else ""
+    clock = f", {when(peak.time, record.kind == 'dynamic')}," if peak.time is not None else ""
+    return f"the peak {readable(peak.value, None, UNITS.get(name, ''))}{at}{clock} is between frames"
+
+
+def _peak(record, name):
+    """The largest value of a field over the run, a `refweb.pictures.peaks.Largest`; None where it is not known."""
+    summary = record.summary
+    try:
+        if name != "utilisation":
+            return observed(summary, record.scene, name)
+        used, margin = summary.get("utilisation"), summary.get("margin") or {}
+        if not used or record.kind != "dynamic":
+            return None
+        time = margin["time"] if margin.get("line") == used["line"] else None
+        return Largest(used["value"], None, used["line"], time)
+    except (InputError, KeyError, TypeError, ValueError, AttributeError):  # of files that no run has written
+        return None

@@ -1,0 +1,96 @@
+"""The largest value of a quantity over a run, as ``run.json`` and ``scene.toml`` have it, and the largest tension."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..results.observables.observe import observes_of
+
+
+class Largest(NamedTuple):
+    """The largest value of a quantity over a run.
+
+    Attributes
+    ----------
+    value : float
+        The value [SI].
+    error : float or None
+        Its ±, None where none is known.
+    line : int or None
+        Number of its line, of a quantity of nodes of its node; None where it is not known.
+    time : float or None
+        When it was [s], in statics the load step; None where it is not known.
+    source : str
+        A remark on where it is from; empty where a result holds it.
+    within : tuple or None
+        Least and largest value that are possible, where ± goes beyond them.
+    """
+
+    value: float
+    error: float | None
+    line: int | None
+    time: float | None
+    source: str = ""
+    within: tuple | None = None
+
+    def times(self, factor, source):
+        """The same with all values times a factor."""
+        error = None if self.error is None else factor * self.error
+        within = self.within and tuple(factor * end for end in self.within)
+        return self._replace(value=factor * self.value, error=error, within=within, source=source)
+
+
+def largest_tension(summary, scene, of_frames=None):
+    """The `Largest` tension of a run.
+
+    Parameters
+    ----------
+    summary : dict
+        The content of ``run.json``.
+    scene : dict
+        The tables of the scene file.
+    of_frames : callable, optional
+        Gives the `Largest` of the frames, or None; it is called where nothing else is known.
+
+    Returns
+    -------
+    Largest or None
+        None where it is not known.
+    """
+    if (largest := observed(summary, scene, "tension")) is not None:
+        return largest
+    cable = scene.get("cable") or {}
+    groups = list((cable.get("groups") or {}).values())
+    alike = "area" in cable and not any("area" in group for group in groups)
+    if alike and (stress := observed(summary, scene, "stress")) is not None:
+        return stress.times(cable["area"], "it is the largest stress times the area")
+    margin = summary.get("margin")
+    keys = ("strength", "safety_factor", "knot_factor")
+    if alike and margin and "rupture" not in scene and not any(key in group for group in groups for key in keys):
+        stress = Largest(margin["stress"], None, margin["line"], margin["time"])
+        return stress.times(margin["area"], "it is the largest stress times the area, and its ± is not known")
+    return of_frames() if of_frames is not None else None
+
+
+def observed(summary, scene, quantity):
+    """The `Largest` of the results of a quantity over all lines, or over all nodes; None where there is none."""
+    steps = summary.get("steps") or []
+    tables = [step.get("results") or {} for step in steps] or [summary.get("results") or {}]
+    results_found = []
+    for observe in observes_of(scene):
+        keys = (observe.line, observe.node, observe.body, observe.component, observe.average)
+        every = keys == (None,) * len(keys) and (steps or observe.reduce == "max")
+        if observe.quantity == quantity and every:
+            results_found += [results[observe.name] for results in tables if observe.name in results]
+    if not results_found:
+        return None
+    best = max(results_found, key=lambda result: result["value"])
+    within = best.get("within")
+    return Largest(
+        best["value"], best["error"], best["where"], best["time"], within=None if within is None else tuple(within)
+    )
+
+
+def when(time, dynamic):
+    """A time, or a load step, in words."""
+    return f"t = {time:.6g} s" if dynamic else f"load step {time:g}"
