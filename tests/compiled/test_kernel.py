@@ -209,9 +209,9 @@ from numba.core import event
 seen = event.RecordingListener()
 event.register("numba:compile", seen)
 import refweb
-solves = {"square-load": {}, "square-impact": {"solve.duration": 2e-3}, "closing-net": {"solve.duration": 5e-3}}
+solves = {"square-load": {}, "square-impact": {"solve.duration": 1e-2}, "closing-net": {"solve.duration": 5e-3}}
 runs = [refweb.run(refweb.Scene.load(name, values)) for name, values in solves.items()]
-runs.append(refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 2e-3, "solve.method": "cvode"})))
+runs.append(refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 1e-2, "solve.method": "cvode"})))
 print([*(solution.cost["compile_s"] for solution in runs), len(seen.buffer)])
 """
 
@@ -229,7 +229,7 @@ def test_a_warm_process_compiles_nothing():
 QUICK = """
 import json, sys
 import refweb
-refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 2e-3}), out=sys.argv[1])
+refweb.run(refweb.Scene.load("square-impact", {"solve.duration": 1e-2}), out=sys.argv[1])
 heavy = ("scipy.linalg", "scipy.sparse", "skfem", "numba.typed.typeddict", "meshio", "urllib.request")
 print(json.dumps([name for name in heavy if name in sys.modules]))
 """

@@ -411,7 +411,7 @@ def test_errors_go_on_where_the_second_leg_is_resumed(tmp_path):
     """They are those of a leg that was not interrupted, which what the first leg is off by is most of."""
     refweb.run(swing(0.95), out=tmp_path / "first")
     whole, resumed = nets.whole_and_resumed(swing(0.01, start=str(tmp_path / "first")), tmp_path)
-    assert resumed.results == whole.results
+    assert resumed.results["x"]._replace(verdict_text="") == whole.results["x"]._replace(verdict_text="")
     assert resumed.results["x"].error > 5.0 * refweb.run(swing(0.01)).results["x"].error
 
 
