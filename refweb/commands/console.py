@@ -225,6 +225,8 @@ def print_trust(report):
     rows: list = [("errors", grid)]
     reasons = {(part, text) for result in results.values() for part, text in result["reasons"].items()}
     rows += [("" if n else "none", f"{WORDS[part]}: {text}") for n, (part, text) in enumerate(sorted(reasons))]
+    if any(OPEN in result["parts"].values() for result in results.values()):
+        rows.append(("", "?: not estimated"))
     rows += [("verdict", text) for text in on_verdicts(results)]
     for n, run in enumerate(report["runs"]):
         ended = run["status"] if run["status"] != "solved" else f"{run['cpu_s']:.2f} s CPU"

@@ -41,6 +41,10 @@ DETERMINED, WIDE, STATISTICAL, MODEL, NO_LIMIT = VERDICTS = (
 )
 ALLOWED = 0.1
 """± over the value above which a result is not determined."""
+SMOOTHED = 1.32
+"""What smoothing leaves of a result over what is found by a tenth of it, as if errors went with η.
+
+Where they go with √η, as of nets that are flat and slack, a tenth leaves √0.1 of them."""
 MOST_DIGITS = 12
 """Most digits that are named."""
 TOUCH = 4.0
@@ -83,7 +87,7 @@ def with_parts(result, static, reasons):
     known = {
         "rounding" if static else "time": result.error,
         "elements": result.discretisation,
-        "smoothing": result.smoothing,
+        "smoothing": None if result.smoothing is None else SMOOTHED * result.smoothing,
     }
     parts = {}
     for part in PARTS:
@@ -134,7 +138,7 @@ def with_verdict(result, remedies, mesh_only=False):
             return result._replace(verdict=None, verdict_text=text, digits=digits)
         return result._replace(verdict=DETERMINED, verdict_text=f"{digits} digit{plural}", digits=digits)
     largest = max(numbers, key=lambda part: numbers[part])
-    share = readable(numbers[largest], None, result.unit)
+    share = readable(float(f"{numbers[largest]:.2g}"), None, result.unit)
     cause = f"most of ± is that of {WORDS[largest]}, {share}"
     if largest in MODELS:
         return _judged(result, MODEL, cause, remedies)
@@ -219,6 +223,12 @@ def judge(solution, scene, system, price=None, asked=None):
                 touch = first_touch(scene, system, named[name])
                 mesh_only = touch is not None and 0.0 < total.value <= TOUCH * touch
             made[name] = with_verdict(total, _remedies(total, solution, price), mesh_only)
+            if (spread := further.get("spread")) is not None and made[name].verdict in (WIDE, STATISTICAL):
+                text = "over runs from starts side by side"
+                mean = readable(spread["mean"], spread["deviation"], result.unit)
+                made[name] = made[name]._replace(
+                    verdict=STATISTICAL, verdict_text=f"{mean} {text}; {_remedies(total, solution, price)[STATISTICAL]}"
+                )
             if solution.divergence is not None and made[name].verdict == WIDE:
                 made[name] = _of_chaos(made[name], solution.divergence, solution.horizon)
         return made

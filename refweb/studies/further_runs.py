@@ -12,15 +12,23 @@ its twin are, see `refweb.dynamics.twin_error`: results may agree by chance.
 from __future__ import annotations
 
 import itertools
+import json
+import pathlib
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ..dynamics.budget import steps_with_twin
+from ..dynamics.twin_error import largest_mean
 from ..errors import InputError, SolverError
 from ..registry import EFFECTS, INTEGRATORS, name_of
+from ..results.error_budget import ALLOWED, SMOOTHED, first_touch, reasons_of
+from ..results.files import write_atomically, write_text
+from ..results.solution import as_history
 from ..settings import Accuracy
 from .discretisation_error import MARGIN, left_of
+from .predictability import ensemble, horizon, lost_digits
 
 LEAST, RUNS = 600.0, 20.0
 """Budget where none is given: this time [s], or so many times the cost of the first run, whichever is larger."""
@@ -34,6 +42,10 @@ LESS = 0.1
 """Smoothing that is compared with, over that of the scene."""
 MEMBERS, QUANTILE = 8, 2.5
 """Number of runs of an ensemble, and how many standard deviations 95 in 100 more runs are from its mean at most."""
+APART = 1e-6
+"""Difference of the starts of an ensemble, over the shortest element: no real net is known better."""
+LOST = 5
+"""Number of digits that a small difference has to cost until a result that is wide counts as chaotic."""
 FALLS, GROWS = 0.8, 1.5
 """Factors on a force of contact, with twice the elements and with 4 times the stiffness, below and above which it is
 that of a first touch: that has 0.71 and 2."""
@@ -92,12 +104,10 @@ class FurtherRuns:
         self.static = scene.solve.kind == "static"
         spent = clock.spent()
         first = max(spent["cpu_s"] - spent["compile_s"], 1e-3)
-        from ..dynamics.budget import steps_with_twin
-
         self._single = first if self.static else first / steps_with_twin(simulation.scene)
         given = scene.accuracy.budget
         self.budget = max(LEAST, RUNS * first) if given is None else given
-        self._compared = {None: (_results(solution), _history(solution.columns, rows))}
+        self._compared = {None: (_results(solution), as_history(solution.columns, rows))}
 
     @property
     def spent(self):
@@ -114,7 +124,10 @@ class FurtherRuns:
             left = self.budget - self.spent
             entry = {"part": variant.part, "text": variant.text, "expected_s": variant.price, "cpu_s": 0.0}
             if variant.price > left:
-                entry |= {"status": "left out", "message": f"{variant.price:.3g} s expected, {left:.3g} s left"}
+                entry |= {
+                    "status": "left out",
+                    "message": f"{variant.price:.3g} s expected, {max(left, 0.0):.3g} s left of the budget",
+                }
             else:
                 entry |= self._tried(variant, left)
             self.solution.further.append(entry)
@@ -122,7 +135,7 @@ class FurtherRuns:
                 done.add(variant.text)
                 grown = entry["cpu_s"] / max(variant.price, 1e-9)
                 waiting = [v._replace(price=v.price * grown) if v.part == variant.part else v for v in waiting]
-                if variant.text == HORIZON and self.solution.horizon["statistical"]:
+                if variant.text == HORIZON and any(map(self._chaotic, self.scene.observables)):
                     waiting.append(Variant("chance", ENSEMBLE, None, 0.5 * MEMBERS * entry["cpu_s"]))
 
     def _tried(self, variant, left):
@@ -150,12 +163,16 @@ class FurtherRuns:
 
     def _side_by_side(self, text, tell):
         """Find the horizon, or mean and spread of an ensemble."""
-        from .predictability import ensemble, horizon
-
         if text == HORIZON:
             self.solution.horizon = horizon(self.simulation, self.solution.results, None, tell)
         else:
-            self.solution.horizon["ensemble"] = ensemble(self.simulation, MEMBERS, tell)
+            self.solution.horizon["ensemble"] = ensemble(self.simulation, MEMBERS, tell, APART)
+
+    def _chaotic(self, observable):
+        """Tell if small differences have grown so much before a result that more steps hardly make its ± smaller."""
+        result = self.solution.results[observable.name]
+        lost = lost_digits(self.solution.horizon, result.time)
+        return lost >= LOST and result.error is not None and result.error > ALLOWED * abs(result.value) or lost == 12
 
     def findings(self):
         """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
@@ -166,14 +183,17 @@ class FurtherRuns:
         for part, texts in (("elements", FINER), ("contact_stiffness", STIFFNESS), ("smoothing", (SMOOTHER,))):
             texts = [text for text in texts if text in self._compared]
             if texts:
-                parts[part] = self._left(name, texts, 1.0 / (1.0 - LESS) if part == "smoothing" else 2.0)
+                parts[part] = self._left(name, texts, SMOOTHED / (1.0 - LESS) / MARGIN if part == "smoothing" else 2.0)
         entry = {"parts": parts, "reasons": reasons, "mesh_only": self._mesh_only(observable)}
-        if (mean := self.solution.horizon.get("ensemble", {}).get(name)) is not None:
-            value = self.solution.results[name].value
-            parts["chance"] = abs(value - mean["mean"]) + QUANTILE * mean["deviation"]
-        elif self.solution.horizon and name not in self.solution.horizon["statistical"]:
+        horizon = self.solution.horizon
+        if not horizon:
+            return entry
+        if not self._chaotic(observable):
             parts["chance"] = "none"
-            reasons["chance"] = "a difference of 1e-12 of an element at the start leaves a digit at its time"
+            reasons["chance"] = "small differences at the start leave its digits"
+        elif (mean := horizon.get("ensemble", {}).get(name)) is not None:
+            parts["chance"] = abs(self.solution.results[name].value - mean["mean"]) + QUANTILE * mean["deviation"]
+            entry["spread"] = mean
         return entry
 
     def _left(self, name, texts, factor):
@@ -190,8 +210,6 @@ class FurtherRuns:
         """Mean difference of an observable before its result between the scene and another run; 0 in statics."""
         if self.static:
             return 0.0
-        from ..dynamics.twin_error import largest_mean
-
         table, compared = self._compared[None][1], self._compared[text][1]
         count, end = min(len(table["time"]), len(compared["time"])), self.solution.results[name].time
         same = table["time"][:count] == compared["time"][:count]
@@ -203,8 +221,6 @@ class FurtherRuns:
 
         It falls with the mass of a node, and grows with the root of the stiffness.
         """
-        from ..results.error_budget import first_touch
-
         touch = first_touch(self.scene, self.simulation.system, observable)
         if touch is None or not self.solution.results[observable.name].value > 0.0:
             return False
@@ -223,8 +239,6 @@ SMOOTHER, HORIZON, ENSEMBLE = "a tenth of the smoothing", "two starts side by si
 
 def variants(scene, system, solution, single):
     """Yield the `Variant` of a scene that its error budget asks for; ``single`` is the cost of one run [s]."""
-    from ..results.error_budget import reasons_of
-
     reasons, static = reasons_of(scene, system, solution), scene.solve.kind == "static"
     plain = scene.replace(accuracy=Accuracy(error="none"), chosen=())
     explicit = not static and INTEGRATORS[scene.solve.method].knob == "safety"
@@ -275,12 +289,6 @@ def _results(solution):
     return {name: result.value for name, result in solution.results.items()}
 
 
-def _history(columns, rows):
-    from ..results.solution import as_history
-
-    return as_history(columns, rows)
-
-
 def report(solution):
     """The content of ``trust.json``, a dict of plain values."""
     keys = ("value", "error", "unit", "time", "parts", "reasons", "verdict", "verdict_text", "digits")
@@ -297,11 +305,7 @@ def report(solution):
 
 def write(solution, folder):
     """Write ``trust.json`` and ``trust.png`` to a folder."""
-    import json
-    import pathlib
-
     from ..pictures.error_budget import draw
-    from ..results.files import write_atomically, write_text
 
     folder = pathlib.Path(folder)
     write_text(folder / "trust.json", json.dumps(report(solution), indent=1, ensure_ascii=False))

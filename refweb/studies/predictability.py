@@ -75,21 +75,26 @@ def _integrator(simulation):
     return simulation.integrator_at(simulation.standing.knob)
 
 
-def _beside(simulation, seed):
+def _beside(simulation, seed, size=PERTURBATION):
     """The `Start` of the run of a seed, a little beside that of the simulation."""
     system, x = simulation.system, simulation.begin.x
     x = np.zeros((system.rows, 3)) if x is None else x.copy()
-    size = PERTURBATION * system.net.natural_length.min()
+    size *= system.net.natural_length.min()
     x.ravel()[system.free] += size * np.random.default_rng(seed).uniform(-1.0, 1.0, len(system.free))
     return Start(x, simulation.begin.v)
 
 
-def ensemble(simulation, count, tell):
-    """Mean and standard deviation of each result over runs of different seeds."""
+def lost_digits(horizon, time):
+    """Number of digits that a difference of `PERTURBATION` has cost at a time [s]: its growth, as a power of ten."""
+    return 12 - max((k for k, when in horizon["digits"] if when is None or when > time), default=0)
+
+
+def ensemble(simulation, count, tell, size=PERTURBATION):
+    """Mean and standard deviation of each result over runs of different seeds, which start ``size`` apart."""
     watch, values = simulation.watch, []
     for seed in range(1, count + 1):
         integrator = _integrator(simulation)
-        course = integrator.start(*_beside(simulation, seed).motion)
+        course = integrator.start(*_beside(simulation, seed, size).motion)
         for block in blocks(integrator, course, simulation.schedule):
             table = watch.table(block.history)
         values.append([result.value for result in watch.results(course, table[-1]).values()])

@@ -1,0 +1,149 @@
+"""``refweb trust``: parts of errors by further runs, held against closed forms, and the budget that they keep."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista
+
+import refweb
+from refweb.__main__ import main
+from refweb.results.error_budget import NONE, OPEN, PARTS, VERDICTS
+from refweb.studies import further_runs
+from validation.statics.elastic_catenary import CABLES, exact, solved
+
+CABLE = dict(modulus=7e7, area=1e-4, density=200.0)
+
+
+@pytest.mark.parametrize("name", CABLES)
+def test_the_error_of_elements_holds_the_elastic_catenary(name):
+    """16 straight elements of lumped weight pull less across than the cable, and ± holds by how much."""
+    hung = CABLES[name]
+    pull = refweb.Observe(name="pull", quantity="reaction", node=0, component="x")
+    found = solved(hung, 1, 16).scene.replace(observe=[pull]).trust(progress=False).results["pull"]
+    off = abs(found.value + exact(hung)[0])
+    assert found.parts["chance"] == found.parts["time"] == found.parts["smoothing"] == NONE
+    assert 1e-4 * abs(found.value) < off <= found.error < 8.0 * off
+    assert found.verdict == "determined" and off <= 10.0**-found.digits * abs(found.value)
+
+
+def test_the_error_of_smoothing_holds_the_law_without():
+    scene = refweb.Scene(
+        web=refweb.Window(mesh="square", rows=3, columns=3, side=0.5),
+        cable=refweb.Cable(law="smooth", smoothing=1e-3, **CABLE),
+        effects=[refweb.Load(node="centre", force=(0, 0, 1.0))],
+    )
+    sharp = refweb.run(scene.replace(cable=refweb.Cable(law="tension-only", **CABLE))).results
+    for name, found in scene.trust(progress=False).results.items():
+        off = abs(found.value - sharp[name].value)
+        assert off > 1e-3 * abs(found.value) and off <= found.error < 8.0 * off
+
+
+def bounced(stiffness, duration=0.1, **accuracy):
+    """A ball of 1 kg that comes at 1 m/s to a line which both ends hold, and leaves it: nothing else moves."""
+    ball = refweb.Body(name="ball", radius=0.1, mass=1.0, position=(0.0, 0.0, -0.12), velocity=(0.0, 0.0, 1.0))
+    return refweb.Scene(
+        web=refweb.Inline(points=[[-0.5, 0, 0], [0.5, 0, 0]], lines=[[0, 1]], supports=[0, 1]),
+        cable=refweb.Cable(law="tension-only", **CABLE),
+        effects=[ball, refweb.Contact(stiffness=stiffness)],
+        observe=[refweb.Observe(name="place", quantity="position", body="ball", component="z")],
+        solve=refweb.Dynamic(duration=duration, safety=0.1),
+        accuracy=refweb.Accuracy(**accuracy),
+    )
+
+
+def test_the_error_of_stiffness_holds_the_rigid_bounce(monkeypatch):
+    """A rigid line throws the ball back at once: it ends at −0.1 − (T − 0.02 s) · 1 m/s. Elements stay as they are."""
+    variants = further_runs.variants
+    held = lambda *given: (v for v in variants(*given) if v.part != "elements")  # noqa: E731
+    monkeypatch.setattr(further_runs, "variants", held)
+    found = bounced(1e4).trust(progress=False).results["place"]
+    off = abs(found.value + 0.1 + 0.08)
+    assert off == pytest.approx(np.pi / 100.0, rel=0.2)  # v π √(m/k), a half swing on the spring
+    assert off <= found.parts["contact_stiffness"] < 8.0 * off
+    assert found.parts["elements"] == OPEN
+
+
+def test_a_start_on_the_edge_is_statistical():
+    """A mass at rest between two lines that are pressed leaves to either side: its rest is no result."""
+    rate = np.sqrt(2.0 * 7e3 * 1e-3)
+    scene = refweb.Scene(
+        web=refweb.Inline(points=[[0, 0, 0], [1, 0, 0], [2, 0, 0]], lines=[[0, 1], [1, 2]], supports=[0, 2]),
+        cable=refweb.Cable(law="linear", modulus=7e7, area=1e-4, density=0.0, prestrain=-1e-3),
+        effects=[refweb.PointMass(node=1, mass=1.0)],
+        support=[refweb.Supports(nodes=1, components=["x", "z"])],
+        observe=[refweb.Observe(name="place", quantity="displacement", node=1, component="y")],
+        solve=refweb.Dynamic(duration=45.0 / rate),
+        output=refweb.Output(interval=0.1),
+    )
+    found = scene.trust(progress=False)
+    spread = found.horizon["ensemble"]["place"]
+    assert found.results["place"].verdict == "statistical" and "runs from starts" in found.results["place"].verdict_text
+    assert found.results["place"].error >= 2.0 * spread["deviation"] > 0.0
+
+
+def test_first_touch_has_no_limit_by_what_finer_elements_and_stiffer_contact_do():
+    scene = refweb.Scene.load("triangle-impact", {"solve.duration": 0.05})
+    peak = refweb.Observe(name="peak", quantity="reaction", body="ball", reduce="max")
+    results = scene.replace(observe=[*scene.observables, peak]).trust(progress=False).results
+    assert results["peak"].verdict == "no limit"
+    assert not any(found.verdict == "no limit" for name, found in results.items() if name != "peak")
+
+
+def test_runs_that_cost_too_much_are_left_out():
+    """The first run goes to its end; of the rest nothing is left, and no part is made up."""
+    found = bounced(1e4).trust(budget=1e-6, progress=False)
+    assert {run["status"] for run in found.further} == {"left out"}
+    place = found.results["place"]
+    assert place.verdict is None and place.parts["elements"] == place.parts["contact_stiffness"] == OPEN
+    assert isinstance(place.parts["time"], float) and place.error == place.parts["time"]
+
+
+def test_a_run_on_its_way_beyond_the_budget_is_ended(monkeypatch):
+    """Its price is taken to be nothing; what it takes is more than what is left, and the budget is kept."""
+    variants = further_runs.variants
+    cheap = lambda *given: (v._replace(price=0.0) for v in variants(*given) if v.part == "elements")  # noqa: E731
+    monkeypatch.setattr(further_runs, "variants", cheap)
+    scene = refweb.Scene.load("square-impact", {"solve.duration": 0.05})
+    refweb.run(scene)  # kernels are compiled
+    alone = refweb.run(scene).cost["cpu_s"]
+    found = scene.trust(budget=2.0 * alone, progress=False)
+    assert "ended" in {run["status"] for run in found.further}
+    assert all(result.parts["elements"] == OPEN for result in found.results.values()) or len(found.further) == 2
+
+
+def test_the_command_writes_what_it_prints(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["trust", "square-load", "--budget", "60", "--out", str(out)]) == 0
+    printed, read = capsys.readouterr().out, json.loads((out / "trust.json").read_text(encoding="utf-8"))
+    run = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    for name, entry in read["results"].items():
+        assert name in printed and entry["verdict"] in VERDICTS and list(entry["parts"]) == list(PARTS)
+        for key in ("value", "error", "parts", "verdict", "verdict_text", "digits"):
+            assert run["results"][name][key] == entry[key]
+        numbers = [part for part in entry["parts"].values() if not isinstance(part, str)]
+        assert entry["error"] == pytest.approx(sum(numbers), rel=1e-12)
+    assert read["budget"]["given"] == 60.0 and read["budget"]["spent"] > 0.0
+    picture = pyvista.read(out / "trust.png")
+    assert np.ptp(np.asarray(picture.active_scalars)) > 200
+
+
+def test_a_scene_asks_for_it_itself():
+    level = replace(bounced(1e4).accuracy, level="full", budget=30.0)
+    asked = refweb.run(bounced(1e4).replace(accuracy=level))
+    assert asked.further and OPEN not in asked.results["place"].parts.values()
+
+
+@pytest.mark.parametrize(
+    "given, message",
+    [
+        (["--budget", "0"], "budget = 0.0 must be > 0"),
+        (["--budget", "nan"], "budget = nan must be a finite number"),
+        (["--set", 'accuracy.level="ful"'], "did you mean"),
+    ],
+)
+def test_refusals(given, message, capsys):
+    assert main(["trust", "square-load", *given]) == 2
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1
