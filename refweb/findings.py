@@ -39,6 +39,7 @@ CODES = {
     "resumed": "A run goes on with other versions of libraries.",
     "short-window": "A mean whose window was not full at the end.",
     "slow-library": "A library that makes the run fast is not there.",
+    "soft-contact": "A contact is so deep that results may move with its stiffness.",
     "solver": "A solver has found no answer.",
     "stability-in-doubt": "The stability of the equilibrium is not decided.",
     "starts-in-body": "A body that starts inside of the web, or the web in a body.",

@@ -43,8 +43,13 @@ SHARE = 0.1
 """Overlap that is allowed, over the size of the body."""
 CORE = 0.5
 """Overlap at which a line is in the core, over the distance from the middle of the body to its surface."""
-AIM = 0.8
-"""Overlap that a stiffness is chosen for, over what is allowed."""
+AIM = 0.2
+"""Overlap that a stiffness is chosen for, over what is allowed: 2 % of the size of the body.
+
+Of a net of 16 × 16 cells that is thrown at a box of 500 kg this costs as many steps as 0.8 does, whose contact is 16
+times softer; 0.1 costs 2.4 times as many."""
+NOTED = 0.03
+"""Overlap over the size of the body above which it is told: results may move with it."""
 STIFFER = 4.0
 """Least factor of a stiffness that is chosen anew: an overlap that is found too deep may still be growing."""
 DEEPER = 1.1
@@ -200,6 +205,11 @@ class Deepest(NamedTuple):
             share = 100.0 * self.overlap / size_of(self.body)
             text = f"line {self.line} is up to {self._where()}, {share:.3g} % of its size; {remedy}"
             yield Finding("deep-contact", text, "contact")
+        elif self.overlap > max(NOTED * size_of(self.body), DEEPER * self.initial) and not self.fixed:
+            share = 100.0 * self.overlap / size_of(self.body)
+            text = f"line {self.line} is up to {self._where()}, {share:.2g} % of its size: results may move with the "
+            text += f"stiffness of contact; {self.enough:g} holds it to {100.0 * AIM * SHARE:g} %, and refweb trust "
+            yield Finding("soft-contact", text + "says by how much", "contact")
 
     def _remedy(self):
         if self.fixed:
