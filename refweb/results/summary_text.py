@@ -135,8 +135,7 @@ def on_run(summary):
         line = f"{', '.join(map(str, before[:FEW_BREAKS]))}{', ...' * (len(before) > FEW_BREAKS)}"
         yield "broken", f"{len(before)} line{'s' * (len(before) > 1)} before the run began: {line}"
     if worst := summary.get("utilisation"):
-        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
-        yield "strength", f"utilisation {worst['value']:{digits}} at line {worst['line']}"
+        yield "strength", _of_strength(worst)
 
 
 def on_solver(solver):
@@ -190,6 +189,15 @@ def _breaks(breaks):
         )
     if len(breaks) > FEW_BREAKS:
         yield "", f"and {len(breaks) - FEW_BREAKS} more, the last at t = {breaks[-1]['time']:.6g} s"
+
+
+def _of_strength(worst):
+    """Sentence on the largest stress over strength, with its ± and what that holds."""
+    if (error := worst.get("error")) is None:
+        digits = ".2f" if 0.01 <= worst["value"] < 100.0 else ".2g"
+        return f"utilisation {worst['value']:{digits}} at line {worst['line']}, its ± is not known"
+    text = f"utilisation {with_error(worst['value'], error)} at line {worst['line']}"
+    return f"{text} ({parts})" if (parts := shares(worst)) else text
 
 
 def _of_throw(thrown):

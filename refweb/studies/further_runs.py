@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import InputError, SolverError
 from ..registry import EFFECTS, INTEGRATORS, name_of
+from ..results.strength import UTILISATION
 from ..settings import Accuracy
 from .discretisation_error import MARGIN, left_of
 
@@ -159,14 +160,21 @@ class FurtherRuns:
 
     def findings(self):
         """Errors by result, as far as these runs tell: ``parts``, ``reasons`` and ``mesh_only``."""
-        return {o.name: self._found_of(o) for o in self.scene.observables}
+        found: dict = {o.name: self._found_of(o) for o in self.scene.observables}
+        return found | {UTILISATION: {"parts": self._parts_of(UTILISATION)}}
 
-    def _found_of(self, observable):
-        name, parts, reasons = observable.name, {}, {}
+    def _parts_of(self, name):
+        """Errors of a result by part of the model; of the utilisation, which has no history, by its largest value."""
+        parts = {}
         for part, texts in (("elements", FINER), ("contact_stiffness", STIFFNESS), ("smoothing", (SMOOTHER,))):
             texts = [text for text in texts if text in self._compared]
-            if texts:
+            if texts and name in self._compared[None][0]:
                 parts[part] = self._left(name, texts, 1.0 / (1.0 - LESS) if part == "smoothing" else 2.0)
+        return parts
+
+    def _found_of(self, observable):
+        name, reasons = observable.name, {}
+        parts = self._parts_of(name)
         entry = {"parts": parts, "reasons": reasons, "mesh_only": self._mesh_only(observable)}
         if (mean := self.solution.horizon.get("ensemble", {}).get(name)) is not None:
             value = self.solution.results[name].value
@@ -188,7 +196,7 @@ class FurtherRuns:
 
     def _mean_apart(self, name, text):
         """Mean difference of an observable before its result between the scene and another run; 0 in statics."""
-        if self.static:
+        if self.static or name == UTILISATION:
             return 0.0
         from ..dynamics.twin_error import largest_mean
 
@@ -272,7 +280,8 @@ def _at_knob(simulation):
 
 
 def _results(solution):
-    return {name: result.value for name, result in solution.results.items()}
+    values: dict = {name: result.value for name, result in solution.results.items()}
+    return values | ({UTILISATION: solution.utilisation.value} if solution.utilisation else {})
 
 
 def _history(columns, rows):
