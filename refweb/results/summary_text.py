@@ -203,8 +203,14 @@ def _of_strength(worst):
 def _of_throw(thrown):
     """A number of a throw, or whether something is so, in words."""
     if "unit" not in thrown:
-        return {True: "yes", False: "no", None: "not known"}[thrown["value"]]
-    return "at least " * thrown.get("at_least", False) + readable(thrown["value"], thrown["error"], thrown["unit"])
+        if thrown["value"] is not None:
+            return "yes" if thrown["value"] else "no"
+        drawn = "yes" if thrown["drawn"] else "no"
+        if thrown.get("error") is None:
+            return f"not known, {drawn} in this run: {thrown.get('reason', 'it has no ±')}"
+        return f"undecided, {drawn} in this run"
+    text = "at least " * thrown.get("at_least", False) + readable(thrown["value"], thrown["error"], thrown["unit"])
+    return text if thrown["error"] is not None else f"{text}, its ± is not known: {thrown.get('reason', 'it has none')}"
 
 
 def _horizon(horizon):
